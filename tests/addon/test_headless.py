@@ -19,7 +19,7 @@ from blender_addon.headless import main
 from isc_core.cli.interface.terminal import Interrupts
 from isc_core.result_files.diagnostics_text import status_lines
 from tests.addon.scene_fixture import bump, write_result
-from tests.core.lit_balls import under_lamps
+from tests.core.lit_balls import under_lights
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(
@@ -163,7 +163,7 @@ def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree
 
 
 def test_warnings_of_a_photo_are_printed(tmp_path: Path) -> None:
-    image, mask = under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
+    image, mask = under_lights((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
     np.save(tmp_path / "ball.npy", image)
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255) * mask)
     done = run(

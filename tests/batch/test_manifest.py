@@ -19,7 +19,8 @@ def items(path: Path, text: str | bytes) -> list[BatchItem]:
 def test_both_kinds_say_the_same(tmp_path: Path) -> None:
     table = items(
         tmp_path / "a.csv",
-        'image,mask,name,max-size,full_size,options\ncup.png,m/cup.png,tasse,128,yes,\n/x/jug.png,,,,,"{""seed"": 3}"\n\ns3://b/k.png,,,,,\n',
+        "image,mask,name,max-size,full_size,options\ncup.png,m/cup.png,tasse,128,yes,\n"
+        '/x/jug.png,,,,,"{""seed"": 3}"\n\ns3://b/k.png,,,,,\n',
     )
     lines = items(
         tmp_path / "a.jsonl",

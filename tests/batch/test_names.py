@@ -35,7 +35,7 @@ HOSTILE = [
 
 
 def is_safe(name: str) -> bool:
-    """Whether it can be a folder's name on any system, and none of those that the run itself uses."""
+    """Whether any system accepts it as the name of a folder, and the run itself does not use it."""
     return (
         0 < len(name.encode("utf-8")) <= 130
         and not set(name) & set('/\\\0<>:"|?*\n\r ')

@@ -1,4 +1,4 @@
-"""Balls whose kind is known: painted ones under lamps, and mirrors in their surroundings."""
+"""Balls whose kind is known: coloured ones under lights, and mirrors in their surroundings."""
 
 import numpy as np
 
@@ -12,16 +12,16 @@ def ball() -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], -1) * mask[..., None], mask
 
 
-def under_lamps(
-    *lamps: tuple[float, float, float], paint: tuple[float, float, float] = (0.5, 0.3, 0.2)
+def under_lights(
+    *lamps: tuple[float, float, float], albedo: tuple[float, float, float] = (0.5, 0.3, 0.2)
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A glossy painted ball."""
+    """A glossy coloured ball."""
     normal, mask = ball()
-    image = 0.06 * np.ones((SIDE, SIDE, 3)) * paint
+    image = 0.06 * np.ones((SIDE, SIDE, 3)) * albedo
     for lamp in lamps:
         toward = np.array(lamp) / np.linalg.norm(lamp)
         half = toward + (0, 0, 1)
-        image += np.maximum(normal @ toward, 0)[..., None] * paint
+        image += np.maximum(normal @ toward, 0)[..., None] * albedo
         image += 1.2 * np.maximum(normal @ (half / np.linalg.norm(half)), 0)[..., None] ** 150
     return (image * mask[..., None]).astype(np.float32), mask
 

@@ -1,4 +1,4 @@
-"""Whatever cannot be used ends in one clear line and exit code 2: no traceback, no partial result."""
+"""Unusable input ends in one clear line and exit code 2: no traceback, no partial result."""
 
 import os
 import subprocess

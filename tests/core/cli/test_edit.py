@@ -36,10 +36,10 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cv2.imwrite(
         str(folder / "sky.png"), np.random.default_rng(0).integers(0, 255, (16, 32, 3), np.uint8)
     )
-    sky = np.full((16, 32, 3), 0.5, np.float32)
+    env_map = np.full((16, 32, 3), 0.5, np.float32)
     write_channels(
         folder / "broken.exr",
-        {name: np.where(np.arange(32) == 3, np.inf, sky[..., 0]) for name in "RGB"},
+        {name: np.where(np.arange(32) == 3, np.inf, env_map[..., 0]) for name in "RGB"},
     )
     cv2.imwrite(
         str(folder / "region.png"),
@@ -314,7 +314,7 @@ def test_an_edit_that_changes_nothing_says_so(
         main(["edit", str(work / "ball"), "recolour", "--hue", "360", "-o", str(tmp_path / "out")])
         == 0
     )
-    assert "stays as it was" in capsys.readouterr().out
+    assert "is unchanged" in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "edit.json").read_text())["notes"]
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from isc_core.cli.interface.json_progress import JsonSpeaker
+from isc_core.cli.interface.json_progress import JsonReporter
 from isc_core.result_files.result_folder import load, save
 from tests.core.ball_scene import ball
 from tests.core.command_line import ROOT, ball_photo, isc_command
@@ -22,8 +22,9 @@ def run(options, monitor):
     return [str(time.sleep(0.01)) for _ in range(6000)]
 m.run = run
 """
-STUBBORN = """import time, isc_core.cli.commands.mask as m, isc_core.cli.interface.json_progress as j
-j.PATIENCE_SECONDS = (0.2, 0.2)
+STUBBORN = """import time, isc_core.cli.commands.mask as m
+import isc_core.cli.interface.json_progress as j
+j.GRACE_SECONDS = (0.2, 0.2)
 def run(options, monitor):
     monitor.report("sleeping", 0.5)
     while True:
@@ -83,7 +84,7 @@ def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
     assert events[-1] == {
         "event": "done",
         "output": str(output),
-        "lines": [f"look at {output / 'preview.png'}"],
+        "lines": [f"see {output / 'preview.png'}"],
     }
     load(output)
 
@@ -190,7 +191,7 @@ def test_a_listener_that_goes_deaf_does_not_stop_the_work(tmp_path: Path) -> Non
 
 
 def test_what_breaks_bounds_is_a_failure_with_its_lines(capsys: pytest.CaptureFixture[str]) -> None:
-    speaker = JsonSpeaker(sys.stdout)
+    speaker = JsonReporter(sys.stdout)
     speaker.rejected(["one", "two"], 1)
     assert json.loads(capsys.readouterr().out) == {
         "event": "failed",

@@ -179,7 +179,7 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     photo, out = ball_photo(tmp_path), tmp_path / "out"
     assert isc("decompose", photo, "--model", "naive", "-o", out) == 0
     printed = capfd.readouterr()
-    assert printed.out == f"look at {out / 'preview.png'}\n"
+    assert printed.out == f"see {out / 'preview.png'}\n"
     assert all(line.startswith("isc: ") for line in printed.err.splitlines())
     assert "isc: building the mesh" in printed.err.splitlines()
     assert isc("decompose", photo, "--model", "naive", "--quiet", "-o", out) == 0
@@ -322,7 +322,7 @@ def test_a_light_is_read_from_what_people_have(tmp_path: Path, shape: str) -> No
 
 
 def disc_photo(folder: Path) -> Path:
-    """A disc of three strong paints with three highlights, a 16-bit PNG; nothing is clipped."""
+    """A disc of three strong albedos with three highlights, a 16-bit PNG; nothing is clipped."""
     return write_image(
         folder / "disc.png",
         np.rint(65535 * np.clip(linear_to_srgb(0.7 * glossy_disc()[0]), 0, 1)).astype(np.uint16),
@@ -382,7 +382,7 @@ def test_a_photo_that_is_left_alone_is_said_to_be(
     assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
     assert "no colour" in capsys.readouterr().err
     assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
-    assert "left as it is" not in capsys.readouterr().err
+    assert "left unchanged" not in capsys.readouterr().err
 
 
 def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
@@ -451,7 +451,7 @@ def test_mask_finds_the_ball_in_its_box(tmp_path: Path, capfd: pytest.CaptureFix
     backdrop = np.random.default_rng(2).integers(20000, 26000, codes.shape).astype(np.uint16)
     photo = write_image(tmp_path / "photo.png", np.where(truth[..., None], codes, backdrop))
     assert isc("mask", photo, "--box", "3,2,88,88", "-o", tmp_path / "mask.png") == 0
-    assert "look at it" in capfd.readouterr().out
+    assert "check it" in capfd.readouterr().out
     found = read_photo(photo, tmp_path / "mask.png").mask
     assert (found & truth).sum() / (found | truth).sum() > 0.9
 

@@ -28,7 +28,7 @@ SURE, MIRRORED = (
 
 
 def lit_by(several: float) -> LightEstimate:
-    """One lamp or, with a probability of `several`, more."""
+    """One light or, with a probability of `several`, more."""
     return LightEstimate(
         0.0, 1 - several, several, np.full(len(PLACES), 1 / len(PLACES)), np.zeros(8), np.ones(8)
     )

@@ -1,5 +1,5 @@
-"""Joint MDR on scenes with known parts: grey paint under a lamp, which colour cannot tell from a
-highlight, and matt objects.
+"""Joint MDR on scenes with known parts: grey albedo under a light, which colour cannot tell from a
+highlight, and diffuse objects.
 """
 
 from dataclasses import replace
@@ -26,12 +26,12 @@ from isc_core.shading.radiance import directional, radiance
 from isc_core.shading.spherical_harmonics import light_to_reference
 from tests.core.ball_scene import ball
 
-LAMP = np.array([-0.42, 0.5, 0.757])
-LAMP /= np.linalg.norm(LAMP)
+TO_LIGHT = np.array([-0.42, 0.5, 0.757])
+TO_LIGHT /= np.linalg.norm(TO_LIGHT)
 
 
 def grey_ball(gloss: float, alpha: float = 0.1) -> Decomposition:
-    """A ball of two grey paints; `gloss`: irradiance of the lamp that the gloss mirrors."""
+    """A ball of two grey albedos; `gloss`: irradiance of the light that the gloss mirrors."""
     d = ball((92, 100), 42.0, (46, 50))
     inside = d.mask[..., None]
     reflectance = np.where(inside, 0.25 + 0.6 * d.reflectance[..., :1], 0) * np.ones(3, np.float32)
@@ -39,7 +39,7 @@ def grey_ball(gloss: float, alpha: float = 0.1) -> Decomposition:
         Ggx(alpha, 0.04),
         d.normal.astype(float),
         np.array([0.0, 0, 1]),
-        directional(LAMP, max(gloss, 1e-6)),
+        directional(TO_LIGHT, max(gloss, 1e-6)),
     )
     diffuse, specular = (
         reflectance * d.shading,
@@ -61,7 +61,7 @@ def photo_of(d: Decomposition) -> Photo:
 
 
 def task_of(d: Decomposition) -> DecompositionTask:
-    """With the true shape and light, so that nothing but the separation is asked for; or without
+    """With the true shape and light, so that nothing but the separation is requested; or without
     them.
     """
     photo = photo_of(d)

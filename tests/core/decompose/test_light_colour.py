@@ -19,13 +19,13 @@ from isc_core.scene.diagnostics import Diagnostics, IlluminantOutcome, StopReaso
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOutcome, LobeLight
 from isc_core.separation import separate
 from isc_core.shading.spherical_harmonics import light_from_reference
-from tests.core.illuminant.test_illuminant import LIGHT, PAINTS, ball
+from tests.core.illuminant.test_illuminant import ALBEDOS, LIGHT, ball
 
 MADE = Diagnostics(reason=StopReason.STEP)
 
 
-def photo_of(paints: np.ndarray, light: np.ndarray, gloss: float = 0.5, size: int = 120) -> Photo:
-    image, mask = ball(paints, light, gloss, size)
+def photo_of(albedos: np.ndarray, light: np.ndarray, gloss: float = 0.5, size: int = 120) -> Photo:
+    image, mask = ball(albedos, light, gloss, size)
     source = PhotoSource("0" * 64, (size, size), 12, "linear", "file")
     return Photo(image.astype(np.float32), mask, 1 / 4095, np.zeros(mask.shape, bool), source)
 
@@ -55,7 +55,7 @@ def seen_by(task: DecompositionTask) -> SceneEstimate:
 
 
 def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> None:
-    photo, seen = photo_of(PAINTS, LIGHT), []
+    photo, seen = photo_of(ALBEDOS, LIGHT), []
 
     def solver(task: DecompositionTask) -> SceneEstimate:
         seen.append(task)
@@ -80,11 +80,11 @@ def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> N
     assert answer.diagnostics.reason == MADE.reason
 
 
-@pytest.mark.parametrize(("paints", "asked"), [(PAINTS, "white"), (PAINTS[:1], "estimate")])
+@pytest.mark.parametrize(("albedos", "asked"), [(ALBEDOS, "white"), (ALBEDOS[:1], "estimate")])
 def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
-    paints: np.ndarray, asked: str
+    albedos: np.ndarray, asked: str
 ) -> None:
-    photo = photo_of(paints, LIGHT)
+    photo = photo_of(albedos, LIGHT)
     answer, usual = under_light(task_of(photo, asked), seen_by), seen_by(task_of(photo))
     np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
     np.testing.assert_array_equal(answer.split.confidence, usual.split.confidence)
@@ -94,7 +94,7 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
 
 
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
-    photo = photo_of(PAINTS, np.array([1.3, 1.0, 0.7]))
+    photo = photo_of(ALBEDOS, np.array([1.3, 1.0, 0.7]))
     answer, usual = under_light(task_of(photo), seen_by), seen_by(task_of(photo))
     assert estimate_illuminant(photo.image, photo.mask).too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
@@ -105,7 +105,7 @@ def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() 
 
 
 def test_layers_that_are_known_already_are_taken_along() -> None:
-    photo = photo_of(PAINTS, LIGHT)
+    photo = photo_of(ALBEDOS, LIGHT)
     split = separate("none", photo.image, photo.mask)
 
     def given(task: DecompositionTask) -> SceneEstimate:
@@ -119,7 +119,7 @@ def test_layers_that_are_known_already_are_taken_along() -> None:
 @pytest.mark.parametrize("model", ["joint", "mbp"])
 def test_the_identities_hold_in_the_end(model: str) -> None:
     d = decompose(
-        photo_of(PAINTS, LIGHT, size=64),
+        photo_of(ALBEDOS, LIGHT, size=64),
         Settings(model=model, light_colour="estimate", confidence_weights=model == "joint"),
     )
     assert d.identity_errors().broken() == ()

@@ -9,12 +9,12 @@ from isc_core.decompose.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
-from tests.core.lit_balls import ball, under_lamps
+from tests.core.lit_balls import ball, under_lights
 
 
 def found(toward: tuple[float, float, float], grey: bool = False, **settings: str) -> Decomposition:
-    """A painted ball under one lamp, explained."""
-    image, mask = under_lamps(toward)
+    """A coloured ball under one light, explained."""
+    image, mask = under_lights(toward)
     image = image.mean(axis=2, keepdims=True).repeat(3, axis=2) if grey else image
     photo = Photo(
         image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file")

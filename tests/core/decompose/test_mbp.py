@@ -1,5 +1,5 @@
 """The models that separate, on a scene with known parts: identities, the order of their steps, and
-nothing invented on a matt object.
+nothing invented on a diffuse object.
 """
 
 from dataclasses import replace
@@ -19,19 +19,17 @@ from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.core.ball_scene import ball
 
-LAMP = np.array([-0.42, 0.5, 0.757])
-LAMP /= np.linalg.norm(LAMP)
+TO_LIGHT = np.array([-0.42, 0.5, 0.757])
+TO_LIGHT /= np.linalg.norm(TO_LIGHT)
 
 
 def glossy(shape: tuple[int, int] = (76, 90), radius: float = 34.0) -> Decomposition:
-    """The ball of one red paint, without a pattern, under the gloss of a lamp: alpha .15, strength
-    x light 1.5.
-    """
+    """The ball with one red albedo and the gloss of one light: alpha .15, strength x light 1.5."""
     d = ball(shape, radius, (shape[0] / 2, shape[1] / 2))
     inside = d.mask[..., None]
     reflectance = np.where(inside, [0.52, 0.12, 0.07], 0).astype(np.float32)
     gloss = radiance(
-        Ggx(0.15, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, 1.5)
+        Ggx(0.15, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(TO_LIGHT, 1.5)
     )
     diffuse, specular = reflectance * d.shading, np.where(inside, gloss, 0).astype(np.float32)
     return replace(
@@ -80,7 +78,7 @@ def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     assert brdf.determined, brdf.outcome
     assert brdf.alpha == pytest.approx(0.15, rel=0.5)
     assert brdf.direction is not None
-    assert np.degrees(np.arccos(brdf.direction @ LAMP)) < 5
+    assert np.degrees(np.arccos(brdf.direction @ TO_LIGHT)) < 5
     assert brdf.model.startswith("ggx" if model == "mdr" else "blinn_phong")
 
 
@@ -195,7 +193,7 @@ def test_how_sirfs_shares_out_brightness_does_not_matter() -> None:
 
 
 def test_a_light_of_the_wrong_hue_gives_no_highlights_of_that_hue() -> None:
-    """SIRFS may explain yellow paint as orange paint under blue light; highlights stay white."""
+    """SIRFS may explain yellow albedo as orange albedo under blue light; highlights stay white."""
     d = glossy()
     blue = d.shading * np.array([0.5, 0.8, 2.5], np.float32)
     usual, wrong = (

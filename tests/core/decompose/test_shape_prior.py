@@ -1,6 +1,4 @@
-"""What SIRFS expects of the shape: what the networks predict from the photo, or what its outline alone
-suggests.
-"""
+"""The shape prior of SIRFS: normals predicted from the photo, or the silhouette alone."""
 
 import numpy as np
 import pytest
@@ -9,12 +7,12 @@ from isc_core.decompose.pipeline import KnownInputs, Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
-from tests.core.lit_balls import ball, under_lamps
+from tests.core.lit_balls import ball, under_lights
 
 
 def found(evidence: KnownInputs | None = None, cut: int = 0, **settings: str) -> Decomposition:
-    """A painted ball under one lamp, explained."""
-    image, mask = (part[cut:] for part in under_lamps((-0.7, 0.2, 0.6)))
+    """A coloured ball under one light, explained."""
+    image, mask = (part[cut:] for part in under_lights((-0.7, 0.2, 0.6)))
     photo = Photo(
         image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file")
     )

@@ -22,7 +22,7 @@ from isc_core.scene.decomposition import Decomposition, Provenance
 from tests.core.ball_scene import ball
 
 SCALE = 0.5
-MATT = DichromaticEdit(specular=LayerEdit(gain=0))
+DIFFUSE_ONLY = DichromaticEdit(specular=LayerEdit(gain=0))
 
 
 def photo_of(scene: Decomposition, background: float = 0.3) -> Photo:
@@ -64,7 +64,7 @@ def test_no_edit_is_the_photo_bit_by_bit_at_any_size(full: Decomposition) -> Non
     assert np.array_equal(image, photo.image) and not changed.any()
 
 
-@pytest.mark.parametrize("change", [MATT, DichromaticEdit(diffuse=LayerEdit(gain=0.5))])
+@pytest.mark.parametrize("change", [DIFFUSE_ONLY, DichromaticEdit(diffuse=LayerEdit(gain=0.5))])
 def test_an_enlarged_edit_is_near_the_edit_made_at_full_size(
     full: Decomposition, change: DichromaticEdit
 ) -> None:
@@ -97,7 +97,7 @@ def test_edges_of_the_paint_stay_as_sharp_as_the_photo_s(full: Decomposition) ->
 
 def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
     half, photo = half_size(full), photo_of(full)
-    edit = edit_layers(half, MATT)
+    edit = edit_layers(half, DIFFUSE_ONLY)
     smaller = replace(photo, image=photo.image[:150], mask=photo.mask[:150])
     shifted = replace(photo, mask=np.roll(photo.mask, 15, axis=1))
     for wrong in (smaller, shifted):
@@ -204,7 +204,7 @@ def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: P
     )
     save_edit(
         half,
-        edit_layers(half, MATT),
+        edit_layers(half, DIFFUSE_ONLY),
         tmp_path / "out",
         Record("dichromatic"),
         Sheet("t"),
@@ -222,10 +222,12 @@ def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: P
 
 def test_without_a_photo_the_maps_picture_is_written_with_the_mask_as_alpha(tmp_path: Path) -> None:
     scene = ball()
-    save_edit(scene, edit_layers(scene, MATT), tmp_path / "out", Record("dichromatic"), Sheet("t"))
+    save_edit(
+        scene, edit_layers(scene, DIFFUSE_ONLY), tmp_path / "out", Record("dichromatic"), Sheet("t")
+    )
     written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(written[..., 3], 255 * scene.mask.astype(np.uint8))
     channels = read_channels(tmp_path / "out" / "edited.exr")
     assert np.stack([channels[c] for c in "RGB"], -1) == pytest.approx(
-        edit_layers(scene, MATT).image, abs=1e-6
+        edit_layers(scene, DIFFUSE_ONLY).image, abs=1e-6
     )

@@ -74,10 +74,10 @@ def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposit
 
 
 def test_removing_a_layer_leaves_the_other(scene: Decomposition) -> None:
-    matt = edit_layers(scene, DichromaticEdit(specular=LayerEdit(gain=0)))
+    diffuse_only = edit_layers(scene, DichromaticEdit(specular=LayerEdit(gain=0)))
     lit = scene.specular.any(-1)
-    assert np.array_equal(matt.image[lit], scene.diffuse[lit])
-    assert not matt.specular.any()
+    assert np.array_equal(diffuse_only.image[lit], scene.diffuse[lit])
+    assert not diffuse_only.specular.any()
     gloss = edit_layers(scene, DichromaticEdit(diffuse=LayerEdit(gain=0)))
     assert np.array_equal(gloss.specular, scene.specular) and not gloss.diffuse.any()
 
@@ -199,7 +199,7 @@ def test_clusters_are_the_paints_and_the_same_each_time(scene: Decomposition) ->
     assert agreement.mean() in (0.0, 1.0)
     assert np.array_equal(found.labels, find_clusters(scene, 2, seed=5).labels)
     assert found.shares.sum() == pytest.approx(1) and found.shares[0] >= found.shares[1]
-    assert len(find_clusters(scene, 6).shares) == 2  # there are no more paints
+    assert len(find_clusters(scene, 6).shares) == 2  # there are no more albedos
     for other in range(4):
         assert len(find_clusters(scene, 3, seed=other).shares) == 2
     weights = found.weight(1) + found.weight(2)
@@ -256,10 +256,10 @@ def test_relighting_is_reflectance_times_shading(scene: Decomposition) -> None:
 def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(
     scene: Decomposition,
 ) -> None:
-    sky = np.broadcast_to([0.5, 0.5, 0.5], (16, 32, 3))
-    even = relight(scene, NewLight(environment=sky), Relighting("remove"))
+    env_map = np.broadcast_to([0.5, 0.5, 0.5], (16, 32, 3))
+    even = relight(scene, NewLight(environment=env_map), Relighting("remove"))
     assert even.diffuse[scene.mask] == pytest.approx(0.5 * scene.reflectance[scene.mask], rel=0.01)
-    balanced = relight(scene, NewLight(environment=sky), Relighting("remove", balanced=True))
+    balanced = relight(scene, NewLight(environment=env_map), Relighting("remove", balanced=True))
     assert luminance(balanced.diffuse[scene.mask]).sum() == pytest.approx(
         luminance(scene.diffuse[scene.mask]).sum(), rel=1e-3
     )
@@ -372,7 +372,7 @@ def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Dec
 
 
 def test_a_clipped_highlight_stays_white_on_other_paint(scene: Decomposition) -> None:
-    """What the sensor cut off was of the old paint's colour, and says nothing of the new one's."""
+    """What the sensor cut off was of the old albedo's colour, and says nothing of the new one's."""
     light, full = scene.diffuse + scene.specular, 0.4
     d = replace(
         scene,
@@ -410,13 +410,13 @@ def test_what_was_cut_off_neither_stays_dark_in_more_light_nor_glows_in_less(
 
 def test_a_lobe_in_a_sky_with_one_bright_spot_is_the_lobe_under_that_light() -> None:
     rows = 32
-    sky = np.zeros((rows, 2 * rows, 3))
-    sky[10, 36] = 5.0
-    sun = DirectionalLight(directions(rows)[10, 36], sky[10, 36] * solid_angles(rows)[10, 36])
+    env_map = np.zeros((rows, 2 * rows, 3))
+    env_map[10, 36] = 5.0
+    sun = DirectionalLight(directions(rows)[10, 36], env_map[10, 36] * solid_angles(rows)[10, 36])
     normals = sphere_directions(400)[:190]
     for lobe in (Lobe(30.0), Lobe(alpha=0.3)):
         expected = lobe_under(lobe, normals, sun)
-        assert lobe_in_environment(lobe, normals, sky) == pytest.approx(
+        assert lobe_in_environment(lobe, normals, env_map) == pytest.approx(
             expected, abs=0.03 * expected.max()
         )
 
@@ -479,14 +479,14 @@ def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> 
 
 
 def test_a_matt_object_says_that_it_has_no_gloss_to_change(scene: Decomposition) -> None:
-    matt = replace(
+    diffuse_only = replace(
         scene,
         specular=np.zeros_like(scene.specular),
         residual=np.zeros_like(scene.residual),
         image=scene.diffuse,
     )
-    edit = change_gloss(matt, Gloss(exponent=100))
-    assert np.array_equal(edit.image, matt.image) and "no specular light" in edit.notes[0]
+    edit = change_gloss(diffuse_only, Gloss(exponent=100))
+    assert np.array_equal(edit.image, diffuse_only.image) and "no specular light" in edit.notes[0]
 
 
 # --- what cannot be -------------------------------------------------------------------------------

@@ -7,10 +7,10 @@ import pytest
 
 from isc_core.illuminant.gamut import PLANE, distance_of_white, share_toward_white, without_white
 from isc_core.illuminant.illuminant import estimate_illuminant
-from tests.core.illuminant.test_illuminant import PAINTS, ball
+from tests.core.illuminant.test_illuminant import ALBEDOS, ball
 
 GREY = np.full((1, 3), 0.4)
-SOFT = (PAINTS + 0.3) / 2
+SOFT = (ALBEDOS + 0.3) / 2
 STRONG = [np.array(light) for light in permutations((1.8, 1.0, 0.2))]
 
 
@@ -21,9 +21,9 @@ def lines(start: np.ndarray, end: np.ndarray, number: int = 200) -> tuple[np.nda
 
 
 @pytest.mark.parametrize("light", STRONG)
-@pytest.mark.parametrize("paints", [SOFT, SOFT[:1], SOFT[1:3], GREY])
-def test_strongly_coloured_light_is_told(paints: np.ndarray, light: np.ndarray) -> None:
-    found = estimate_illuminant(*ball(paints, light, 0.5))
+@pytest.mark.parametrize("albedos", [SOFT, SOFT[:1], SOFT[1:3], GREY])
+def test_strongly_coloured_light_is_told(albedos: np.ndarray, light: np.ndarray) -> None:
+    found = estimate_illuminant(*ball(albedos, light, 0.5))
     assert found.too_strong and not found.determined
 
 
@@ -33,26 +33,26 @@ def test_less_strong_light_is_told_on_grey(light: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("light", [np.ones(3), np.array([1.1, 1.0, 0.9])])
-@pytest.mark.parametrize("paints", [PAINTS, *(paint[None] for paint in PAINTS), GREY])
+@pytest.mark.parametrize("albedos", [ALBEDOS, *(albedo[None] for albedo in ALBEDOS), GREY])
 def test_a_lamp_s_light_is_not_where_highlights_show_it(
-    paints: np.ndarray, light: np.ndarray
+    albedos: np.ndarray, light: np.ndarray
 ) -> None:
-    assert not estimate_illuminant(*ball(paints, light, 0.5)).too_strong
+    assert not estimate_illuminant(*ball(albedos, light, 0.5)).too_strong
 
 
 def test_many_paints_without_highlights_hold_white_and_one_does_not() -> None:
     white = np.ones(3)
-    assert not estimate_illuminant(*ball(PAINTS, white, 0.0)).too_strong
+    assert not estimate_illuminant(*ball(ALBEDOS, white, 0.0)).too_strong
     assert not estimate_illuminant(*ball(GREY, white, 0.0)).too_strong
     assert estimate_illuminant(
-        *ball(PAINTS[:1], white, 0.0)
-    ).too_strong  # as grey paint under red light
+        *ball(ALBEDOS[:1], white, 0.0)
+    ).too_strong  # as grey albedo under red light
 
 
 def test_the_distance_is_that_of_the_hull() -> None:
-    paint = np.array([[0.6, 0.3, 0.3]])
-    place = 3 * paint[0] / paint.sum() @ PLANE
-    assert distance_of_white(np.repeat(paint, 100, axis=0)) == pytest.approx(
+    albedo = np.array([[0.6, 0.3, 0.3]])
+    place = 3 * albedo[0] / albedo.sum() @ PLANE
+    assert distance_of_white(np.repeat(albedo, 100, axis=0)) == pytest.approx(
         np.linalg.norm(place), rel=2e-3
     )  # of 64 directions
     around = np.repeat(np.eye(3) + 0.1, 100, axis=0)

@@ -15,19 +15,19 @@ from isc_core.illuminant.illuminant import (
 )
 
 LIGHT = np.array([1.15, 1.0, 0.85])
-PAINTS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])
+ALBEDOS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])
 
 
 def ball(
-    paints: np.ndarray, light: np.ndarray, gloss: float, size: int = 120
+    albedos: np.ndarray, light: np.ndarray, gloss: float, size: int = 120
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A ball with one sector for each paint, which all meet under the highlight."""
+    """A ball with one sector for each albedo, which all meet under the highlight."""
     y, x = (np.mgrid[:size, :size] - (size - 1) / 2) / (0.46 * size)
     mask = x**2 + y**2 < 1
     z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
-    sector = ((np.arctan2(y, x) / (2 * np.pi) + 0.5) * len(paints)).astype(int) % len(paints)
+    sector = ((np.arctan2(y, x) / (2 * np.pi) + 0.5) * len(albedos)).astype(int) % len(albedos)
     shading = 0.3 + 0.7 * z
-    image = light * (paints[sector] * shading[..., None] + gloss * (z**25)[..., None])
+    image = light * (albedos[sector] * shading[..., None] + gloss * (z**25)[..., None])
     return np.where(mask[..., None], image, 0), mask
 
 
@@ -43,32 +43,32 @@ def angle(colour: np.ndarray, other: np.ndarray) -> float:
 
 @pytest.mark.parametrize("light", [np.ones(3), LIGHT, LIGHT[::-1], np.array([0.9, 1.2, 0.9])])
 def test_several_paints_give_the_light(light):
-    found = estimate_illuminant(*ball(PAINTS, light, 0.5))
+    found = estimate_illuminant(*ball(ALBEDOS, light, 0.5))
     assert found.determined and found.confidence > 0.5
     assert angle(found.colour, light) < 2
     assert found.colour.mean() == pytest.approx(1, abs=1e-12) and found.colour.min() > 0
 
 
 def test_one_paint_is_not_enough_and_stays_nearer_to_white():
-    found = estimate_illuminant(*ball(PAINTS[:1], LIGHT, 0.5))
+    found = estimate_illuminant(*ball(ALBEDOS[:1], LIGHT, 0.5))
     assert not found.determined
     assert angle(found.colour, LIGHT) < angle(np.ones(3), LIGHT)
-    # The one plane of paint and light must hold what is said.
-    normal = np.cross(PAINTS[0] * LIGHT, LIGHT)
+    # The one plane of albedo and light must hold what is said.
+    normal = np.cross(ALBEDOS[0] * LIGHT, LIGHT)
     assert abs(normal @ found.colour) / np.linalg.norm(normal) < 0.02
 
 
 @pytest.mark.parametrize("gloss", [0.0, 0.5])
 def test_white_where_nothing_can_be_said(gloss):
     grey = np.full((1, 3), 0.4)
-    paints = PAINTS if gloss == 0 else grey
-    found = estimate_illuminant(*ball(paints, np.ones(3), gloss))
+    albedos = ALBEDOS if gloss == 0 else grey
+    found = estimate_illuminant(*ball(albedos, np.ones(3), gloss))
     assert not found.determined
     assert angle(found.colour, np.ones(3)) < 0.5
 
 
 def test_exposure_turning_and_surroundings_do_not_matter():
-    image, mask = ball(PAINTS, LIGHT, 0.5)
+    image, mask = ball(ALBEDOS, LIGHT, 0.5)
     found = estimate_illuminant(image, mask)
     np.testing.assert_allclose(
         estimate_illuminant(image * 37, mask).colour, found.colour, atol=1e-9
@@ -81,7 +81,7 @@ def test_exposure_turning_and_surroundings_do_not_matter():
 
 
 def test_clipped_pixels_say_nothing():
-    image, mask = ball(PAINTS, LIGHT, 0.5)
+    image, mask = ball(ALBEDOS, LIGHT, 0.5)
     cut = np.minimum(image, 0.7)
     found = estimate_illuminant(cut, mask, (image >= 0.7).any(axis=2))
     assert angle(found.colour, LIGHT) < angle(np.ones(3), LIGHT)
@@ -89,7 +89,7 @@ def test_clipped_pixels_say_nothing():
 
 
 def test_less_is_believed_the_less_is_usual():
-    image, mask = ball(PAINTS, LIGHT, 0.5)
+    image, mask = ball(ALBEDOS, LIGHT, 0.5)
     near, far = (
         estimate_illuminant(image, mask, options=IlluminantOptions(prior_deviation=usual))
         for usual in (0.005, 0.2)
@@ -113,11 +113,11 @@ def test_whitened_and_back(dtype):
 
 def test_the_benchmark_relights_exactly_and_knows_the_best_answer():
     white = np.ones(3)
-    (image, mask), (diffuse, _) = ball(PAINTS, white, 0.5), ball(PAINTS, white, 0.0)
+    (image, mask), (diffuse, _) = ball(ALBEDOS, white, 0.5), ball(ALBEDOS, white, 0.0)
     layers = [layer.astype(np.float32) for layer in (image, diffuse, image - diffuse)]
     truth = SeparationTruth("ball", layers[0], mask, layers[1], layers[2], np.zeros_like(mask))
     scene = relit(truth, LIGHT)
-    np.testing.assert_allclose(scene.image, ball(PAINTS, LIGHT, 0.5)[0], atol=1e-6)
+    np.testing.assert_allclose(scene.image, ball(ALBEDOS, LIGHT, 0.5)[0], atol=1e-6)
     np.testing.assert_allclose(scene.diffuse + scene.specular, scene.image, atol=1e-6)
     found = measure("balls", scene, LIGHT, False)
     assert found.determined and found.angle < 2 < found.of_white
@@ -127,7 +127,7 @@ def test_the_benchmark_relights_exactly_and_knows_the_best_answer():
 
 
 def test_what_does_not_fit_is_refused():
-    image, mask = ball(PAINTS, LIGHT, 0.5)
+    image, mask = ball(ALBEDOS, LIGHT, 0.5)
     for arrays in ((image[..., 0], mask), (image, mask[1:]), (image, np.zeros_like(mask))):
         with pytest.raises(InputError, match="the light's colour needs"):
             estimate_illuminant(*arrays)

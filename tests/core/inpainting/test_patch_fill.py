@@ -13,7 +13,7 @@ from isc_core.progress import Monitor
 
 
 def checks(height: int, width: int) -> np.ndarray:
-    """A tiled pattern (height, width, 3) with edges in two directions and two colours, period 12."""
+    """A tiled pattern (height, width, 3) of two colours with edges in two directions, period 12."""
     y, x = np.mgrid[:height, :width]
     light = ((y // 6 + x // 6) % 2)[..., None]
     return np.where(light == 1, [0.8, 0.6, 0.2], [0.1, 0.3, 0.5])

@@ -207,26 +207,26 @@ def test_a_highlight_narrower_than_a_pixel_gives_an_upper_bound() -> None:
 
 def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
     rng = np.random.default_rng(1)
-    sky = 0.2 + rng.random((16, 32, 3)).cumsum(1) / 16
-    sky[4, 17] += 30
+    env_map = 0.2 + rng.random((16, 32, 3)).cumsum(1) / 16
+    env_map[4, 17] += 30
     normal = np.array([[0.0, 0, 1], [0.3, 0.4, np.sqrt(0.75)], [-0.6, 0.0, 0.8]])
     lights = environment(
-        directions(16).reshape(-1, 3), solid_angles(16).ravel(), sky.reshape(-1, 3)
+        directions(16).reshape(-1, 3), solid_angles(16).ravel(), env_map.reshape(-1, 3)
     )
     for model, lobe in (("ggx", Ggx(0.4)), ("blinn_phong", BlinnPhong(1.0, 2 / 0.4**2 - 2))):
-        found = respond_to(split_environment(sky), model, normal, 0.4)  # type: ignore[arg-type]
+        found = respond_to(split_environment(env_map), model, normal, 0.4)  # type: ignore[arg-type]
         np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
 
 
 def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
     normal, mask = ball()
     towards, solid = directions(24), solid_angles(24)
-    sky = np.full((24, 48, 3), 0.1)
-    sky[5:8, 26:30] += (20, 18, 15)
-    lights = environment(towards.reshape(-1, 3), solid.ravel(), sky.reshape(-1, 3))
+    env_map = np.full((24, 48, 3), 0.1)
+    env_map[5:8, 26:30] += (20, 18, 15)
+    lights = environment(towards.reshape(-1, 3), solid.ravel(), env_map.reshape(-1, 3))
     specular = np.zeros(normal.shape)
     specular[mask] = 0.7 * radiance(Ggx(0.2), normal[mask], VIEW, lights)
-    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=sky))
+    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=env_map))
     assert fit.determined
     assert fit.alpha == pytest.approx(0.2, rel=0.05)
     np.testing.assert_allclose(fit.strength, 0.7, rtol=0.05)
@@ -238,11 +238,11 @@ def test_under_an_even_environment_alpha_is_undetermined() -> None:
     mask &= (
         normal[..., 2] > 0.6
     )  # toward grazing angles the gloss of rough surfaces does look different
-    sky = np.ones((16, 32, 3))
+    env_map = np.ones((16, 32, 3))
     specular = np.zeros(normal.shape)
-    specular[mask] = respond_to(split_environment(sky), "ggx", normal[mask], 0.3)
+    specular[mask] = respond_to(split_environment(env_map), "ggx", normal[mask], 0.3)
     specular *= np.random.default_rng(0).uniform(0.7, 1.3, mask.shape)[..., None]
-    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=sky))
+    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=env_map))
     assert fit.outcome == LobeFitOutcome.SMOOTH_LIGHT and fit.alpha is None
 
 
@@ -267,7 +267,7 @@ def test_what_does_not_fit_together_is_refused() -> None:
     specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR), 24)
     broken = specular.copy()
     broken[12, 12] = np.nan
-    sky = np.ones((8, 16, 3))
+    env_map = np.ones((8, 16, 3))
     for arguments, keywords in (
         ((specular[:-1], normal, mask), {}),
         ((specular, 2 * normal, mask), {}),
@@ -276,9 +276,9 @@ def test_what_does_not_fit_together_is_refused() -> None:
         ((specular, normal, mask.astype(float)), {}),
         ((specular, normal, mask), {"pixels": PixelData(confidence=np.full(mask.shape, 2.0))}),
         ((specular, normal, mask), {"light": GivenLight(direction=np.array([1.0, 1, 1]))}),
-        ((specular, normal, mask), {"light": GivenLight(KEY, sky)}),
-        ((specular, normal, mask), {"light": GivenLight(environment=sky[:, :-1])}),
-        ((specular, normal, mask), {"light": GivenLight(environment=-sky)}),
+        ((specular, normal, mask), {"light": GivenLight(KEY, env_map)}),
+        ((specular, normal, mask), {"light": GivenLight(environment=env_map[:, :-1])}),
+        ((specular, normal, mask), {"light": GivenLight(environment=-env_map)}),
     ):
         with pytest.raises(InputError):
             fit_lobe(*arguments, **keywords)  # type: ignore[arg-type]
@@ -298,7 +298,7 @@ def whole_chain(
     alpha: float, strength: float = 1.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Specular image, cut off at a level as separators do, wavy normals, mask, and the shading of a
-    white matt surface.
+    white diffuse surface.
     """
     specular, normal, mask = seen(Ggx(alpha), directional(KEY, np.pi * strength))
     shading = np.where(
@@ -352,7 +352,7 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
 
 
 def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> LightEstimate:
-    """A lamp, with some doubt."""
+    """One light, with some uncertainty."""
     places = np.exp(30 * (PLACES @ toward))
     return LightEstimate(none, 0.9 - none, 0.1, places / places.sum(), np.zeros(8), np.ones(8))
 

@@ -129,8 +129,8 @@ def test_specks_of_a_matt_object_tell_no_light() -> None:
     specks = np.zeros_like(scene.specular)
     specks[30:32, 40] = 0.01
     fit = LobeFit.without_lobe("ggx", LobeFitOutcome.NO_SPECULAR, specks.shape)
-    matt = replace(scene, specular=specks, brdf=fit)
-    assert not explain_specular(matt).determined
-    assert explain_specular(replace(matt, brdf=None)).exponent is not None, (
+    diffuse_only = replace(scene, specular=specks, brdf=fit)
+    assert not explain_specular(diffuse_only).determined
+    assert explain_specular(replace(diffuse_only, brdf=None)).exponent is not None, (
         "without a fit whatever there is is explained"
     )

@@ -1,4 +1,4 @@
-"""What renderers are told of the gloss, on a ball whose lobe, lamp and paint are known."""
+"""What renderers are told of the gloss, on a ball whose lobe, light and albedo are known."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.core.ball_scene import ball
 
-LAMP = np.array([-0.3, 0.4, 0.866]) / np.linalg.norm([-0.3, 0.4, 0.866])
+TO_LIGHT = np.array([-0.3, 0.4, 0.866]) / np.linalg.norm([-0.3, 0.4, 0.866])
 VIEW = np.array([0.0, 0.0, 1.0])
 
 
@@ -21,10 +21,10 @@ def lit(
     alpha: float,
     strength: float | np.ndarray,
     lamp: float = 2.0,
-    sky: float = 0.4,
+    env_map: float = 0.4,
     model: LobeModel = "ggx",
 ) -> Decomposition:
-    """A ball under a lamp of irradiance `lamp` and an even sky that is not mirrored;
+    """A ball under a light of irradiance `lamp` and an even environment map that is not mirrored;
 
     `strength`: of the lobe, 1 is f0 = .04.
     """
@@ -32,11 +32,13 @@ def lit(
     normal = d.normal.astype(float)
     inside = d.mask[..., None]
     gloss = (
-        radiance(Ggx(alpha, 0.04), normal, VIEW, directional(LAMP, lamp))
+        radiance(Ggx(alpha, 0.04), normal, VIEW, directional(TO_LIGHT, lamp))
         * np.asarray(strength)[..., None]
         * inside
     )
-    shading = (lamp / np.pi * np.maximum(normal @ LAMP, 0) + sky)[..., None] * inside * np.ones(3)
+    shading = (
+        (lamp / np.pi * np.maximum(normal @ TO_LIGHT, 0) + env_map)[..., None] * inside * np.ones(3)
+    )
     return replace(
         d,
         specular=gloss.astype(np.float32),
@@ -59,7 +61,8 @@ def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
 
 def test_the_lamp_s_brightness_does_not_matter() -> None:
     dim, bright = (
-        fitted_specular(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1))
+        fitted_specular(lit(0.2, 0.6, lamp, env_map)).specular
+        for lamp, env_map in ((1.0, 0.4), (8.0, 0.1))
     )
     assert dim == pytest.approx(bright, rel=0.03)
 

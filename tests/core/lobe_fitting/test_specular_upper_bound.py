@@ -1,4 +1,4 @@
-"""A gloss that mirrors more of the sky than the photo shows is not believed."""
+"""The specular level is limited to what the photo shows of the mirrored environment map."""
 
 import json
 from dataclasses import replace
@@ -44,12 +44,12 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
 
 def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     d = glossy()
-    sky = environment_from_shading(d.illumination, 16)
+    env_map = environment_from_shading(d.illumination, 16)
     image = d.image.copy()
     rows, columns = np.nonzero(d.mask)
     image[rows[::8], columns[::8], 2] = 0
-    assert specular_upper_bound(replace(d, image=image), 0.4, sky) == pytest.approx(
-        specular_upper_bound(d, 0.4, sky), rel=0.1
+    assert specular_upper_bound(replace(d, image=image), 0.4, env_map) == pytest.approx(
+        specular_upper_bound(d, 0.4, env_map), rel=0.1
     )
 
 

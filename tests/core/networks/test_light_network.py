@@ -12,7 +12,7 @@ from isc_core.errors import InputError
 from isc_core.networks.light_network import LightNetwork, predict_light
 from isc_core.scene.light_estimate import PLACES, LightEstimate
 from isc_core.shading.spherical_harmonics import real_sh
-from tests.core.lit_balls import SIDE, ball, under_lamps
+from tests.core.lit_balls import SIDE, ball, under_lights
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 LAYERS = {
@@ -154,14 +154,14 @@ def test_a_cone_is_never_a_point_and_one_that_is_half_the_sky_tells_nothing() ->
     ],
 )
 def test_the_lamp_of_a_painted_ball_is_found(toward: tuple[float, float, float]) -> None:
-    found = predict_light(*under_lamps(toward))
+    found = predict_light(*under_lights(toward))
     assert found.one > 0.5
     assert off(found.direction, np.array(toward)) < 15
 
 
 def test_three_lamps_are_several_and_smooth_light_is_none() -> None:
     assert (
-        predict_light(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several
+        predict_light(*under_lights((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several
         > 0.7
     )
     normal, mask = ball()
@@ -172,7 +172,7 @@ def test_three_lamps_are_several_and_smooth_light_is_none() -> None:
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no light network"):
+    with pytest.raises(InputError, match=r"bad\.npz is not a light network"):
         LightNetwork.read(bad)
     network = small_network(np.random.default_rng(2))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}

@@ -10,7 +10,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
 from isc_core.networks.normal_network import NormalNetwork, predict_normals
-from tests.core.lit_balls import ball, under_lamps
+from tests.core.lit_balls import ball, under_lights
 
 SHAPES = [
     (16, 4),
@@ -97,7 +97,7 @@ def test_photos_without_anything_in_them_have_a_shape_too(level: float) -> None:
     [[(-0.5, 0.5, 0.7)], [(0.6, 0.1, 0.7)], [(0.1, 0.8, 0.6)], [(-0.7, 0.2, 0.6), (0.7, 0.4, 0.6)]],
 )
 def test_a_painted_ball_is_round(lamps: list[tuple[float, float, float]]) -> None:
-    seen, (normal, mask) = predict_normals(*under_lamps(*lamps)), ball()
+    seen, (normal, mask) = predict_normals(*under_lights(*lamps)), ball()
     length = np.linalg.norm(seen.normal, axis=-1)
     cosine = (seen.normal * normal).sum(-1)[mask] / length[mask]
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 12
@@ -108,7 +108,7 @@ def test_a_painted_ball_is_round(lamps: list[tuple[float, float, float]]) -> Non
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no normal network"):
+    with pytest.raises(InputError, match=r"bad\.npz is not a normal network"):
         NormalNetwork.read(bad)
     network = small_network(np.random.default_rng(3))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}

@@ -18,7 +18,7 @@ from isc_core.networks.scene_classifier import (
     SceneClassifier,
     classify_scene,
 )
-from tests.core.lit_balls import mirror_ball, under_lamps
+from tests.core.lit_balls import mirror_ball, under_lights
 from training.data.environments import ENVIRONMENTS, make_environment
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
@@ -95,9 +95,9 @@ def test_mirrors_look_like_mirrors(place: str) -> None:
 
 
 def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
-    assert classify_scene(*under_lamps((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
+    assert classify_scene(*under_lights((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
     assert (
-        classify_scene(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS]
+        classify_scene(*under_lights((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS]
         > 0.8
     )
 
@@ -105,7 +105,7 @@ def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no scene classifier"):
+    with pytest.raises(InputError, match=r"bad\.npz is not a scene classifier"):
         SceneClassifier.read(bad)
     network = small_network(np.random.default_rng(2))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}

@@ -1,4 +1,4 @@
-"""Cutting an object out by a box: found exactly, the same every time, written whole or not at all."""
+"""Masks from a box: exact, the same every time, written whole or not at all."""
 
 from pathlib import Path
 

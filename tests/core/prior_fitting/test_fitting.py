@@ -48,14 +48,14 @@ def scale_mixture_samples(seed: int = 0, count: int = 200_000) -> np.ndarray:
 
 
 def painted_ball(seed: int, size: int = 40) -> TrainingObject:
-    """A sphere with two paints and some texture."""
+    """A sphere with two albedos and some texture."""
     rng = np.random.default_rng(seed)
     i, j = np.mgrid[:size, :size] - (size - 1) / 2
     inside = i**2 + j**2 < (0.45 * size) ** 2
     height = np.where(inside, np.sqrt(np.maximum((size / 2) ** 2 - i**2 - j**2, 0)), np.nan)
-    paint = np.where((i > j)[..., None], rng.uniform(0.1, 0.9, 3), rng.uniform(0.1, 0.9, 3))
+    albedo = np.where((i > j)[..., None], rng.uniform(0.1, 0.9, 3), rng.uniform(0.1, 0.9, 3))
     reflectance = (
-        np.clip(paint * np.exp(0.02 * rng.normal(size=(size, size, 1))), 0, 1) * inside[..., None]
+        np.clip(albedo * np.exp(0.02 * rng.normal(size=(size, size, 1))), 0, 1) * inside[..., None]
     )
     return TrainingObject(
         f"ball{seed}",

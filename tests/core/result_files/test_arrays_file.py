@@ -142,7 +142,7 @@ def test_detail_stays_where_vertices_are_few() -> None:
 
 
 def glossy() -> Decomposition:
-    """The ball under the gloss of one lamp, with the lobe that fits it."""
+    """The ball under the gloss of one light, with the lobe that fits it."""
     d = ball()
     lamp = np.array([-0.37, 0.46, 0.807]) / np.linalg.norm([-0.37, 0.46, 0.807])
     gloss = 0.6 * radiance(
@@ -178,7 +178,7 @@ def test_the_command_gives_the_same_bytes_as_the_option(
     save(ball(), tmp_path / "later")
     assert not (tmp_path / "later" / ARRAYS).exists()
     assert main(["arrays", str(tmp_path / "later")]) == 0
-    assert capsys.readouterr().out == f"{tmp_path / 'later' / ARRAYS} is written\n"
+    assert capsys.readouterr().out == f"wrote {tmp_path / 'later' / ARRAYS}\n"
     assert (tmp_path / "later" / ARRAYS).read_bytes() == (folder / ARRAYS).read_bytes()
     load(tmp_path / "later")
     save(

@@ -1,4 +1,4 @@
-"""The contact sheet: every panel shows the map that its label names, in tones that can be compared."""
+"""The contact sheet: every panel shows the map that its label names, in comparable tones."""
 
 from dataclasses import replace
 from typing import Any
@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.result_files.contact_sheet import (
-    Answer,
+    LabelledSeparation,
     comparison_sheet,
     contact_sheet,
     separation_sheet,
@@ -193,7 +193,7 @@ def test_a_comparison_shows_where_light_was_left_and_where_too_much_was_taken(
     exact = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
     black = Separation(0 * scene.image, scene.image, scene.residual, scene.confidence)
     answers = [
-        Answer(name, "remark", split)
+        LabelledSeparation(name, "remark", split)
         for name, split in (("none", nothing), ("exact", exact), ("black", black))
     ]
     sheet = comparison_sheet(
@@ -223,7 +223,9 @@ def test_a_comparison_shows_where_light_was_left_and_where_too_much_was_taken(
 
 def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -> None:
     exact = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
-    sheet = comparison_sheet("ball", scene.image, scene.mask, [Answer("exact", "", exact)])
+    sheet = comparison_sheet(
+        "ball", scene.image, scene.mask, [LabelledSeparation("exact", "", exact)]
+    )
     colour, confidence = comparison_panel(sheet, 2), comparison_panel(sheet, 5)
     assert np.abs(colour.sum(-1) - 1)[inner()].max() < 0.05
     assert (

@@ -140,7 +140,7 @@ def test_each_old_sentence_about_the_lobe_has_its_outcome(
 
 def test_an_unknown_old_reason_is_refused() -> None:
     assert old_lobe_outcome("determined") == LobeFitOutcome.DETERMINED
-    with pytest.raises(ValueError, match="not known"):
+    with pytest.raises(ValueError, match="unknown reason"):
         old_lobe_outcome("nobody knows")
 
 

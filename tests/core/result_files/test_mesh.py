@@ -122,9 +122,9 @@ def test_the_texture_is_the_right_way_round() -> None:
     from the top.
     """
     d = ball((40, 60), 100, (20, 30))
-    paint = np.full((40, 60, 3), 0.2)
-    paint[:8, :8] = [0.9, 0.0, 0.0]
-    result = build_mesh(d.height, d.normal, np.ones((40, 60), bool), paint, MeshOptions())
+    albedo = np.full((40, 60, 3), 0.2)
+    albedo[:8, :8] = [0.9, 0.0, 0.0]
+    result = build_mesh(d.height, d.normal, np.ones((40, 60), bool), albedo, MeshOptions())
     mesh = reopened(result)
     red = sampled(mesh.visual.material.baseColorTexture, mesh.visual.uv)
     red = (red[:, 0] > 200) & (red[:, 1] < 10)
@@ -391,7 +391,7 @@ def test_what_cannot_be_a_mesh_is_one_clear_line() -> None:
     attempts = [
         (lambda: build_mesh(d.height, d.normal, thin, d.reflectance), "2 x 2"),
         (lambda: build_mesh(d.height, d.normal, np.zeros_like(thin), d.reflectance), "2 x 2"),
-        (lambda: build_mesh(broken, d.normal, d.mask, d.reflectance), "height map holds NaN"),
+        (lambda: build_mesh(broken, d.normal, d.mask, d.reflectance), "height map has NaN"),
         (lambda: build_mesh(d.height[1:], d.normal, d.mask, d.reflectance), "one size"),
         (lambda: built(d, longest_side=0.0), "positive"),
         (lambda: built(d, metres_per_pixel=-1.0), "positive"),
@@ -403,7 +403,7 @@ def test_what_cannot_be_a_mesh_is_one_clear_line() -> None:
 
 
 def test_blender_opens_it_upright(tmp_path: Path) -> None:
-    """Blender turns glTF's +Y into its +Z: right stays +X, the top is +Z, the viewer stands at -Y."""
+    """Blender turns glTF's +Y into its +Z: right stays +X, the top is +Z, the viewer is at -Y."""
     bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")
     d = ball()
     result = built(d)

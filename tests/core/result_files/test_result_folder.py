@@ -162,9 +162,9 @@ def test_a_fit_that_knows_nothing_is_read_back_with_its_reason(tmp_path: Path) -
 
 def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
     d = ball((48, 60), 20.0, (22, 33))
-    sky = np.full((8, 16, 3), 0.02)
-    sky[2, 9] = (40.0, 38.0, 35.0)
-    fit = fit_lobe(d.specular, d.normal, d.mask, light=GivenLight(environment=sky))
+    env_map = np.full((8, 16, 3), 0.02)
+    env_map[2, 9] = (40.0, 38.0, 35.0)
+    fit = fit_lobe(d.specular, d.normal, d.mask, light=GivenLight(environment=env_map))
     assert fit.strength is not None
     save(replace(d, brdf=fit), tmp_path / "out")
     back = load(tmp_path / "out").brdf

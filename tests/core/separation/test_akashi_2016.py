@@ -17,8 +17,9 @@ QUICK = replace(VARIANTS["improved"], surface_colours=2, sample=1000)
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two reflectances on a shaded disc under white light, with one
-    highlight.
+    """Image, true specular (H, W) and mask.
+
+    A shaded disc of two albedos under white light, with one highlight.
     """
     y, x = np.mgrid[-1:1:60j, -1:1:70j]
     mask = x**2 + y**2 < 0.9

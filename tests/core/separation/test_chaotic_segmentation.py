@@ -24,16 +24,17 @@ PAPER = VARIANTS["paper"]
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one
-    highlight over both.
+    """Image, true specular (H, W) and mask.
+
+    A shaded disc of two albedos under white light, with one highlight over both.
     """
     y, x = np.mgrid[-1:1:90j, -1:1:110j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     specular = 0.5 * np.exp(-((x - 0.05) ** 2 + (y + 0.2) ** 2) / 0.02)
-    paint = np.where((x > 0)[..., None], [0.7, 0.25, 0.15], [0.2, 0.6, 0.15])
+    albedo = np.where((x > 0)[..., None], [0.7, 0.25, 0.15], [0.2, 0.6, 0.15])
     return (
-        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        (albedo * shading[..., None] + specular[..., None]) * mask[..., None],
         specular * mask,
         mask,
     )

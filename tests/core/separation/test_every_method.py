@@ -42,9 +42,7 @@ def separate(
 
 
 def scene(height: int = 44, width: int = 52) -> tuple[np.ndarray, np.ndarray]:
-    """Two paints on a shaded disc with two highlights, in [0, 1), float64, with a little noise, and
-    the mask.
-    """
+    """Image in [0, 1), float64, and mask: a slightly noisy disc, two albedos, two highlights."""
     rng = np.random.default_rng(3)
     y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     mask = x**2 + y**2 < 0.9
@@ -52,9 +50,9 @@ def scene(height: int = 44, width: int = 52) -> tuple[np.ndarray, np.ndarray]:
     specular = 0.4 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02) + 0.2 * np.exp(
         -((x + 0.5) ** 2 + (y - 0.1) ** 2) / 0.05
     )
-    paint = np.where((x > 0.1 * np.sin(9 * y))[..., None], [0.6, 0.25, 0.12], [0.15, 0.3, 0.5])
+    albedo = np.where((x > 0.1 * np.sin(9 * y))[..., None], [0.6, 0.25, 0.12], [0.15, 0.3, 0.5])
     noise = 0.004 * rng.random((height, width, 3))
-    return (paint * shading[..., None] + specular[..., None] + noise) * mask[..., None], mask
+    return (albedo * shading[..., None] + specular[..., None] + noise) * mask[..., None], mask
 
 
 def assert_sound(
@@ -163,7 +161,7 @@ def test_a_photo_without_colour(method: str, variant: str, kind: str) -> None:
     if (method, variant) in WITHOUT_COLOUR:
         assert_sound(separate(method, grey, mask, variant=variant), grey, mask)
     else:
-        with pytest.raises(InputError, match=f"the photo has no colour, and {method}") as raised:
+        with pytest.raises(InputError, match=f"the photo has no colour, which {method}") as raised:
             separate(method, grey, mask, variant=variant)
         assert "\n" not in str(raised.value)
 

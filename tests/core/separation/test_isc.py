@@ -69,18 +69,18 @@ SPOTS = [(0.5 * np.cos(t), 0.5 * np.sin(t)) for t in (-2 * np.pi / 3, 0.0, 2 * n
 
 
 def sectors(
-    paints: np.ndarray = ALBEDOS, height: int = 192, width: int = 240, glossy: bool = True
+    albedos: np.ndarray = ALBEDOS, height: int = 192, width: int = 240, glossy: bool = True
 ) -> Scene:
-    """Three paints in sectors, each with a highlight."""
+    """Three albedos in sectors, each with a highlight."""
     x, y, mask, shading = disc(height, width)
-    paint = paints[np.digitize(np.arctan2(y, x), [-np.pi / 3, np.pi / 3])]
-    return lit(paint * shading[..., None], mask, SPOTS if glossy else [])
+    albedo = albedos[np.digitize(np.arctan2(y, x), [-np.pi / 3, np.pi / 3])]
+    return lit(albedo * shading[..., None], mask, SPOTS if glossy else [])
 
 
 def printed(
     white: tuple[float, float, float], spots: list[tuple[float, float]]
 ) -> tuple[Scene, np.ndarray]:
-    """Red paint with words of white paint, and where the words are (H, W) bool."""
+    """Red albedo with words of white albedo, and where the words are (H, W) bool."""
     _, _, mask, shading = disc()
     letters = np.zeros(mask.shape, np.uint8)
     for line, word in enumerate(("TEXT OF", "WHITE", "PAINT")):
@@ -371,7 +371,7 @@ def test_more_probable_highlights_are_taken_off_more() -> None:
 
 
 def test_a_true_prior_helps() -> None:
-    """Where gains were in doubt: the highlight beside white print, which the cues hardly believe."""
+    """A highlight beside white print, to which the cues give a low probability."""
     scene, _ = printed((0.75, 0.72, 0.71), spots=[(-0.45, -0.55)])
     prior = np.where(scene.specular > 0.02, 0.95, 0.05)
     split, told = (separate("isc", scene.image, scene.mask, prior=p) for p in (None, prior))
@@ -407,7 +407,7 @@ def test_a_prior_for_nobody_is_refused() -> None:
     scene = sectors()
     prior = np.full(scene.mask.shape, 0.5)
     for method in METHODS[:-1]:
-        with pytest.raises(InputError, match="a prior is for the method isc alone"):
+        with pytest.raises(InputError, match="only the method isc takes a prior"):
             separate(method, scene.image, scene.mask, prior=prior)
     with pytest.raises(InputError, match=r"photo's size \(192, 240\)"):
         separate("isc", scene.image, scene.mask, prior=prior[1:])
@@ -429,8 +429,8 @@ def test_a_prior_for_nobody_is_refused() -> None:
         ("low_quantile", 1.0, "low_quantile within"),
         ("borrowed", -1.0, "borrowed at least 0"),
         ("borrowed", np.nan, "borrowed at least 0"),
-        ("scatter", -0.1, "numbers from 0 on"),
-        ("scatter_here", -0.1, "numbers from 0 on"),
+        ("scatter", -0.1, "finite and at least 0"),
+        ("scatter_here", -0.1, "finite and at least 0"),
         ("colourful", (0.5, 0.5), "colourful must be two different numbers"),
         ("unmixed_here", (0.5,), "unmixed_here must be two different numbers"),
         ("clear", (0.1, 0.2, 0.3), "clear must be two different numbers"),

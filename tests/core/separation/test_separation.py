@@ -188,13 +188,13 @@ def test_options_are_read_as_their_types(made: str) -> None:
 @pytest.mark.parametrize(
     ("word", "message"),
     [
-        ("levels", "--set levels: write it as name=value"),
+        ("levels", "--set levels: expected NAME=VALUE"),
         (
             "level=3",
             "made has no option 'level': choose one of levels, share, opening, optimiser, "
             "threshold, name",
         ),
-        ("levels=3.5", "--set levels of made: '3.5' is not a whole number"),
+        ("levels=3.5", "--set levels of made: '3.5' is not an integer"),
         ("share=nan", "'nan' is not a number"),
         ("share=", "'' is not a number"),
         ("opening=perhaps", "'perhaps' is not yes or no"),
@@ -237,7 +237,7 @@ def test_the_command_chooses_variants_and_options(
     assert removed[0] > 0 and removed == pytest.approx([removed[0], removed[0] / 2, removed[0] / 4])
 
 
-# Its starts are random: held to the figure in its own test.
+# Its starts are random: its own test checks the figure.
 RANDOM = {"akashi_2016"}
 
 

@@ -46,18 +46,18 @@ def left_over(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.
 
 
 def glossy_scene(strength: float = 0.4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints and a pale print on a shaded disc under
+    """Image, true specular (H, W) and mask: two albedos and a pale print on a shaded disc under
     white light, with one highlight.
     """
     y, x = np.mgrid[-1:1:100j, -1:1:120j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     specular = strength * np.exp(-((x - 0.3) ** 2 + (y + 0.2) ** 2) / 0.03)
-    paint = np.where((x > 0)[..., None], RED, GREEN)
+    albedo = np.where((x > 0)[..., None], RED, GREEN)
     print_ = (np.abs(y - 0.3) < 0.08) & (np.abs(x + 0.5) < 0.2)
-    paint = np.where(print_[..., None], PALE_GREEN, paint)
+    albedo = np.where(print_[..., None], PALE_GREEN, albedo)
     return (
-        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        (albedo * shading[..., None] + specular[..., None]) * mask[..., None],
         specular * mask,
         mask,
     )

@@ -1,4 +1,4 @@
-"""Images that white light does not reach, held against what their equations promise."""
+"""Images that white light does not reach, compared with what their equations promise."""
 
 import numpy as np
 

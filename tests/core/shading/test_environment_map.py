@@ -36,9 +36,9 @@ def test_up_right_and_toward_the_viewer_are_where_mitsuba_has_them() -> None:
 def test_a_constant_light_is_a_uniform_sky() -> None:
     light = np.zeros((9, 3))
     light[0] = np.log([0.2, 0.5, 2.0]) * np.sqrt(4 * np.pi)
-    sky = environment_from_shading(light, rows=16)
+    env_map = environment_from_shading(light, rows=16)
     np.testing.assert_allclose(
-        shading_under(sky, facing_normals(50)), [[0.2, 0.5, 2.0]] * 50, rtol=0.02
+        shading_under(env_map, facing_normals(50)), [[0.2, 0.5, 2.0]] * 50, rtol=0.02
     )
 
 
@@ -46,17 +46,17 @@ def test_a_constant_light_is_a_uniform_sky() -> None:
 def test_the_sky_gives_the_recovered_shading(seed: int) -> None:
     """Lights of the strength that decompositions find.
 
-    Not every contrast is within a sky's reach: some error remains.
+    Not every contrast is within an environment map's reach: some error remains.
     """
     light = (
         np.random.default_rng(seed).normal(size=(9, 3))
         * np.array([0.5, *[0.5] * 3, *[0.15] * 5])[:, None]
     )
-    sky = environment_from_shading(light)
+    env_map = environment_from_shading(light)
     normals = facing_normals(400)
-    error = np.abs(shading_under(sky, normals) / np.exp(real_sh(normals) @ light) - 1)
-    assert sky.min() >= 0
-    assert np.isfinite(sky).all()
+    error = np.abs(shading_under(env_map, normals) / np.exp(real_sh(normals) @ light) - 1)
+    assert env_map.min() >= 0
+    assert np.isfinite(env_map).all()
     assert np.median(error) < 0.02
     assert error.max() < 0.2
 
@@ -64,8 +64,8 @@ def test_the_sky_gives_the_recovered_shading(seed: int) -> None:
 def test_light_from_the_left_comes_from_the_left() -> None:
     light = np.zeros((9, 3))
     light[3] = -1  # log shading falls with x
-    sky, towards = environment_from_shading(light, rows=16), directions(16)
-    assert sky[towards[..., 0] < -0.5].mean() > 3 * sky[towards[..., 0] > 0.5].mean()
+    env_map, towards = environment_from_shading(light, rows=16), directions(16)
+    assert env_map[towards[..., 0] < -0.5].mean() > 3 * env_map[towards[..., 0] > 0.5].mean()
 
 
 @pytest.mark.parametrize("rows", [7, 16, 24, 32, 51])
@@ -73,19 +73,21 @@ def test_resampling_loses_no_light_from_any_side(rows: int) -> None:
     """Exact for the sum; what stays within a pixel keeps its moment only as far as the larger
     pixels tell.
     """
-    sky = np.random.default_rng(4).gamma(0.3, size=(24, 48, 3))
-    other = resampled(sky, rows)
+    env_map = np.random.default_rng(4).gamma(0.3, size=(24, 48, 3))
+    other = resampled(env_map, rows)
     assert other.shape == (rows, 2 * rows, 3)
-    light, kept = ((r * solid_angles(len(r))[..., None]).sum((0, 1)) for r in (sky, other))
+    light, kept = ((r * solid_angles(len(r))[..., None]).sum((0, 1)) for r in (env_map, other))
     np.testing.assert_allclose(kept, light, rtol=1e-12)
     np.testing.assert_allclose(
-        shading_under(other, facing_normals(40)), shading_under(sky, facing_normals(40)), rtol=0.15
+        shading_under(other, facing_normals(40)),
+        shading_under(env_map, facing_normals(40)),
+        rtol=0.15,
     )
-    assert other.min() >= sky.min() and other.max() <= sky.max() * (1 + 1e-12)
+    assert other.min() >= env_map.min() and other.max() <= env_map.max() * (1 + 1e-12)
 
 
 def test_resampling_to_the_same_rows_changes_nothing_and_to_more_can_be_undone() -> None:
-    sky = np.random.default_rng(4).random((6, 12, 3))
-    np.testing.assert_allclose(resampled(sky, 6), sky, rtol=1e-12)
-    np.testing.assert_allclose(resampled(resampled(sky, 18), 6), sky, rtol=1e-12)
-    assert resampled(sky.astype(np.float32), 3).dtype == np.float32
+    env_map = np.random.default_rng(4).random((6, 12, 3))
+    np.testing.assert_allclose(resampled(env_map, 6), env_map, rtol=1e-12)
+    np.testing.assert_allclose(resampled(resampled(env_map, 18), 6), env_map, rtol=1e-12)
+    assert resampled(env_map.astype(np.float32), 3).dtype == np.float32

@@ -13,7 +13,7 @@ from isc_core.shading.spherical_harmonics import real_sh
 from .brdf.directions_at import GLOSSY_PLASTIC, UP, polar_units, random_units
 
 
-def sky(rows: int = 40) -> tuple[np.ndarray, np.ndarray]:
+def env_map(rows: int = 40) -> tuple[np.ndarray, np.ndarray]:
     """Directions (K, 3) over the whole sphere and their solid angles (K,)."""
     cosine, weight = np.polynomial.legendre.leggauss(rows)
     azimuth = (np.arange(2 * rows) + 0.5) * np.pi / rows
@@ -43,7 +43,7 @@ def test_lights_add_up() -> None:
 
 
 def test_a_white_sky_shows_what_a_surface_keeps() -> None:
-    directions, weights = sky(28)
+    directions, weights = env_map(28)
     white = environment(directions, weights, np.ones((len(weights), 3)))
     for cos_view in (0.9, 0.5):
         for model in (Lambert(0.6), Ggx(0.5, 0.8), GLOSSY_PLASTIC):
@@ -55,7 +55,7 @@ def test_a_cosine_sky_on_a_matt_surface_has_a_closed_form() -> None:
     """Radiance 1 + cos of the angle from the top: the irradiance is pi (1 + 2/3 n_z), as order 1
     harmonics say.
     """
-    directions, weights = sky(60)
+    directions, weights = env_map(60)
     light = environment(directions, weights, np.repeat(1 + directions[:, 2:], 3, axis=1))
     normal = polar_units(np.array([1.0, 0.8, 0.3]))
     seen = radiance(Lambert(1.0), normal, normal, light)

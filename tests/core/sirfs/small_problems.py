@@ -110,7 +110,7 @@ def blob(
     bumps: float = 1.0,
     one_color: bool = False,
 ) -> Scene:
-    """A blob that fills most of the frame, under `LIGHT`, painted in three colours."""
+    """A blob that fills most of the frame, under `LIGHT`, coloured in three colours."""
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(float)
     size = min(shape)
     y, x = (

@@ -13,7 +13,7 @@ from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SolverOptions
-from tests.core.lit_balls import ball, under_lamps
+from tests.core.lit_balls import ball, under_lights
 
 
 def paraboloid(rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +59,7 @@ def test_the_field_is_in_the_reference_s_frame_and_goes_on_beyond_what_was_seen(
 
 
 def test_sirfs_takes_the_shape_that_was_seen() -> None:
-    image, mask = under_lamps((-0.7, 0.2, 0.6))
+    image, mask = under_lights((-0.7, 0.2, 0.6))
     normal, _ = ball()
     priors, weights = shipped_prior_set().priors("natural", 3), isc_weights("natural", 3)
 

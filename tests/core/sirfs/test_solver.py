@@ -1,4 +1,4 @@
-"""The solver on made scenes whose shape, light and paint are known."""
+"""The solver on made scenes whose shape, light and albedo are known."""
 
 from dataclasses import replace
 from importlib.util import find_spec
@@ -109,7 +109,7 @@ def test_known_shape_is_kept_exactly_and_its_light_is_found() -> None:
     np.testing.assert_array_equal(result.height, scene.height)
     start = NumpyEngine(make_problem(scene)).evaluate(scene.height, np.zeros((9, 3))).terms.total
     assert result.terms.total < start
-    # the light's constant part is shared with the paint; how shading varies is not
+    # the light's constant part is shared with the albedo; how shading varies is not
     assert np.abs(result.light - scene.light)[1:].mean() < 0.5 * np.abs(scene.light[1:]).mean()
 
 

@@ -1,4 +1,4 @@
-"""What is said of clipped pixels: a highlight's core is filled from around, full paint stays paint."""
+"""Clipped pixels: the core of a highlight is filled from around it, a bright albedo stays."""
 
 from pathlib import Path
 
@@ -51,7 +51,7 @@ def test_cores_of_highlights_are_recovered(gain: float) -> None:
 
 
 def test_full_channels_of_strong_paint_are_no_highlight() -> None:
-    """Red paint, full in the light, of which the method removed nothing."""
+    """Red albedo, full in the light, of which the method removed nothing."""
     y, x = np.mgrid[-1:1:60j, -1:1:60j]
     shading = 1.5 * np.exp(-(x**2) - y**2) + 0.1 * np.sin(40 * x) * np.sin(40 * y)
     image = np.minimum(shading[..., None] * np.array([1.0, 0.3, 0.1]), 1)
@@ -66,9 +66,9 @@ def test_full_channels_of_strong_paint_are_no_highlight() -> None:
 def test_full_white_speaks_for_itself() -> None:
     split, image, clipped = explained(np.zeros((96, 120)), 1.6)
     white = clipped & (image.min(axis=2) > 0.85)
-    paint = clipped & (image.min(axis=2) < 0.6)
-    assert white.sum() > 20 and paint.sum() > 20
-    assert split.specular[white].min() > 0.1 and not split.specular[paint].any()
+    albedo = clipped & (image.min(axis=2) < 0.6)
+    assert white.sum() > 20 and albedo.sum() > 20
+    assert split.specular[white].min() > 0.1 and not split.specular[albedo].any()
 
 
 @pytest.mark.parametrize("method", ["tan_2005", "yang_2010", "mallick_2006", "shen_2013"])

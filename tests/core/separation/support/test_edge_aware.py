@@ -96,7 +96,7 @@ def test_pixels_without_weight_say_nothing() -> None:
 
 
 def spotted() -> tuple[np.ndarray, np.ndarray]:
-    """A paint of .3 with some scatter, and where a third of it is raised."""
+    """An albedo of .3 with some scatter, and where a third of it is raised."""
     rng = np.random.default_rng(6)
     y, x = np.mgrid[:80, :100]
     raised = ((x % 25) < 15) & ((y % 20) < 11)

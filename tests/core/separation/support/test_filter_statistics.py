@@ -32,13 +32,13 @@ DISC = np.hypot(*(np.mgrid[:90, :90] - 44.5)) < 42
 
 
 def photo(seed: int, glossy: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Intensity, specular light and mask: a shaded disc with soft paint; if glossy, with sharp
+    """Intensity, specular light and mask: a shaded disc with soft albedo; if glossy, with sharp
     highlights.
     """
     random = np.random.default_rng(seed)
     y, x = (np.mgrid[:90, :90] - 44.5) / 45
-    paint = 0.5 + 0.8 * ndimage.gaussian_filter(random.standard_normal(DISC.shape), 6)
-    diffuse = np.maximum(paint, 0.05) * (1 - 0.5 * (x**2 + y**2))
+    albedo = 0.5 + 0.8 * ndimage.gaussian_filter(random.standard_normal(DISC.shape), 6)
+    diffuse = np.maximum(albedo, 0.05) * (1 - 0.5 * (x**2 + y**2))
     specular = np.zeros_like(diffuse)
     for row, column in random.uniform(25, 65, (5, 2)) if glossy else ():
         specular += 0.9 * np.exp(
@@ -221,7 +221,7 @@ def test_the_shipped_table_is_whole_and_others_are_refused(tmp_path):
     with pytest.raises(InputError, match="cannot be read"):
         read_table(tmp_path / "none.npz")
     (tmp_path / "text.npz").write_text("no table")
-    with pytest.raises(InputError, match="is no table"):
+    with pytest.raises(InputError, match="is not a table"):
         read_table(tmp_path / "text.npz")
     np.savez(
         tmp_path / "other.npz",
@@ -230,7 +230,7 @@ def test_the_shipped_table_is_whole_and_others_are_refused(tmp_path):
         highlight=np.ones((2, BINS)),
         temperature=1.0,
     )
-    with pytest.raises(InputError, match="other filters"):
+    with pytest.raises(InputError, match="does not match the filters"):
         read_table(tmp_path / "other.npz")
     with pytest.raises(InputError, match="mask is empty"):
         highlight_prior(np.ones((4, 4, 3)), np.zeros((4, 4), bool))

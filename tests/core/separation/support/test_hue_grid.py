@@ -165,7 +165,7 @@ def test_turning_all_hues_by_a_cell_turns_the_votes() -> None:
 
 
 def test_pixels_of_other_hues_have_no_say() -> None:
-    """Two paints in the same place: the median that each reads is its own."""
+    """Two albedos in the same place: the median that each reads is its own."""
     rng = np.random.default_rng(5)
     hue = np.repeat([1.0, 4.0], 500)
     places: Places = GRID.places(60 * rng.random(1000), 80 * rng.random(1000), hue)
