@@ -42,7 +42,7 @@ from ..imaging.smoothing import masked_gaussian
 from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
-from ..separation.support.light_tint import held_to_light
+from ..separation.support.light_tint import limit_tint
 from .layers import separated_first, shaded
 from .lobe import fit_specular
 from .shape import Shape, confidence_weight, energy_of, recover_shape
@@ -224,7 +224,7 @@ def detect_residual_highlights(
     unreliable = ndimage.binary_opening(level > options.unreliable_from, np.ones((2, 2))) & mask
     if unreliable[mask].mean() > _HALF:
         unreliable = np.zeros_like(mask)
-    cleaner = held_to_light(diffuse, diffuse * np.exp(-left), options.network.tint)
+    cleaner = limit_tint(diffuse, diffuse * np.exp(-left), options.network.tint)
     return ResidualHighlights(cleaner.astype(diffuse.dtype), unreliable)
 
 

@@ -121,9 +121,9 @@ def _listed(image: np.ndarray, corners: np.ndarray) -> Patches:
 
 
 def _windows(flags: np.ndarray) -> np.ndarray:
-    """How many of each patch's pixels are set, by corner:
+    """Number of set pixels of each patch, by its corner.
 
-    (H - 7, W - 7); empty where the image is smaller than a patch.
+    (H - 7, W - 7); empty if the image is smaller than a patch.
     """
     if min(flags.shape) < PATCH:
         return np.zeros((0, 0), np.int32)
@@ -146,7 +146,7 @@ class CshSearch:
     """
 
     def __init__(self, source: Patches, options: CshOptions | None = None) -> None:
-        """Raises `InputError` where there is no source patch, and for options out of range."""
+        """Raise `InputError` without a source patch, or for options out of range."""
         self.options = options or CshOptions()
         _check(self.options, source)
         self.source = source
@@ -200,7 +200,7 @@ class CshSearch:
         table: int,
         rng: np.random.Generator,
     ) -> None:
-        """Improves `matches` in place by the candidates of one hash table."""
+        """Improve `matches` in place with the candidates of one hash table."""
         width = self._width * np.float32(_WIDTHS[table % len(_WIDTHS)])
         offset = rng.random(self.options.hashed, np.float32) * width
         factors = rng.integers(1 << 40, size=self.options.hashed)
@@ -252,16 +252,18 @@ class _Hashed(NamedTuple):
     members: np.ndarray
 
 
-# Target patches are swept in so many parts, however many threads there are, for the same result.
+# Number of parts in which target patches are swept, independent of the threads, so that the result
+# is too.
 _PARTS = 16
-# Wide bins give rare patches company, narrow ones common patches their best.
+# Factors of the bin width: wide bins give rare patches candidates, narrow ones common patches their
+# best.
 _WIDTHS = (8.0, 4.0, 2.0, 16.0, 1.0)
 
 
 def _check(options: CshOptions, source: Patches) -> None:
     if not len(source):
         raise InputError(
-            f"there is no source patch: {PATCH} x {PATCH} pixels without a gap are needed"
+            f"no source patch: the image needs {PATCH} x {PATCH} known pixels without a gap"
         )
     most = PATCH * PATCH * source.image.shape[2]
     if not 1 <= options.hashed <= options.projections <= most:
@@ -314,8 +316,8 @@ def _buckets(
 
 @jit
 def _hash(values, width, offset, factors, bits, bins):
-    """bins[i]: some `bits` of sum_j factor_j floor((v_ij + b_j) / r), bits that all of the factors'
-    40 bits mix in; nothing overflows.
+    """bins[i]: `bits` middle bits of sum_j factor_j floor((v_ij + b_j) / r), which depend on all 40
+    bits of the factors; nothing overflows.
     """
     inverse = np.float32(1) / width
     for i in range(values.shape[0]):
@@ -347,7 +349,8 @@ def _sort_into(bins, starts, members):
 def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
     """One pass over the target patches [low, high).
 
-    Of others it reads `before`, the matches at its start: other threads change theirs.
+    Matches of other patches are read from `before`, the state at the start: other threads change
+    them.
     """
     step = 1 if forward else -1
     tried = np.empty(4 * candidates + 4, np.int32)
@@ -361,7 +364,7 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
             filled = 1
         for axis in range(2):
             other = found
-            found = _beside(
+            found = _propagated(
                 source, target, match, before, low, high, i, step * (1 - axis), step * axis
             )
             if found >= 0 and found != other:
@@ -378,11 +381,11 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
         filled = _draw(
             source.starts, source.members, target.bins[i], candidates, i + salt, tried, filled
         )
-        alike = filled
+        own_bins = filled
         filled = _draw(
             target.starts, target.members, target.bins[i], candidates, i + salt, tried, filled
         )
-        for k in range(alike, filled):
+        for k in range(own_bins, filled):
             tried[k] = before[tried[k]]
         for k in range(filled):
             if tried[k] == match[i] and distance[i] < np.inf:
@@ -401,7 +404,7 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
 
 
 @jit
-def _beside(source, target, match, before, low, high, i, down, right):
+def _propagated(source, target, match, before, low, high, i, down, right):
     """The source patch that continues the match of target patch i's neighbour, (down, right) before
     it; -1 where there is none.
     """
@@ -411,8 +414,8 @@ def _beside(source, target, match, before, low, high, i, down, right):
     neighbour = target.places[row, column]
     if neighbour < 0:
         return -1
-    beside = match[neighbour] if low <= neighbour < high else before[neighbour]
-    row, column = source.rows[beside] + down, source.columns[beside] + right
+    matched = match[neighbour] if low <= neighbour < high else before[neighbour]
+    row, column = source.rows[matched] + down, source.columns[matched] + right
     if row < 0 or column < 0 or row >= source.places.shape[0] or column >= source.places.shape[1]:
         return -1
     return source.places[row, column]
@@ -420,8 +423,8 @@ def _beside(source, target, match, before, low, high, i, down, right):
 
 @jit
 def _draw(starts, members, bin_, most, turn, drawn, filled):
-    """Appends up to `most` members of a bin to `drawn`, from a place in it that varies with `turn`;
-    returns the new count.
+    """Append up to `most` members of a bin to `drawn`, starting at a position that varies with
+    `turn`; return the new count.
     """
     first, size = starts[bin_], starts[bin_ + 1] - starts[bin_]
     for k in range(min(size, most)):
@@ -431,25 +434,25 @@ def _draw(starts, members, bin_, most, turn, drawn, filled):
 
 
 @jit
-def _projected_distance(source, candidate, target, i, enough):
-    """Squared distance of the projections of two patches, rows of `source` and `target`, or some
-    value above `enough`.
+def _projected_distance(source, candidate, target, i, bound):
+    """Squared distance of the projections of two patches, rows of `source` and `target`, or a
+    value above `bound`.
     """
     total = np.float32(0)
     for first in range(0, source.shape[1], 8):
         for k in range(first, min(first + 8, source.shape[1])):
             difference = source[candidate, k] - target[i, k]
             total += difference * difference
-        if total >= enough:
+        if total >= bound:
             break
     return total
 
 
 @jit
-def _distance(source, row_s, column_s, target, row_t, column_t, enough):
-    """Squared distance of two patches by all their values, or some value above `enough`.
+def _distance(source, row_s, column_s, target, row_t, column_t, bound):
+    """Squared distance of two patches by all their values, or a value above `bound`.
 
-    Four rows at once: sums that do not wait for each other are several times faster than one.
+    Four rows at once: independent sums are several times faster than one.
     """
     t0, t1, t2, t3 = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
     for r in range(0, 8, 4):
@@ -464,6 +467,6 @@ def _distance(source, row_s, column_s, target, row_t, column_t, enough):
                 t1 += d1 * d1
                 t2 += d2 * d2
                 t3 += d3 * d3
-        if t0 + t1 + t2 + t3 >= enough:
+        if t0 + t1 + t2 + t3 >= bound:
             break
     return t0 + t1 + t2 + t3

@@ -35,7 +35,7 @@ from .pull_push import fill, pull, push
 from .voting import vote
 from .walsh_hadamard import PATCH
 
-# What a vote loses for each pixel of its patch's depth in the hole.
+# Factor by which a vote's weight falls per pixel of its patch's depth in the hole.
 _DEPTH_LOSS = 1.3
 
 
@@ -126,21 +126,21 @@ def _filled(
         monitor.report("filling holes", 0.25**level * (0.25 + 0.75 * turn / count))
         target = patches_touching(current, wanted)
         matches = search.match(target, None if matches is None else matches.source)
-        means, voted = vote(current, target, source, matches, _deepness(target, depth))
-        current = np.where((voted & ~known)[..., None], means, current).astype(np.float32)
+        means, has_votes = vote(current, target, source, matches, _depth_penalty(target, depth))
+        current = np.where((has_votes & ~known)[..., None], means, current).astype(np.float32)
     return current
 
 
 def _any_of_four(flags: np.ndarray) -> np.ndarray:
-    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column stands
-    alone.
+    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column forms
+    blocks of its own.
     """
     padded = np.pad(flags, [(0, n % 2) for n in flags.shape])
     return padded[::2, ::2] | padded[1::2, ::2] | padded[::2, 1::2] | padded[1::2, 1::2]
 
 
-def _deepness(target: Patches, depth: np.ndarray) -> np.ndarray:
-    """What votes of `target` patches lose (see `voting`): their centres' `depth` (H, W) in the
-    hole, in pixels, times log g.
+def _depth_penalty(target: Patches, depth: np.ndarray) -> np.ndarray:
+    """Loss of the votes of `target` patches (see `voting`): the `depth` (H, W) of their centres in
+    the hole, in pixels, times log g.
     """
     return np.log(_DEPTH_LOSS) * depth[target.rows + PATCH // 2, target.columns + PATCH // 2]

@@ -83,18 +83,16 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     """
     at = np.nonzero(~known)
     (row, next_row), (column, next_column) = (
-        _blocks_beside(place, size) for place, size in zip(at, coarse.shape, strict=False)
+        _nearest_blocks(index, size) for index, size in zip(at, coarse.shape, strict=False)
     )
-    here = 0.75 * coarse[row, column] + 0.25 * coarse[row, next_column]
-    there = 0.75 * coarse[next_row, column] + 0.25 * coarse[next_row, next_column]
+    upper = 0.75 * coarse[row, column] + 0.25 * coarse[row, next_column]
+    lower = 0.75 * coarse[next_row, column] + 0.25 * coarse[next_row, next_column]
     filled = values.copy()
-    filled[at] = 0.75 * here + 0.25 * there
+    filled[at] = 0.75 * upper + 0.25 * lower
     return filled
 
 
-def _blocks_beside(place: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The block, one of `size`, that a fine pixel lies in, and the one that it lies nearest to
-    beside that.
-    """
-    near = place // 2
-    return near, np.clip(near - 1 + place % 2 * 2, 0, size - 1)
+def _nearest_blocks(index: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The block, of `size`, that contains a fine pixel, and the nearest of its neighbours."""
+    near = index // 2
+    return near, np.clip(near - 1 + index % 2 * 2, 0, size - 1)

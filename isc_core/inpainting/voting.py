@@ -13,8 +13,8 @@ import numpy as np
 from ..numerics.jit import jit
 from .coherency_sensitive_hashing import Matches, Patches
 
-# Weights below exp(-60) are as good as none, but must not vanish: where all patches match badly
-# they still decide.
+# Weights below exp(-60) are negligible but must not vanish: they decide where all patches match
+# badly.
 _LEAST = -60.0
 
 
@@ -40,7 +40,7 @@ def vote(
     -------
     values : (H, W, C) float64 ndarray
         0 without votes.
-    voted : (H, W) bool ndarray
+    has_votes : (H, W) bool ndarray
     """
     height, width = target.index.shape
     scale = 2 * max(float(np.quantile(matches.distance, 0.75)), 1e-12) if len(target) else 1.0
@@ -56,8 +56,8 @@ def vote(
         weight,
         total,
     )
-    voted = total[..., -1] > 0
-    return total[..., :-1] / np.where(voted, total[..., -1], 1)[..., None], voted
+    has_votes = total[..., -1] > 0
+    return total[..., :-1] / np.where(has_votes, total[..., -1], 1)[..., None], has_votes
 
 
 @jit

@@ -44,8 +44,8 @@ def opponent(image: np.ndarray) -> np.ndarray:
     (H, W, C) float32 ndarray
         Contiguous.
     """
-    turned = image @ _OPPONENT.T if image.shape[2] == 3 else image
-    return np.ascontiguousarray(turned, np.float32)
+    rotated = image @ _OPPONENT.T if image.shape[2] == 3 else image
+    return np.ascontiguousarray(rotated, np.float32)
 
 
 def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:
@@ -64,8 +64,8 @@ def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: i
         Indices below 64 C.
     """
     step = max(1, len(rows) // _SAMPLE)
-    everything = np.arange(_CELLS * image.shape[2])
-    variance = project(image, rows[::step], columns[::step], everything)[:, :-1].var(axis=0)
+    all_coefficients = np.arange(_CELLS * image.shape[2])
+    variance = project(image, rows[::step], columns[::step], all_coefficients)[:, :-1].var(axis=0)
     return np.argsort(-variance, kind="stable")[:count]
 
 
@@ -113,7 +113,7 @@ def _project(image, rows, columns, chosen, out):
     for n in range(rows.shape[0]):
         if rows[n] != row:
             row = rows[n]
-            # Patches of one row share their columns: those are transformed once.
+            # Patches of one row share their columns, which are transformed once.
             for c in range(channels):
                 for i in range(8):
                     for x in range(width):

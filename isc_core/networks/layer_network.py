@@ -31,7 +31,7 @@ from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded
 from .loader import Network, Parameters
 from .network_input import standardise_input
 
-_MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
+_MARGIN = 2.0  # offset of the output: its prior is a small log ratio
 _CHANNELS = 4  # y of three colours, log b
 
 
@@ -129,11 +129,11 @@ class LayerNetwork(Network):
 
     def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         steps = iter(zip(self.weights, self.biases, strict=True))
-        kept = encoded(image, mask, steps, self._levels)
-        layer = kept[-1]
-        for skipped in kept[-2::-1]:
+        skips = encoded(image, mask, steps, self._levels)
+        layer = skips[-1]
+        for skip in skips[-2::-1]:
             layer = conv_block(
-                np.concatenate([skipped, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
+                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
             )
         raw = depth_to_space(convolved(layer, *next(steps)))
         raw[..., :3] = np.logaddexp(0, raw[..., :3] - np.float32(_MARGIN))
@@ -160,26 +160,28 @@ def log_ratio(
         Its error, greater than 0; 0 outside the mask.
     """
     box = mask_slices(mask)
-    seen = standardise_input(image, mask, options.long_side)
-    raw, log_error = network(seen.image, seen.mask, options.mirrored)
+    prepared = standardise_input(image, mask, options.long_side)
+    raw, log_error = network(prepared.image, prepared.mask, options.mirrored)
     error = np.exp(log_error)
     excess = np.maximum(raw - options.doubt * error[..., None], 0)
-    found = np.concatenate([excess, error[..., None]], axis=2)[seen.place]
-    whole = np.zeros((*mask.shape, 4), np.float32)
-    whole[box] = np.where(
-        mask[box][..., None], _carried(found, seen.inside, mask[box].shape, seen.factor), 0
+    predicted = np.concatenate([excess, error[..., None]], axis=2)[prepared.place]
+    full = np.zeros((*mask.shape, 4), np.float32)
+    full[box] = np.where(
+        mask[box][..., None],
+        _upsampled(predicted, prepared.inside, mask[box].shape, prepared.factor),
+        0,
     )
-    return whole[..., :3], whole[..., 3]
+    return full[..., :3], full[..., 3]
 
 
-def _carried(
-    found: np.ndarray, known: np.ndarray, shape: tuple[int, ...], factor: float
+def _upsampled(
+    predicted: np.ndarray, inside: np.ndarray, shape: tuple[int, ...], factor: float
 ) -> np.ndarray:
-    """Maps (h, w, C), `known` (h, w) bool, at the pixels of a picture of `shape`: linear between
-    pixels' centres.
-    """
+    """Maps (h, w, C), valid where `inside` (h, w), upsampled bilinearly to `shape`."""
     if factor == 1:
-        return found
+        return predicted
     return enlarged(
-        np.where(known[..., None], found, masked_gaussian(found, known, 1.0)), shape, 1 / factor
+        np.where(inside[..., None], predicted, masked_gaussian(predicted, inside, 1.0)),
+        shape,
+        1 / factor,
     )

@@ -16,17 +16,15 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-STRIDE = 32  # pixels: sides of what a network sees are multiples
+STRIDE = 32  # pixels: the sides of a network's input are multiples of it
 BLOCK = 2
-_DARK = 0.03  # of the mean light: below, logarithms are of noise
-_BITS = (
-    20  # of the largest factor: 9 x 1024 products of twice as many bits add up to less than 2^53
-)
-_FRAME = 8  # pixels around the object: what lies beyond the picture's frame is background as well
+_DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
+_BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
+_FRAME = 8  # pixels around the object: beyond the photo's frame there is background as well
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
-]  # weights (9, inputs, outputs) and biases (outputs,) of the convolutions still to come
+]  # weights (9, inputs, outputs) and biases (outputs,) of the remaining convolutions
 
 
 def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> list[np.ndarray]:
@@ -80,7 +78,7 @@ def weights_in(
         for kind in ("weight", "bias")
     )
     if not all(np.isfinite(values).all() for values in (*weights, *biases)):
-        raise ValueError("some of its numbers are not finite")
+        raise ValueError("some of its values are not finite")
     return weights, biases
 
 
@@ -177,17 +175,17 @@ def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.nda
     (H, W, D) float32 ndarray
     """
     rows, columns, channels = layer.shape
-    (seen, of_layer), (kernel, of_kernel) = _in_steps(layer), _in_steps(weight)
-    padded = np.pad(seen, ((1, 1), (1, 1), (0, 0)))
-    near = np.stack(
+    (integers, layer_step), (kernel, kernel_step) = _as_integers(layer), _as_integers(weight)
+    padded = np.pad(integers, ((1, 1), (1, 1), (0, 0)))
+    neighbourhoods = np.stack(
         [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2
     )
-    sums = near.reshape(-1, 9 * channels) @ kernel.reshape(-1, weight.shape[2])
-    return (sums * (of_layer * of_kernel) + bias).astype(np.float32).reshape(rows, columns, -1)
+    sums = neighbourhoods.reshape(-1, 9 * channels) @ kernel.reshape(-1, weight.shape[2])
+    return (sums * (layer_step * kernel_step) + bias).astype(np.float32).reshape(rows, columns, -1)
 
 
-def _in_steps(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """`values` in float64 as whole numbers of steps, at most 2^20 of them; and the step, a power of
+def _as_integers(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """`values` as integer multiples (float64), at most 2^20, of a step; and the step, a power of
     two.
     """
     most = float(np.abs(values).max())

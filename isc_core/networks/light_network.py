@@ -34,16 +34,18 @@ from .layers import encoded, is_encoder
 from .loader import Network, Parameters
 from .network_input import standardise_input
 
-LONG_SIDE = 112  # of the object, in pixels, as the network sees it
+LONG_SIDE = 112  # of the object in the network's input, in pixels
 CELL = 16
-_WHERE, _LOOK = 5, 8  # numbers that tell where a cell lies; that tell how a light looks
+_WHERE, _SHADING = 5, 8  # numbers of a cell's position, and of a light's log shading
 _LEAST, _MOST = 1e-6, 1e4
-_INSIDE = (
-    0.2  # of the fullest cell: a cell that the object fills less does not count for the most of h
+_MIN_COVERAGE = (
+    0.2  # of the fullest cell's coverage: cells covered less do not enter the maximum of h
 )
 _LAYERS = ("local", "whole", "lamps", "places", "light")
-SURE, UNSURE = -3.5, 1.0  # bounds of the logarithm of the deviations
-_MIRROR = np.array([1, 1, -1, -1, 1, 1, -1, 1.0])  # what a look becomes in a mirror
+MIN_LOG_DEVIATION, MAX_LOG_DEVIATION = -3.5, 1.0  # bounds of the logarithm of the deviations
+_MIRROR = np.array(
+    [1, 1, -1, -1, 1, 1, -1, 1.0]
+)  # signs of the log shading's coefficients under reflection
 
 
 @dataclass(frozen=True)
@@ -83,16 +85,16 @@ class LightNetwork(Network):
             matrices[0].shape[1],
             matrices[1].shape[1],
         )
-        wanted = [
+        expected = [
             (count + _WHERE, wide),
             (3 * wide, deep),
             (deep, 3),
             (deep, len(PLACES)),
-            (deep, 2 * _LOOK),
+            (deep, 2 * _SHADING),
         ]
-        fits = [matrix.shape for matrix in matrices] == wanted and [
+        fits = [matrix.shape for matrix in matrices] == expected and [
             values.shape for values in added
-        ] == [shape[1:] for shape in wanted]
+        ] == [shape[1:] for shape in expected]
         return fits and self.middle.shape == self.scale.shape == (count,)
 
     @classmethod
@@ -124,28 +126,37 @@ class LightNetwork(Network):
         cover = _cells(mask.astype(float)[..., None], CELL)[..., 0]
         steps = iter(zip(self.weights, self.biases, strict=True))
         layers = encoded(image, mask, steps, len(self.weights) // 2)
-        found = np.concatenate([_in_cells(layer, cover.shape) for layer in layers], axis=2)
+        features = np.concatenate([_in_cells(layer, cover.shape) for layer in layers], axis=2)
         inside = cover > 0
         weight = cover[inside] / cover.sum()
-        seen = (np.sqrt(np.clip(found[inside], 0, _MOST) + _LEAST) - self.middle) * self.scale
+        normalised = (
+            np.sqrt(np.clip(features[inside], 0, _MOST) + _LEAST) - self.middle
+        ) * self.scale
         local = self._layer(
-            "local", np.concatenate([seen, _where(inside, weight)], axis=1), rectified=True
+            "local",
+            np.concatenate([normalised, _cell_positions(inside, weight)], axis=1),
+            rectified=True,
         )
         mean = np.einsum("c,cn->n", weight, local)
         spread = np.sqrt(np.maximum(np.einsum("c,cn->n", weight, local**2) - mean**2, _LEAST))
-        most = np.where((weight > _INSIDE * weight.max())[:, None], local, 0).max(axis=0)
+        most = np.where((weight > _MIN_COVERAGE * weight.max())[:, None], local, 0).max(axis=0)
         whole = self._layer("whole", np.concatenate([mean, spread, most])[None], rectified=True)
-        lamps, places, light = (self._layer(name, whole)[0] for name in _LAYERS[2:])
+        counts, places, light = (self._layer(name, whole)[0] for name in _LAYERS[2:])
         return (
-            _softmax(lamps),
+            _softmax(counts),
             _softmax(places),
-            np.concatenate([light[:_LOOK], np.exp(np.clip(light[_LOOK:], SURE, UNSURE))]),
+            np.concatenate(
+                [
+                    light[:_SHADING],
+                    np.exp(np.clip(light[_SHADING:], MIN_LOG_DEVIATION, MAX_LOG_DEVIATION)),
+                ]
+            ),
         )
 
     def _layer(self, name: str, values: np.ndarray, rectified: bool = False) -> np.ndarray:
         matrix, added = self.layers[name]
-        found = np.einsum("rn,nk->rk", values, matrix) + added
-        return np.asarray(np.maximum(found, 0) if rectified else found)
+        output = np.einsum("rn,nk->rk", values, matrix) + added
+        return np.asarray(np.maximum(output, 0) if rectified else output)
 
 
 def predict_light(
@@ -165,22 +176,22 @@ def predict_light(
     -------
     LightEstimate
     """
-    seen = standardise_input(image, mask, LONG_SIDE)
-    light, cover = seen.image, seen.mask
-    judge = network or LightNetwork.shipped()
-    (counts, places, told), (other, mirrored, reversed_) = (
-        judge(light, cover),
-        judge(light[:, ::-1], cover[:, ::-1]),
+    prepared = standardise_input(image, mask, LONG_SIDE)
+    light, cover = prepared.image, prepared.mask
+    predict = network or LightNetwork.shipped()
+    (counts, places, direct), (mirrored_counts, mirrored_places, reflected) = (
+        predict(light, cover),
+        predict(light[:, ::-1], cover[:, ::-1]),
     )
-    none, one, several = (float(share) for share in (counts + other) / 2)
-    shading = (told[:_LOOK] + _MIRROR * reversed_[:_LOOK]) / 2
+    none, one, several = (float(share) for share in (counts + mirrored_counts) / 2)
+    shading = (direct[:_SHADING] + _MIRROR * reflected[:_SHADING]) / 2
     return LightEstimate(
         none,
         one,
         several,
-        (places + _mirror(mirrored)) / 2,
+        (places + _mirror(mirrored_places)) / 2,
         shading,
-        (told[_LOOK:] + reversed_[_LOOK:]) / 2,
+        (direct[_SHADING:] + reflected[_SHADING:]) / 2,
     )
 
 
@@ -193,7 +204,7 @@ def _cells(layer: np.ndarray, step: int) -> np.ndarray:
 
 
 def _in_cells(layer: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """A layer of the encoder on the cells' grid: its means, or, where it is coarser, itself."""
+    """A layer of the encoder on the cells' grid: means, or repeated values if it is coarser."""
     finer = layer.shape[0] // shape[0]
     if finer:
         return _cells(layer.astype(float), finer)
@@ -201,15 +212,15 @@ def _in_cells(layer: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     return np.asarray(layer.astype(float).repeat(times, axis=0).repeat(times, axis=1))
 
 
-def _where(inside: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Where each cell of `inside` (rows, columns) bool lies in the object: x, y, x^2, y^2, x y over
-    its extent, (cells, 5).
+def _cell_positions(inside: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Position of each cell of `inside` (rows, columns) bool, relative to the object's extent:
+    x, y, x^2, y^2, x y, (cells, 5).
     """
     rows, columns = np.nonzero(inside)
-    off = np.stack([columns, -rows], axis=1) - np.einsum(
+    offset = np.stack([columns, -rows], axis=1) - np.einsum(
         "c,cd->d", weight, np.stack([columns, -rows], axis=1).astype(float)
     )
-    x, y = (off / np.sqrt(max(float(np.einsum("c,cd->", weight, off**2)), _LEAST))).T
+    x, y = (offset / np.sqrt(max(float(np.einsum("c,cd->", weight, offset**2)), _LEAST))).T
     return np.stack([x, y, x * x, y * y, x * y], axis=1)
 
 
@@ -219,9 +230,9 @@ def _softmax(score: np.ndarray) -> np.ndarray:
 
 
 def _mirror(places: np.ndarray) -> np.ndarray:
-    """Probabilities of `PLACES` for the photo whose left is right."""
-    found = places[_mirrored_places()]
-    return np.asarray(found / found.sum())
+    """Probabilities of `PLACES` for the mirrored photo."""
+    flipped = places[_mirrored_places()]
+    return np.asarray(flipped / flipped.sum())
 
 
 @cache

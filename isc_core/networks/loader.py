@@ -76,7 +76,7 @@ class Network:
         try:
             return cls.from_parameters(_parameters(read_arrays(path)))
         except (ValueError, KeyError) as error:
-            raise InputError(f"{path} holds no {cls.title}: {error}") from error
+            raise InputError(f"{path} is not a {cls.title}: {error}") from error
 
     @classmethod
     def shipped(cls) -> Self:
@@ -99,5 +99,5 @@ def _parameters(arrays: Mapping[str, np.ndarray]) -> Parameters:
         if name not in convolutions
     }
     if not all(np.isfinite(values).all() for values in others.values()):
-        raise ValueError("some of its numbers are not finite")
+        raise ValueError("some of its values are not finite")
     return Parameters(*weights_in(convolutions), others)

@@ -10,7 +10,7 @@ from .layers import pad_to_stride
 
 @dataclass(frozen=True)
 class NetworkInput:
-    """A photo as a network sees it.
+    """A photo in the networks' input format.
 
     Attributes
     ----------

@@ -36,11 +36,11 @@ from .layers import conv_block, convolved, encoded, is_encoder
 from .loader import Network, Parameters
 from .network_input import standardise_input
 
-LONG_SIDE = 112  # of the object, in pixels, as the network sees it
+LONG_SIDE = 112  # of the object in the network's input, in pixels
 CELL = 4
-SURE, UNSURE = -4.0, 1.0  # bounds of the logarithm of the deviation
+MIN_LOG_DEVIATION, MAX_LOG_DEVIATION = -4.0, 1.0  # bounds of the logarithm of the deviation
 _CHANNELS = 4  # m, log s
-_COVERED = 0.02  # of a cell that says something
+_MIN_COVERAGE = 0.02  # least coverage of a cell that is used
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,11 @@ class NormalNetwork(Network):
         if not is_encoder(self.weights[:down], self.biases[:down]):
             return False
         wide = [w.shape[2] for w in self.weights[1:down:2]]
-        shapes, seen = [], wide[-1]
-        for beside in wide[-2:0:-1]:
-            shapes += [(9, beside + seen, beside), (9, beside, beside)]
-            seen = beside
-        shapes.append((9, seen, _CHANNELS))
+        shapes, inputs = [], wide[-1]
+        for skip in wide[-2:0:-1]:
+            shapes += [(9, skip + inputs, skip), (9, skip, skip)]
+            inputs = skip
+        shapes.append((9, inputs, _CHANNELS))
         return [w.shape for w in self.weights[down:]] == shapes and [
             b.shape for b in self.biases[down:]
         ] == [s[2:] for s in shapes]
@@ -91,11 +91,11 @@ class NormalNetwork(Network):
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """Return m and log s, (H / 4, W / 4, 4) float32, for an input of `standardise_input`."""
         steps = iter(zip(self.weights, self.biases, strict=True))
-        kept = encoded(image, mask, steps, self._depth)
-        layer = kept[-1]
-        for beside in kept[-2:0:-1]:
+        skips = encoded(image, mask, steps, self._depth)
+        layer = skips[-1]
+        for skip in skips[-2:0:-1]:
             layer = conv_block(
-                np.concatenate([beside, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
+                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
             )
         return convolved(layer, *next(steps))
 
@@ -118,27 +118,29 @@ def predict_normals(
     NormalEstimate
     """
     box = mask_slices(mask)
-    seen = standardise_input(image, mask, LONG_SIDE)
-    light, cover = seen.image, seen.mask
-    judge = network or NormalNetwork.shipped()
-    found = 0.5 * (
-        judge(light, cover)
-        + judge(light[:, ::-1], cover[:, ::-1])[:, ::-1] * np.array([-1, 1, 1, 1], np.float32)
+    prepared = standardise_input(image, mask, LONG_SIDE)
+    light, cover = prepared.image, prepared.mask
+    predict = network or NormalNetwork.shipped()
+    predicted = 0.5 * (
+        predict(light, cover)
+        + predict(light[:, ::-1], cover[:, ::-1])[:, ::-1] * np.array([-1, 1, 1, 1], np.float32)
     )
-    near = enlarged(_carried_on(found, cover), cover.shape, CELL)[seen.place]
-    whole = np.zeros((*mask.shape, _CHANNELS), np.float32)
-    whole[box] = near if seen.factor == 1 else enlarged(near, mask[box].shape, 1 / seen.factor)
-    deviation = np.exp(np.clip(whole[..., 3], SURE, UNSURE))
-    return NormalEstimate(
-        np.where(mask[..., None], whole[..., :3], 0), np.where(mask, deviation, 0)
+    upsampled = enlarged(_extrapolated(predicted, cover), cover.shape, CELL)[prepared.place]
+    full = np.zeros((*mask.shape, _CHANNELS), np.float32)
+    full[box] = (
+        upsampled
+        if prepared.factor == 1
+        else enlarged(upsampled, mask[box].shape, 1 / prepared.factor)
     )
+    deviation = np.exp(np.clip(full[..., 3], MIN_LOG_DEVIATION, MAX_LOG_DEVIATION))
+    return NormalEstimate(np.where(mask[..., None], full[..., :3], 0), np.where(mask, deviation, 0))
 
 
-def _carried_on(found: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """What cells say (h, w, C) where they lie on `mask` (4 h, 4 w), carried on from the nearest of
-    them elsewhere.
+def _extrapolated(cells: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Values of the cells (h, w, C) on `mask` (4 h, 4 w), extrapolated from the nearest of them
+    elsewhere.
     """
-    rows, columns = found.shape[:2]
-    known = mask.reshape(rows, CELL, columns, CELL).mean(axis=(1, 3)) > _COVERED
-    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-    return np.asarray(found[tuple(nearest)])
+    rows, columns = cells.shape[:2]
+    covered = mask.reshape(rows, CELL, columns, CELL).mean(axis=(1, 3)) > _MIN_COVERAGE
+    nearest = ndimage.distance_transform_edt(~covered, return_distances=False, return_indices=True)
+    return np.asarray(cells[tuple(nearest)])

@@ -1,4 +1,4 @@
-"""Classification of a photo's scene: opaque paint under one light source, or a violated assumption.
+"""Classification of a photo's scene: opaque surface under one light, or a violated assumption.
 
 Problem: a mirror, glass, and paint under several sources also have a shape, a reflectance and a
 light that add up to the photo: wrong ones. Their appearance gives them away: an environment bent
@@ -31,10 +31,10 @@ from .loader import Network, Parameters
 from .network_input import standardise_input
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
-LONG_SIDE = 144  # of the object, in pixels, as the network sees it
+LONG_SIDE = 144  # of the object in the network's input, in pixels
 _MOMENTS = 3
 _LEAST, _MOST = 1e-6, 1e4
-_NONE = "these are not the weights of a scene classifier"
+_INVALID = "these are not the weights of a scene classifier"
 
 
 @dataclass(frozen=True)
@@ -66,12 +66,12 @@ class SceneClassifier(Network):
 
     def __post_init__(self) -> None:
         if not is_encoder(self.weights, self.biases):
-            raise InputError(_NONE)
+            raise InputError(_INVALID)
         count = _MOMENTS * sum(w.shape[-1] for w in self.weights[1::2])
-        wanted = [(count,), (count,), (count, len(KINDS)), (len(KINDS),)]
-        fits = [part.shape for part in (self.middle, self.scale, self.head, self.odds)] == wanted
+        expected = [(count,), (count,), (count, len(KINDS)), (len(KINDS),)]
+        fits = [part.shape for part in (self.middle, self.scale, self.head, self.odds)] == expected
         if not (fits and (self.scale > 0).all()):
-            raise InputError(_NONE)
+            raise InputError(_INVALID)
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "SceneClassifier":
@@ -81,26 +81,26 @@ class SceneClassifier(Network):
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """Return the probabilities (4,) of `KINDS` for an input of `standardise_input`."""
-        found = (np.sqrt(self._moments(image, mask)) - self.middle) / self.scale
-        score = np.einsum("n,nk->k", found, self.head) + self.odds
+        features = (np.sqrt(self._moments(image, mask)) - self.middle) / self.scale
+        score = np.einsum("n,nk->k", features, self.head) + self.odds
         shares = np.exp(score - score.max())
         return np.asarray(shares / shares.sum())
 
     def _moments(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         steps = iter(zip(self.weights, self.biases, strict=True))
-        cover, found = mask.astype(float)[..., None], []
+        cover, moments = mask.astype(float)[..., None], []
         for layer in encoded(image, mask, steps, len(self.weights) // 2):
             cover = average_pool(cover)
             weight, values = cover[..., 0] / cover.sum(), np.minimum(layer.astype(float), _MOST)
             first, second, fourth = (
                 np.einsum("ij,ijc->c", weight, values**power) for power in (1, 2, 4)
             )
-            found += [
+            moments += [
                 first,
                 np.sqrt(np.maximum(second - first**2, _LEAST)),
                 (fourth + _LEAST**2) ** 0.25,
             ]
-        return np.concatenate(found) + _LEAST
+        return np.concatenate(moments) + _LEAST
 
 
 def classify_scene(
@@ -121,8 +121,8 @@ def classify_scene(
     dict of str to float
         By `KINDS`; they sum to 1.
     """
-    seen = standardise_input(image, mask, LONG_SIDE)
-    light, cover = seen.image, seen.mask
-    judge = network or SceneClassifier.shipped()
-    found = 0.5 * (judge(light, cover) + judge(light[:, ::-1], cover[:, ::-1]))
-    return {kind: float(share) for kind, share in zip(KINDS, found, strict=True)}
+    prepared = standardise_input(image, mask, LONG_SIDE)
+    light, cover = prepared.image, prepared.mask
+    predict = network or SceneClassifier.shipped()
+    shares = 0.5 * (predict(light, cover) + predict(light[:, ::-1], cover[:, ::-1]))
+    return {kind: float(share) for kind, share in zip(KINDS, shares, strict=True)}

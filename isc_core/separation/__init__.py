@@ -1,4 +1,4 @@
-"""Separation of a photo into diffuse and specular light: one method a file, found by its name.
+"""Separation of a photo into diffuse and specular light: one method per file, looked up by name.
 
 A method's module is imported when the method is first used, so that a program starts fast and
 without the dependencies of other methods. Each module has `separate`, a dataclass of options, and
@@ -42,8 +42,8 @@ METHODS = (
 )
 BEST = "isc"
 IMPROVED = "improved"
-# The toolbox knows the whole frame only, and nothing of clipping: its figures are found again no
-# other way.
+# The toolbox processes the whole frame and ignores clipping; its published figures can only be
+# reproduced that way.
 _TOOLBOX = "sihr"
 
 
@@ -92,21 +92,21 @@ def separate(
     check_arrays(image, mask, clipped)
     if prior is not None and (method != BEST or prior.shape != mask.shape):
         raise InputError(
-            f"a prior is for the method {BEST} alone, and has the photo's size {mask.shape}"
+            f"only the method {BEST} takes a prior, and it must have the photo's size {mask.shape}"
         )
     toolbox = variant == _TOOLBOX
-    part = np.s_[:, :] if toolbox else mask_slices(mask)
-    inside = image[part], mask[part], None if clipped is None or toolbox else clipped[part]
+    box = np.s_[:, :] if toolbox else mask_slices(mask)
+    cropped = image[box], mask[box], None if clipped is None or toolbox else clipped[box]
     if options is None:
-        split = _module(method).separate(inside[0], inside[1], clipped=inside[2])
+        split = _module(method).separate(cropped[0], cropped[1], clipped=cropped[2])
     else:
-        extra = {} if prior is None else {"prior": prior[part]}
+        extra = {} if prior is None else {"prior": prior[box]}
         split = _module(method).separate(
-            inside[0], inside[1], options, clipped=inside[2], monitor=monitor, **extra
+            cropped[0], cropped[1], options, clipped=cropped[2], monitor=monitor, **extra
         )
     return Separation(
         *(
-            _placed(layer, part, mask.shape)
+            _uncrop(layer, box, mask.shape)
             for layer in (split.diffuse, split.specular, split.residual, split.confidence)
         )
     )
@@ -153,10 +153,10 @@ def method_options(
     InputError
         If the method, variant or option does not exist.
     """
-    known = getattr(_module(method), "VARIANTS", {IMPROVED: None})
-    if variant not in known:
-        raise InputError(f"{method} has no variant {variant!r}: choose {' or '.join(known)}")
-    options = known[variant]
+    available = getattr(_module(method), "VARIANTS", {IMPROVED: None})
+    if variant not in available:
+        raise InputError(f"{method} has no variant {variant!r}: choose {' or '.join(available)}")
+    options = available[variant]
     fields = [] if options is None else [field.name for field in dataclasses.fields(options)]
     for name in changes or {}:
         if name not in fields:
@@ -176,7 +176,7 @@ def _module(method: str) -> ModuleType:
     return importlib.import_module(f"{folder}.{method}", __package__)
 
 
-def _placed(layer: np.ndarray, part: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:
-    whole = np.zeros((*shape, *layer.shape[2:]), layer.dtype)
-    whole[part] = layer
-    return whole
+def _uncrop(layer: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:
+    full = np.zeros((*shape, *layer.shape[2:]), layer.dtype)
+    full[box] = layer
+    return full

@@ -93,7 +93,7 @@ VARIANTS = {
 }
 
 _TABLES = 3
-# Below this share of the object's mean colour, the colour of F counts as none: it is noise.
+# F below this share of the object's mean is treated as noise, without a colour.
 _FAINT = 0.2
 
 
@@ -145,18 +145,18 @@ def separate(
     if options.rim > 0 and specular.any():
         reach = max(1.0, options.rim * float(np.sqrt(mask.sum())))
         specular = mask & (ndimage.distance_transform_edt(~specular) <= reach)
-    known = mask & ~specular if clipped is None else mask & ~specular & ~clipped
-    if not specular.any() or not known.any():
+    valid = mask & ~specular if clipped is None else mask & ~specular & ~clipped
+    if not specular.any() or not valid.any():
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)
     if options.repaint == "colour":
-        filled = _repainted(scaled, known, specular, options, monitor.part(0.1, 1.0))
+        filled = _filled_image(scaled, valid, specular, options, monitor.part(0.1, 1.0))
         return diffuse_layers(
             inside, mask, np.where(specular[..., None], filled * peak, inside), clipped
         )
-    share = saturation_gate(scaled, known | specular) * peak if options.guard else peak
+    share = saturation_gate(scaled, valid | specular) * peak if options.guard else peak
     if share == 0:
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)
-    removed = share * _white_light(scaled, known, specular, options, monitor.part(0.1, 1.0))
+    removed = share * _ratio_specular(scaled, valid, specular, options, monitor.part(0.1, 1.0))
     return white_layers(inside, mask, removed, clipped)
 
 
@@ -191,14 +191,14 @@ def find_specular(
     if np.ptp(levels[mask]) == 0:
         return np.zeros_like(mask)
     objective = OtsuObjective.of(levels[mask])
-    found = maximise(
+    optimum = maximise(
         options.optimiser,
         objective,
         options.levels,
         evaluations=options.evaluations,
         seed=options.seed,
     )
-    return mask & (levels > found.thresholds[-1])
+    return mask & (levels > optimum.thresholds[-1])
 
 
 def _check_options(options: ChaoticSegmentationOptions) -> None:
@@ -211,7 +211,7 @@ def _check_options(options: ChaoticSegmentationOptions) -> None:
             f"optimiser must be one of {', '.join(OPTIMISERS)}, repaint ratio or colour"
         )
     if not 0 <= options.rim <= 1:
-        raise InputError("rim must lie between 0 and 1: it is a share of the object's size")
+        raise InputError("rim must lie between 0 and 1, as a share of the object's size")
     if options.threshold is not None and not 0 < options.threshold < 1:
         raise InputError(
             "threshold must lie between 0 and 1, a share of the brightest value, not "
@@ -219,24 +219,24 @@ def _check_options(options: ChaoticSegmentationOptions) -> None:
         )
 
 
-def _repainted(
+def _filled_image(
     image: np.ndarray,
-    known: np.ndarray,
+    valid: np.ndarray,
     specular: np.ndarray,
     options: ChaoticSegmentationOptions,
     monitor: Monitor,
 ) -> np.ndarray:
-    """The image (H, W, 3) with specular pixels filled from known ones."""
-    usual = PatchFillOptions()
+    """The image (H, W, 3) with specular pixels filled from valid ones."""
+    defaults = PatchFillOptions()
     matching = CshOptions(
-        tables=usual.matching.tables, candidates=usual.matching.candidates, seed=options.seed
+        tables=defaults.matching.tables, candidates=defaults.matching.candidates, seed=options.seed
     )
-    return fill_patches(image, known, specular, PatchFillOptions(matching=matching), monitor)
+    return fill_patches(image, valid, specular, PatchFillOptions(matching=matching), monitor)
 
 
-def _white_light(
+def _ratio_specular(
     image: np.ndarray,
-    known: np.ndarray,
+    valid: np.ndarray,
     specular: np.ndarray,
     options: ChaoticSegmentationOptions,
     monitor: Monitor,
@@ -244,27 +244,27 @@ def _white_light(
     """The specular layer (H, W) of the specular pixels; 0 elsewhere."""
     low = smallest(image)
     chroma = largest(image) - low
-    # Colours are handed over as two sums whose quotient is the ratio: pixels with much colour,
-    # whose ratio is sure, count most.
-    paint = np.stack([low, chroma], axis=2)
-    means = fill(paint, known)
-    hue = _invariant_colour(image, low, known | specular)
-    source, target = patches_within(hue, known), patches_touching(hue, specular)
+    # The ratio is voted as two sums, numerator and denominator: saturated pixels, whose ratio is
+    # reliable, weigh most.
+    sums = np.stack([low, chroma], axis=2)
+    means = fill(sums, valid)
+    hue = _invariant_colour(image, low, valid | specular)
+    source, target = patches_within(hue, valid), patches_touching(hue, specular)
     if len(source) and len(target):
         matches = CshSearch(source, CshOptions(tables=_TABLES, seed=options.seed)).match(
             target, monitor=monitor
         )
-        votes, voted = vote(paint, target, source, matches)
-        means = np.where(voted[..., None], votes, means)
+        votes, has_votes = vote(sums, target, source, matches)
+        means = np.where(has_votes[..., None], votes, means)
     ratio = means[..., 0] / np.maximum(means[..., 1], 1e-6)
     return np.where(specular, np.clip(low - ratio * chroma, 0, low), 0)
 
 
 def _invariant_colour(image: np.ndarray, low: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """F / (sum F + e), F = I - min I (H, W, 3): a highlight does not change it, and shading little;
-    carried on beyond the mask.
+    """F / (sum F + e), F = I - min I (H, W, 3): invariant to highlights, nearly so to shading;
+    extrapolated beyond the mask.
     """
-    without_white = image - low[..., None]
-    total = without_white.sum(axis=2)
-    colour = without_white / (total + max(_FAINT * float(total[mask].mean()), 1e-12))[..., None]
+    specular_free = image - low[..., None]
+    total = specular_free.sum(axis=2)
+    colour = specular_free / (total + max(_FAINT * float(total[mask].mean()), 1e-12))[..., None]
     return fill(colour, mask)

@@ -56,8 +56,8 @@ from .support.highlight_cues import (
     Steps,
     far_from_borders,
     noise_level,
-    paint_mixing,
     ramp,
+    reflectance_mixing,
     roughness,
     steps_of,
 )
@@ -65,23 +65,23 @@ from .support.hue_grid import HueGrid, Places, hue_of, quantile
 from .support.layers import white_layers
 from .support.saturation_gate import saturation_gate
 
-# Objects longer than this are judged on averages of blocks, in pixels.
-_LONGEST = 640
+# Longest side in pixels at which statistics are computed; larger objects are block-averaged.
+_MAX_SIDE = 640
 _BINS, _CHROMA_BINS = 100, 64
 _TINY = np.float32(1e-9)
-# A layer that is nowhere brighter is none, as a share of the brightest value: half a step of a
-# display of eight bits.
-_FAINTEST = 1 / 512
-# Gaussian smoothing, in pixels, before the ratios by hue and by place are taken.
+# A layer whose maximum stays below this share of the brightest value is dropped: half a step of an
+# 8-bit display.
+_MIN_PEAK = 1 / 512
+# Gaussian sigmas, in pixels, applied before the ratios by hue and by place are computed.
 _BY_HUE, _BY_PLACE = 0.7, 1.0
-# A step of log C, and of the hue's shares, that counts as a border; the share of the brightest
-# value below which C is noise.
+# Steps of log C and of the hue's shares that count as an edge; the share of the brightest value
+# below which C is noise.
 _CHROMA_STEP, _SHARE_STEP, _DARK = 0.5, 0.1, 0.03
-# Of the filter by place: its reach as a share of the object's diagonal, the scale of doubt, rounds;
-# and how many times the smallest step.
-_REACH, _DOUBT, _ROUNDS, _SMALLEST_STEP = 0.15, 0.1, 4, 0.01
-# How far around what is proven a highlight may fade out, as a share of the object's diagonal.
-_NEARBY = 0.02
+# The filter by place: reach as a share of the object's diagonal, scale tau of the robust weights,
+# iterations, smallest step.
+_REACH, _TAU, _ROUNDS, _MIN_STEP = 0.15, 0.1, 4, 0.01
+# Extent of a highlight's faint rim around proven pixels, as a share of the object's diagonal.
+_RIM = 0.02
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,8 @@ class IscOptions:
     cell : float
         Side of the grid's cells as a share of the object's longer side, in (0, 1].
     low_quantile : float
-        Which quantile of min / max over like pixels is the paint's, in (0, 1); lower removes more.
+        Quantile of min I / max I over pixels of similar hue that is the diffuse ratio, in (0, 1); a
+        lower one removes more.
     borrowed : float
         Votes of the pixels of similar hue everywhere in a cell; >= 0.
     colourful : tuple[float, float]
@@ -156,11 +157,11 @@ VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
 
 
 @dataclass(frozen=True)
-class _Photo:
+class _ObjectMaps:
     """The object at one scale: `image` (H, W, 3), `mask` and `usable` (not clipped) (H, W) bool;
     smoothed for the ratios by hue: `low`, `high`, their difference `chroma` and the `hue` (H, W).
-    `peak`: the brightest value; `base`: the mean of `low`; `noise`: its standard deviation, which
-    nobody asks of a full photo that was judged on averages.
+    `peak`: the brightest value; `base`: the mean of `low`; `noise`: its standard deviation,
+    computed only on demand.
     """
 
     image: np.ndarray
@@ -193,10 +194,9 @@ class _Photo:
 
 
 @dataclass(frozen=True)
-class _Paints:
-    """What the pixels of like hue say: `share` of the smallest in the largest channel of their
-    paint, and their `chroma`, as tables of the `grid`, in units of 1 and of the photo's peak.
-    `places`: those of the pixels that they were learned from.
+class _DiffuseRatios:
+    """Diffuse statistics by hue, as tables over the `grid`: `share`, the ratio min D / max D, and
+    `chroma` in units of the photo's peak. `places`: grid positions of the pixels they come from.
     """
 
     grid: HueGrid
@@ -206,10 +206,10 @@ class _Paints:
 
 
 @dataclass(frozen=True)
-class _Judged:
-    """Candidates for s, by hue and by place, and their gains in [0, 1];
+class _Candidates:
+    """Candidates for s by hue and by place, with their gains in [0, 1].
 
-    `share` (H, W): the paint's min / max by place.
+    `share` (H, W): min D / max D by place.
     """
 
     by_hue: np.ndarray
@@ -260,39 +260,39 @@ def separate(
     check_arrays(image, mask, clipped)
     _check(options, prior, mask)
     if options.filters:
-        found = highlight_prior(image, mask)
-        prior = found if prior is None else _at_odds(found, prior)
+        cue = highlight_prior(image, mask)
+        prior = cue if prior is None else _apply_prior(cue, prior)
     unit = _unit(image[mask])
     image = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
     usable = mask if clipped is None else mask & ~clipped
-    factor = -(-max(mask.shape) // _LONGEST)
-    monitor.report("looking at the paints", 0.0)
-    photo = _photo(*_blocks(image, mask, usable, factor))
-    paints = _paints(photo, options)
-    monitor.report("weighing the evidence", 0.3)
-    judged = _judge(photo, paints, options)
-    monitor.report("taking highlights off", 0.8)
+    factor = -(-max(mask.shape) // _MAX_SIDE)
+    monitor.report("estimating diffuse colours", 0.0)
+    photo = _object_maps(*_block_averages(image, mask, usable, factor))
+    ratios = _diffuse_ratios(photo, options)
+    monitor.report("testing highlight candidates", 0.3)
+    candidates = _candidates(photo, ratios, options)
+    monitor.report("removing highlights", 0.8)
     if factor > 1:
-        photo = _photo(image, mask, usable)
-        judged = _carried_over(photo, paints, judged, factor)
+        photo = _object_maps(image, mask, usable)
+        candidates = _upsample_candidates(photo, ratios, candidates, factor)
     specular = np.maximum(
-        judged.by_hue * _at_odds(judged.gain_by_hue, prior),
-        judged.by_place * _at_odds(judged.gain_by_place, prior),
+        candidates.by_hue * _apply_prior(candidates.gain_by_hue, prior),
+        candidates.by_place * _apply_prior(candidates.gain_by_place, prior),
     )
-    if float(specular.max()) < _FAINTEST * photo.peak:
+    if float(specular.max()) < _MIN_PEAK * photo.peak:
         specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
-    trusted = np.ones(mask.shape, bool) if clipped is None else ~clipped
-    confidence = np.where(trusted, _confidence(photo, split.specular[..., 0]), 0)
+    unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
+    confidence = np.where(unclipped, _confidence(photo, split.specular[..., 0]), 0)
     return Separation(
         unit * split.diffuse, unit * split.specular, unit * split.residual, confidence
     )
 
 
 def _unit(values: np.ndarray) -> np.float32:
-    """A power of two near the largest value: dividing by it rounds nothing, and the small constants
-    mean the same at any exposure.
+    """A power of two near the largest value: dividing by it is exact, and makes
+    the small constants independent of exposure.
     """
     return np.float32(2.0 ** np.ceil(np.log2(max(float(values.max()), 1e-30))))
 
@@ -309,7 +309,7 @@ def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> N
             "least 0"
         )
     if not (0 <= options.scatter < np.inf and 0 <= options.scatter_here < np.inf):
-        raise InputError("scatter and scatter_here must be numbers from 0 on")
+        raise InputError("scatter and scatter_here must be finite and at least 0")
     for name, ends in vars(options).items():
         if isinstance(ends, tuple) and (
             len(ends) != 2 or not np.isfinite(ends).all() or ends[0] == ends[1]
@@ -320,14 +320,14 @@ def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> N
     if prior.shape != mask.shape:
         raise InputError(f"the prior must have the photo's size {mask.shape}, not {prior.shape}")
     if not np.isfinite(prior[mask]).all() or prior[mask].min() < 0 or prior[mask].max() > 1:
-        raise InputError("the prior must lie within [0, 1] inside the mask: it is a probability")
+        raise InputError("the prior must lie within [0, 1] inside the mask")
 
 
-def _blocks(
+def _block_averages(
     image: np.ndarray, mask: np.ndarray, usable: np.ndarray, factor: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The three at 1 / `factor` of their size: averages of the mask's pixels in each block; a block
-    is usable if all of those are.
+    """The three arrays downsampled by `factor`: means of the mask's pixels in each block. A block
+    is usable if all its pixels are.
     """
     if factor == 1:
         return image, mask, usable
@@ -351,47 +351,45 @@ def _blocks(
     return np.where(inside[..., None], whole, 0), inside, inside & (share(mask & ~usable) == 0)
 
 
-def _photo(image: np.ndarray, mask: np.ndarray, usable: np.ndarray) -> _Photo:
+def _object_maps(image: np.ndarray, mask: np.ndarray, usable: np.ndarray) -> _ObjectMaps:
     smooth = np.where(mask[..., None], masked_gaussian(image, mask, _BY_HUE), 0)
     low, high = smallest(smooth), largest(smooth)
-    return _Photo(image, mask, usable, low, high, hue_of(smooth, low, high))
+    return _ObjectMaps(image, mask, usable, low, high, hue_of(smooth, low, high))
 
 
-def _paints(photo: _Photo, options: IscOptions) -> _Paints:
-    """The tables of `_Paints`, from bright and coloured pixels; chroma from those that show little
-    candidate highlight.
-    """
+def _diffuse_ratios(photo: _ObjectMaps, options: IscOptions) -> _DiffuseRatios:
+    """Collect the tables from bright, coloured pixels; chroma where the candidate s is small."""
     mask, low, high, chroma = photo.mask, photo.low, photo.high, photo.chroma
     grid = HueGrid(
         (mask.shape[0], mask.shape[1]), max(options.cell * max(mask.shape), 1.0), options.hues
     )
     places = _places(grid, photo, 1)
-    telling = (photo.usable & (low > photo.base) & (chroma > photo.base / 2))[mask].astype(
+    weight = (photo.usable & (low > photo.base) & (chroma > photo.base / 2))[mask].astype(
         np.float32
     )
     bins = np.minimum(
         (_BINS * low[mask] / np.maximum(high[mask], _TINY)).astype(np.int64), _BINS - 1
     )
-    near, everywhere = grid.histograms(places, bins, _BINS, telling)
+    near, everywhere = grid.histograms(places, bins, _BINS, weight)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
     near += options.borrowed * everywhere
     share = quantile(near, options.low_quantile)
-    found = _specular(low[mask], chroma[mask], places.read(share))
-    telling *= np.exp(-np.square(found / np.maximum(0.1 * high[mask], _TINY)))
+    candidate = _specular(low[mask], chroma[mask], places.read(share))
+    weight *= np.exp(-np.square(candidate / np.maximum(0.1 * high[mask], _TINY)))
     bins = np.minimum(
         (np.clip(chroma[mask] / photo.peak, 0, 1) * (_CHROMA_BINS - 0.01)).astype(np.int64),
         _CHROMA_BINS - 1,
     )
-    near, everywhere = grid.histograms(places, bins, _CHROMA_BINS, telling)
+    near, everywhere = grid.histograms(places, bins, _CHROMA_BINS, weight)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
     near += 20 * everywhere
-    return _Paints(grid, places, share, quantile(near, 0.5))
+    return _DiffuseRatios(grid, places, share, quantile(near, 0.5))
 
 
-def _places(grid: HueGrid, photo: _Photo, scale: float) -> Places:
-    """Of the mask's pixels;
+def _places(grid: HueGrid, photo: _ObjectMaps, scale: float) -> Places:
+    """Grid positions of the mask's pixels.
 
-    `scale`: how many of them to a pixel of the photo that the grid is of.
+    `scale`: size of the photo relative to the image for which the grid was built.
     """
     rows, columns = np.nonzero(photo.mask)
     return grid.places(
@@ -400,9 +398,7 @@ def _places(grid: HueGrid, photo: _Photo, scale: float) -> Places:
 
 
 def _specular(low: np.ndarray, chroma: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """s = min I - q C, within [0, min I], for a paint whose smallest channel is `share` of its
-    largest.
-    """
+    """s = min I - q C, within [0, min I], for the diffuse ratio min D / max D = `share`."""
     return np.clip(low - _ratio(share) * chroma, 0, low)
 
 
@@ -410,109 +406,117 @@ def _ratio(share: np.ndarray) -> np.ndarray:
     return share / np.maximum(1 - share, np.float32(0.01))
 
 
-def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _as_map(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """`values` (n,) of the mask's pixels as a map (H, W), 0 elsewhere."""
     layer = np.zeros(mask.shape, np.float32)
     layer[mask] = values
     return layer
 
 
-def _judge(photo: _Photo, paints: _Paints, options: IscOptions) -> _Judged:
-    """Both candidates and what the evidence leaves of them."""
+def _candidates(photo: _ObjectMaps, ratios: _DiffuseRatios, options: IscOptions) -> _Candidates:
+    """Both candidates for s, with their gains."""
     hue_share, usual_chroma = (
-        _spread(paints.places.read(table), photo.mask)
-        for table in (paints.share, photo.peak * paints.chroma)
+        _as_map(ratios.places.read(table), photo.mask)
+        for table in (ratios.share, photo.peak * ratios.chroma)
     )
     by_hue = _specular(photo.low, photo.chroma, hue_share)
-    trust = far_from_borders(_chroma_steps(photo), photo.mask, blur=1.5, unit=0.6)
+    edge_weight = far_from_borders(_chroma_steps(photo), photo.mask, blur=1.5, unit=0.6)
     with ThreadPoolExecutor(
         1
-    ) as beside:  # filters release the interpreter's lock, and neither needs what the other finds
-        in_groups = beside.submit(
+    ) as executor:  # the filters release the GIL, and the two candidates are independent
+        in_groups = executor.submit(
             grouped_specular,
             photo.image,
             photo.mask,
             photo.usable if photo.usable.any() else photo.mask,
         )
-        gain_by_hue = beside.submit(_gain_by_hue, photo, by_hue, hue_share, trust, options)
-        by_place, gain_by_place, share = _by_place(photo, usual_chroma, trust, in_groups, options)
-        return _Judged(by_hue, gain_by_hue.result(), by_place, gain_by_place, share)
+        gain_by_hue = executor.submit(_gain_by_hue, photo, by_hue, hue_share, edge_weight, options)
+        by_place, gain_by_place, share = _by_place(
+            photo, usual_chroma, edge_weight, in_groups, options
+        )
+        return _Candidates(by_hue, gain_by_hue.result(), by_place, gain_by_place, share)
 
 
-def _chroma_steps(photo: _Photo) -> Steps:
+def _chroma_steps(photo: _ObjectMaps) -> Steps:
     level = photo.chroma + _DARK * photo.peak
-    # Three standard deviations of the difference of two neighbours, whose noise the smoothing has
-    # brought down to a third.
+    # Three standard deviations of the difference of two neighbours; smoothing reduces their noise
+    # to a third.
     floor = 3 * 0.3 * 1.4 * photo.noise / level / _CHROMA_STEP
     return steps_of([(np.log(level), _CHROMA_STEP)], photo.mask, floor)
 
 
 def _gain_by_hue(
-    photo: _Photo, candidate: np.ndarray, share: np.ndarray, trust: np.ndarray, options: IscOptions
+    photo: _ObjectMaps,
+    candidate: np.ndarray,
+    share: np.ndarray,
+    edge_weight: np.ndarray,
+    options: IscOptions,
 ) -> np.ndarray:
-    """The share (H, W) of the candidate by hue that is kept: whether it is believed at all is
-    decided for the object as a whole.
-    """
+    """The gain (H, W) of the candidate by hue: one factor for the object times local cues."""
     mask, low = photo.mask, photo.low
     bright = ramp(low / photo.base, options.bright)
-    found = candidate * bright
+    specular = candidate * bright
     weight = np.where(mask, ramp(low / photo.base, (0.5, 1.2)), 0)
     colour = (photo.chroma * weight).sum(dtype=float) / max(
         (photo.high * weight).sum(dtype=float), float(_TINY)
     )
     scale = max(0.015 * photo.diagonal, 2.5)
-    rough, rough_here = roughness(found, trust, mask, scale, fine=1.5)
-    believed = float(ramp(colour, options.colourful) * ramp(rough, options.smooth))
-    if believed > 0:
-        believed *= float(ramp(_mixing(photo, found, share, trust), options.unmixed))
-    if believed == 0:
+    rough, rough_here = roughness(specular, edge_weight, mask, scale, fine=1.5)
+    gain = float(ramp(colour, options.colourful) * ramp(rough, options.smooth))
+    if gain > 0:
+        gain *= float(ramp(_mixing(photo, specular, share, edge_weight), options.unmixed))
+    if gain == 0:
         return np.zeros(mask.shape, np.float32)
-    clear = ramp(found / (options.scatter * (low - found) + _TINY), options.clear)
-    kept = _carried_in(found * ramp(rough_here, options.smooth_here) * clear, trust)
-    return np.where(mask, believed * kept / np.maximum(candidate, _TINY), 0)
+    clear = ramp(specular / (options.scatter * (low - specular) + _TINY), options.clear)
+    kept = _suppress_borders(specular * ramp(rough_here, options.smooth_here) * clear, edge_weight)
+    return np.where(mask, gain * kept / np.maximum(candidate, _TINY), 0)
 
 
-def _mixing(photo: _Photo, found: np.ndarray, share: np.ndarray, trust: np.ndarray) -> float:
-    """The median paint mixing where the candidate `found` (H, W) is strong."""
-    inside = np.where(photo.mask, found, 0)
-    smooth = _carried_in(inside, np.square(trust), reach=4.0)
-    mixing = paint_mixing(
+def _mixing(
+    photo: _ObjectMaps, specular: np.ndarray, share: np.ndarray, edge_weight: np.ndarray
+) -> float:
+    """The median reflectance mixing where the `candidate` (H, W) is strong."""
+    inside = np.where(photo.mask, specular, 0)
+    smooth = _suppress_borders(inside, np.square(edge_weight), reach=4.0)
+    mixing = reflectance_mixing(
         smooth, photo.chroma, _ratio(share), photo.usable, max(0.03 * photo.diagonal, 2.5)
     )
     values = inside[photo.mask]
     return float(np.median(mixing[photo.mask][values >= 0.3 * np.quantile(values, 0.99)]))
 
 
-def _carried_in(found: np.ndarray, trust: np.ndarray, reach: float = 2.5) -> np.ndarray:
-    """`found` (H, W) where it can be trusted, and beside borders no more than around them, within
+def _suppress_borders(
+    specular: np.ndarray, edge_weight: np.ndarray, reach: float = 2.5
+) -> np.ndarray:
+    """`specular` (H, W), limited near edges (low `edge_weight`) to the level around them, within
     `reach` pixels.
     """
-    around = weighted_gaussian(found, trust, reach, 1e-3)
-    return trust * found + (1 - trust) * np.minimum(around, found)
+    around = weighted_gaussian(specular, edge_weight, reach, 1e-3)
+    return edge_weight * specular + (1 - edge_weight) * np.minimum(around, specular)
 
 
 def _by_place(
-    photo: _Photo,
+    photo: _ObjectMaps,
     usual_chroma: np.ndarray,
-    trust: np.ndarray,
+    edge_weight: np.ndarray,
     in_groups: "Future[np.ndarray]",
     options: IscOptions,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The candidate by place, its gain and the paint's min / max, all (H, W);
+    """The candidate by place, its gain and min D / max D, each (H, W).
 
-    `in_groups`: what `grouped_specular` is to find.
+    `in_groups`: the pending result of `grouped_specular`.
     """
     mask = photo.mask
     smooth = np.where(mask[..., None], masked_gaussian(photo.image, mask, _BY_PLACE), 0)
     low, high = smallest(smooth), largest(smooth)
     chroma = high - low
-    seen = low / np.maximum(high, _TINY)
+    observed = low / np.maximum(high, _TINY)
     paths = _paths(smooth, low, chroma, photo)
     weight = photo.usable.astype(np.float32)
-    share = paths.lower_mode(seen, weight, _DOUBT, _ROUNDS)
-    ratio, seen_ratio = _ratio(share), _ratio(seen)
-    off = np.clip((seen_ratio - ratio) / np.maximum(ratio, np.float32(1e-3)), -1, 1)
-    scatter = np.sqrt(paths.weighted(np.square(off), weight * (off <= 0)))
+    share = paths.lower_mode(observed, weight, _TAU, _ROUNDS)
+    ratio, observed_ratio = _ratio(share), _ratio(observed)
+    deviation = np.clip((observed_ratio - ratio) / np.maximum(ratio, np.float32(1e-3)), -1, 1)
+    scatter = np.sqrt(paths.weighted(np.square(deviation), weight * (deviation <= 0)))
     candidate = np.where(mask, np.clip(low - ratio * chroma, 0, low), 0)
     error = np.hypot(
         np.hypot(scatter, options.scatter_here) * (low - candidate), 3 * photo.noise * (1 + ratio)
@@ -523,30 +527,30 @@ def _by_place(
     )
     scale = max(0.015 * photo.diagonal, 2.5)
     gain *= ramp(
-        paint_mixing(candidate, photo.chroma, ratio, photo.usable, scale), options.unmixed_here
+        reflectance_mixing(candidate, photo.chroma, ratio, photo.usable, scale),
+        options.unmixed_here,
     )
-    safe = gain * trust * ramp(1 - share, options.coloured)
-    _, rough_here = roughness(candidate * safe, trust, mask, scale, fine=1.5)
+    safe = gain * edge_weight * ramp(1 - share, options.coloured)
+    _, rough_here = roughness(candidate * safe, edge_weight, mask, scale, fine=1.5)
     agreed = np.minimum(gain, in_groups.result() / np.maximum(candidate, _TINY))
     proven = np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0)
-    # A highlight fades out: around what is proven, what would not be enough by itself belongs to
-    # it.
+    # A highlight fades out: around proven pixels, weaker candidates belong to it as well.
     around = ndimage.maximum_filter(
-        ramp(proven, options.proven), 2 * round(_NEARBY * photo.diagonal) + 1
+        ramp(proven, options.proven), 2 * round(_RIM * photo.diagonal) + 1
     )
-    faint = trust * ramp(candidate / np.maximum(error, _TINY), options.faint)
+    faint = edge_weight * ramp(candidate / np.maximum(error, _TINY), options.faint)
     faint *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present)
     return candidate, np.where(mask, np.maximum(proven, np.minimum(faint, around)), 0), share
 
 
-def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Photo) -> Paths:
+def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _ObjectMaps) -> Paths:
     """Distances that grow across reflectance edges, and are infinite across the silhouette."""
     dark = _DARK * photo.peak
     free = smooth - low[..., None]
     shares = free / (free.sum(axis=2) + np.float32(dark))[..., None]
     reach = _REACH * photo.diagonal
     steps = steps_of(
-        [(shares, _SHARE_STEP), (np.log(chroma + dark), _CHROMA_STEP)], photo.mask, _SMALLEST_STEP
+        [(shares, _SHARE_STEP), (np.log(chroma + dark), _CHROMA_STEP)], photo.mask, _MIN_STEP
     )
     across, down = 1 + reach * steps.across, 1 + reach * steps.down
     across[:, 1:][photo.mask[:, 1:] != photo.mask[:, :-1]] = 1e6
@@ -554,32 +558,34 @@ def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Phot
     return Paths(across, down, reach)
 
 
-def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -> _Judged:
-    """What was found on averages of `factor` x `factor` pixels, for the full photo."""
+def _upsample_candidates(
+    full: _ObjectMaps, ratios: _DiffuseRatios, candidates: _Candidates, factor: int
+) -> _Candidates:
+    """Candidates of the block-averaged photo, upsampled by `factor` to the full one."""
     mask = full.mask
-    hue_share = _spread(_places(paints.grid, full, factor).read(paints.share), mask)
+    hue_share = _as_map(_places(ratios.grid, full, factor).read(ratios.share), mask)
     gain_by_hue, gain_by_place, share = (
         enlarged(layer, mask.shape, factor)
-        for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
+        for layer in (candidates.gain_by_hue, candidates.gain_by_place, candidates.share)
     )
     by_hue = _specular(full.low, full.chroma, hue_share)
     by_place = _specular(full.low, full.chroma, share)
-    return _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
+    return _Candidates(by_hue, gain_by_hue, by_place, gain_by_place, share)
 
 
-def _at_odds(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
-    """The gain after its odds are multiplied by the prior's."""
+def _apply_prior(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
+    """The gain with its odds multiplied by the prior's."""
     if prior is None:
         return gain
-    yes, no = gain * prior, (1 - gain) * (1 - prior)
-    return yes / np.maximum(yes + no, _TINY)
+    accepted, rejected = gain * prior, (1 - gain) * (1 - prior)
+    return accepted / np.maximum(accepted + rejected, _TINY)
 
 
-def _confidence(photo: _Photo, specular: np.ndarray) -> np.ndarray:
-    """exp(-e / u) (H, W): e, the error to be expected, is a share of what was removed and of what
-    could hide in the smallest channel.
+def _confidence(photo: _ObjectMaps, specular: np.ndarray) -> np.ndarray:
+    """exp(-e / u) (H, W): the expected error e is a share of s and of what
+    the smallest channel could hide.
 
-    On a pale object colour tells little, and e is up to three times as large.
+    On a pale object colour is a weak cue: e is up to three times as large.
     """
     error = (specular + 0.3 * photo.low) * (3 - 2 * saturation_gate(photo.image, photo.mask))
     return np.where(photo.mask, np.exp(-error / photo.base), 0).astype(np.float32)

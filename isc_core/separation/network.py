@@ -26,7 +26,7 @@ from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .support.checks import check_arrays
 from .support.layers import diffuse_layers
-from .support.light_tint import held_to_light
+from .support.light_tint import limit_tint
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
 
@@ -70,16 +70,16 @@ def separate(
     options, monitor = options or NetworkOptions(), monitor or Monitor()
     if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:
         raise InputError(
-            f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and "
-            "a tint of 1 or more"
+            f"the method network needs long_side at least {STRIDE}, doubt at least 0 and tint at "
+            "least 1"
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
     excess, error = log_ratio(image, mask, network or LayerNetwork.shipped(), options)
-    seen = np.where(mask[..., None], image, 0)
-    diffuse = held_to_light(seen, seen * np.exp(-excess), options.tint)
+    inside = np.where(mask[..., None], image, 0)
+    diffuse = limit_tint(inside, inside * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)
     unit = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
-    trust = 1 / (1 + error * split.diffuse.mean(axis=2) / unit)
-    known = mask if clipped is None else mask & ~clipped
-    return replace(split, confidence=np.where(known, trust, 0).astype(np.float32))
+    confidence = 1 / (1 + error * split.diffuse.mean(axis=2) / unit)
+    unclipped = mask if clipped is None else mask & ~clipped
+    return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))

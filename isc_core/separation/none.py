@@ -1,4 +1,4 @@
-"""Doing nothing, diffuse = image: the baseline of every table of separations."""
+"""The identity, diffuse = image: the baseline of every comparison of separations."""
 
 import numpy as np
 
@@ -25,8 +25,8 @@ def separate(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = N
         If shapes are invalid, the mask is empty, or values inside it are negative or not finite.
     """
     check_arrays(image, mask, clipped)
-    trusted = mask if clipped is None else mask & ~clipped
+    unclipped = mask if clipped is None else mask & ~clipped
     diffuse = np.where(mask[..., None], image, 0).astype(np.float32)
     return Separation(
-        diffuse, np.zeros_like(diffuse), np.zeros_like(diffuse), trusted.astype(np.float32)
+        diffuse, np.zeros_like(diffuse), np.zeros_like(diffuse), unclipped.astype(np.float32)
     )

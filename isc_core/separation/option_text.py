@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from ..errors import InputError
 from . import IMPROVED, method_options
 
-_WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
-_KINDS = {bool: "yes or no", int: "a whole number", float: "a number", str: "a word"}
+_BOOLEANS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "off": False}
+_TYPE_NAMES = {bool: "yes or no", int: "an integer", float: "a number", str: "a text"}
 
 
 def parse_changes(
@@ -32,21 +32,21 @@ def parse_changes(
     InputError
         If the method, variant, option or value is invalid.
     """
-    usual = method_options(method, variant)
-    kinds = {} if usual is None else typing.get_type_hints(type(usual))
+    defaults = method_options(method, variant)
+    kinds = {} if defaults is None else typing.get_type_hints(type(defaults))
     changes: dict[str, object] = {}
     for word in words:
         name, equals, text = (piece.strip() for piece in word.partition("="))
         if not equals:
-            raise InputError(f"--set {word}: write it as name=value")
-        method_options(method, variant, {name: None})  # the name is known, or this says which are
+            raise InputError(f"--set {word}: expected NAME=VALUE")
+        method_options(method, variant, {name: None})  # raises, listing the names, if unknown
         changes[name] = _value(text, kinds[name], f"--set {name} of {method}")
     return changes
 
 
 def _value(text: str, kind: object, what: str) -> object:
-    """`text` as the type `kind`: bool, int, float, str, a `Literal`, or a union of them, in which
-    `none` is None.
+    """Parse `text` as the type `kind`: bool, int, float, str, a `Literal`, a tuple, or a union
+    of them, in which `none` is None.
     """
     choices = (
         list(typing.get_args(kind))
@@ -56,19 +56,21 @@ def _value(text: str, kind: object, what: str) -> object:
     if types.NoneType in choices and text.lower() == "none":
         return None
     for choice in choices:
-        found = _one(text, choice)
-        if found is not None:
-            return found
-    raise InputError(f"{what}: {text!r} is not {' or '.join(_named(choice) for choice in choices)}")
+        value = _parse_one(text, choice)
+        if value is not None:
+            return value
+    raise InputError(
+        f"{what}: {text!r} is not {' or '.join(_type_name(choice) for choice in choices)}"
+    )
 
 
-def _one(text: str, kind: object) -> object | None:
-    """`text` as one plain type, or None where it is not of it."""
+def _parse_one(text: str, kind: object) -> object | None:
+    """Parse `text` as one plain type; None if it does not match."""
     if typing.get_origin(kind) is typing.Literal:
         return next((value for value in typing.get_args(kind) if str(value) == text), None)
     if typing.get_origin(kind) is tuple:
         parts = [
-            _one(piece.strip(), part)
+            _parse_one(piece.strip(), part)
             for piece, part in zip(text.split(","), typing.get_args(kind), strict=False)
         ]
         return (
@@ -79,7 +81,7 @@ def _one(text: str, kind: object) -> object | None:
             else tuple(parts)
         )
     if kind is bool:
-        return _WORDS.get(text.lower())
+        return _BOOLEANS.get(text.lower())
     if kind is str:
         return text
     try:
@@ -91,9 +93,11 @@ def _one(text: str, kind: object) -> object | None:
     return value if math.isfinite(value) else None
 
 
-def _named(kind: object) -> str:
+def _type_name(kind: object) -> str:
     if typing.get_origin(kind) is typing.Literal:
         return "one of " + ", ".join(map(str, typing.get_args(kind)))
     if typing.get_origin(kind) is tuple:
-        return f"{len(typing.get_args(kind))} numbers with commas between them"
-    return "none" if kind is types.NoneType else _KINDS.get(kind, "something that can be set here")  # type: ignore[call-overload]
+        return f"{len(typing.get_args(kind))} comma-separated numbers"
+    return (
+        "none" if kind is types.NoneType else _TYPE_NAMES.get(kind, "a value that can be set here")
+    )  # type: ignore[call-overload]

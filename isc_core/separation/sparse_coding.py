@@ -17,7 +17,7 @@ The code is sparse: beta is 0 except where beta > lambda t, and a group switches
 not at all. A group is a connected region of active pixels without an edge of the specular-free
 images in it. White reflectance raises beta as well, but F changes with it; a highlight has edges
 that F does not show, and F has edges that beta does not show. A group's code is weighted by the
-product of six ramps, see `_keep`: what cannot be identified is left unchanged.
+product of six ramps, see `_group_gains`: what cannot be identified is left unchanged.
 docs/methods/sparse_coding.md derives all of it.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
@@ -46,8 +46,8 @@ from ..scene.decomposition import Separation
 from .support.checks import check_arrays, require_colour
 from .support.layers import diffuse_layers, white_layers
 
-# Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and
-# direction (the highlight atom).
+# Linear Rec.709 to CIE XYZ, and white specular light (1, 1, 1) there: its length and direction (the
+# highlight atom).
 _XYZ = np.array(
     [
         [0.4124564, 0.3575761, 0.1804375],
@@ -58,15 +58,15 @@ _XYZ = np.array(
 _WHITE = float(np.linalg.norm(_XYZ.sum(axis=1)))
 _HIGHLIGHT = _XYZ.sum(axis=1) / _WHITE
 _TINY = 1e-12
-# The plane across the highlight atom, in which paint and its specular-free images lie alike.
+# Basis of the plane orthogonal to the highlight atom, which contains the specular-free images.
 _FIRST = np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]) / np.linalg.norm(
     np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0])
 )
-_ACROSS = np.stack([_FIRST, np.cross(_HIGHLIGHT, _FIRST)])
+_ORTHOGONAL = np.stack([_FIRST, np.cross(_HIGHLIGHT, _FIRST)])
 # The histogram of log(t / alpha): its range holds every colour from pure blue to grey within
 # rounding.
 _LOG_RATIOS = np.linspace(-1, 5, 241)
-_LOWER = 0.16  # this quantile lies one standard deviation below the median
+_LOWER = 0.16  # the quantile one standard deviation below the median
 
 
 @dataclass(frozen=True)
@@ -113,10 +113,10 @@ VARIANTS: dict[str, SparseCodingOptions] = {
 
 
 @dataclass(frozen=True)
-class _Free:
-    """What highlights leave as it is: `alpha` (H, W), the length of a pixel's part across h, `hue`
-    (H, W), its angle in turns, [0, 1). And what they raise: `brightness` (H, W), t, the part along
-    h. Zero outside `mask`.
+class _Invariants:
+    """Highlight-invariant coordinates: `alpha` (H, W), the length of a pixel's component
+    orthogonal to h, `hue` (H, W), its angle in turns, [0, 1). What highlights raise:
+    `brightness` (H, W), t, the component along h. Zero outside `mask`.
     """
 
     alpha: np.ndarray
@@ -127,10 +127,9 @@ class _Free:
 
 @dataclass(frozen=True)
 class _Dictionary:
-    """Per hue (k,):
+    """Tables by hue (k,).
 
-    `log_ratio`, log R_k, and `spread`, how far the ratios of paint without highlight scatter around
-    it (log).
+    `log_ratio`: log R_k; `spread`: scatter of the diffuse log ratios around it.
     """
 
     log_ratio: np.ndarray
@@ -220,8 +219,8 @@ def separate(
     monitor.report("specular-free images", 0.0)
     free = _specular_free(image, mask, options.blur)
     monitor.report("dictionary", 0.3)
-    telling = mask if clipped is None or not (mask & ~clipped).any() else mask & ~clipped
-    dictionary = _learn(free, telling, options)
+    informative = mask if clipped is None or not (mask & ~clipped).any() else mask & ~clipped
+    dictionary = _learn(free, informative, options)
     monitor.report("sparse codes", 0.4)
     if options.grouped:
         return white_layers(image, mask, _grouped(free, dictionary, options).specular, clipped)
@@ -230,7 +229,7 @@ def separate(
     )
 
 
-def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> np.ndarray:
+def grouped_specular(image: np.ndarray, mask: np.ndarray, informative: np.ndarray) -> np.ndarray:
     """Return the specular light of the improved variant, before it is clamped.
 
     Parameters
@@ -238,7 +237,7 @@ def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -
     image : (H, W, 3) ndarray
         0 outside the mask.
     mask : (H, W) bool ndarray
-    telling : (H, W) bool ndarray
+    informative : (H, W) bool ndarray
         Pixels of the mask that shape the atoms.
 
     Returns
@@ -246,14 +245,14 @@ def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -
     (H, W) ndarray
         Equal in all channels.
     """
-    return stages(image, mask, telling).specular
+    return stages(image, mask, informative).specular
 
 
-def stages(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> Stages:
+def stages(image: np.ndarray, mask: np.ndarray, informative: np.ndarray) -> Stages:
     """Return the intermediate maps of the improved variant; arguments as `grouped_specular`."""
     options = VARIANTS["improved"]
     free = _specular_free(image, mask, options.blur)
-    return _grouped(free, _learn(free, telling, options), options)
+    return _grouped(free, _learn(free, informative, options), options)
 
 
 def _check_options(options: SparseCodingOptions) -> None:
@@ -274,27 +273,27 @@ def _check_options(options: SparseCodingOptions) -> None:
         raise InputError("sparsity and noise must be within [0, 1)")
 
 
-def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Free:
+def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Invariants:
     pixel = np.where(mask[..., None], masked_gaussian(image, mask, blur), 0) @ _XYZ.T
-    one, two = pixel @ _ACROSS[0], pixel @ _ACROSS[1]
-    return _Free(
+    one, two = pixel @ _ORTHOGONAL[0], pixel @ _ORTHOGONAL[1]
+    return _Invariants(
         np.hypot(one, two), np.arctan2(two, one) / (2 * np.pi) % 1, pixel @ _HIGHLIGHT, mask
     )
 
 
-def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _Dictionary:
-    """The atoms from the pixels `telling` (H, W) bool: quantiles of log(t / alpha) per hue, pixels
+def _learn(free: _Invariants, informative: np.ndarray, options: SparseCodingOptions) -> _Dictionary:
+    """The atoms from the `informative` pixels (H, W) bool: quantiles of log(t / alpha) per hue,
     weighted by alpha.
     """
-    k = np.minimum((free.hue[telling] * options.hues).astype(int), options.hues - 1)
+    k = np.minimum((free.hue[informative] * options.hues).astype(int), options.hues - 1)
     ratio = np.log(
-        np.maximum(free.brightness[telling], _TINY) / np.maximum(free.alpha[telling], _TINY)
+        np.maximum(free.brightness[informative], _TINY) / np.maximum(free.alpha[informative], _TINY)
     )
     size = len(_LOG_RATIOS)
     place = np.clip(
         (ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0]), 0, size - 1
     ).astype(int)
-    votes = np.bincount(k * size + place, free.alpha[telling], options.hues * size).reshape(
+    votes = np.bincount(k * size + place, free.alpha[informative], options.hues * size).reshape(
         options.hues, size
     )
     summed = np.cumsum(ndimage.gaussian_filter1d(votes, 1.0, axis=0, mode="wrap"), axis=1)
@@ -307,9 +306,9 @@ def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _D
 
 
 def _diffuse_of_pixels(
-    image: np.ndarray, free: _Free, dictionary: _Dictionary, options: SparseCodingOptions
+    image: np.ndarray, free: _Invariants, dictionary: _Dictionary, options: SparseCodingOptions
 ) -> np.ndarray:
-    """Diffuse (H, W, 3), linear RGB: each pixel coded by itself, 1/2 |y - a x - h z|^2 + l (x + z),
+    """Diffuse (H, W, 3), linear RGB: each pixel coded alone, 1/2 |y - a x - h z|^2 + l (x + z),
     x, z >= 0, with its hue's atom.
 
     With unit atoms of inner product c the optimum with both active is x = (p - c q) / (1 - c^2), z
@@ -327,20 +326,20 @@ def _diffuse_of_pixels(
 
 
 def _atoms(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
-    """Unit colours (..., 3) in XYZ of `hue` (...) in turns whose part along h is R times that
-    across it.
+    """Unit colours (..., 3) in XYZ of `hue` (...) in turns; their component along h is R times
+    the orthogonal one.
     """
     angle = 2 * np.pi * hue[..., None]
     colour = (
-        np.cos(angle) * _ACROSS[0]
-        + np.sin(angle) * _ACROSS[1]
+        np.cos(angle) * _ORTHOGONAL[0]
+        + np.sin(angle) * _ORTHOGONAL[1]
         + np.exp(log_ratio)[..., None] * _HIGHLIGHT
     )
     return colour / np.linalg.norm(colour, axis=-1, keepdims=True)
 
 
-def _grouped(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> Stages:
-    """The highlight atom's code of pixels that switch it on in groups."""
+def _grouped(free: _Invariants, dictionary: _Dictionary, options: SparseCodingOptions) -> Stages:
+    """The code of the highlight atom, activated in groups of pixels."""
     log_ratio = dictionary.at(dictionary.log_ratio, free.hue)
     diffuse = np.exp(log_ratio) * free.alpha
     beta = np.where(free.mask, np.maximum(free.brightness - diffuse, 0), 0)
@@ -348,31 +347,35 @@ def _grouped(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions)
     floor = options.noise * brightest
     active = beta > options.sparsity * free.brightness + floor / 2
     code, group = np.zeros(beta.shape), np.full(beta.shape, -1)
-    answer = Stages(free.hue, free.alpha, free.brightness, beta, group, code)
+    result = Stages(free.hue, free.alpha, free.brightness, beta, group, code)
     if not active.any():
-        return answer
+        return result
     angle = 2 * np.pi * free.hue
     colour = np.stack([np.cos(angle), np.sin(angle), free.alpha, np.exp(log_ratio), beta], axis=2)
-    watched = options.specular_free != "sf2", options.specular_free != "sf1"
-    names, number = np.unique(
-        _groups(colour, active, watched, options.edge, floor)[active], return_inverse=True
+    considered = options.specular_free != "sf2", options.specular_free != "sf1"
+    roots, number = np.unique(
+        _groups(colour, active, considered, options.edge, floor)[active], return_inverse=True
     )
     group[active] = number
-    evidence = _evidence(colour, group, free.mask, watched, options.edge, floor, len(names))
+    statistics = _group_statistics(
+        colour, group, free.mask, considered, options.edge, floor, len(roots)
+    )
     excess = np.log(free.brightness[active] / np.maximum(diffuse[active], _TINY))
-    paint = _Paint(
+    cues = _PixelCues(
         saturation=_saturation(free.hue[active], log_ratio[active]),
         spread=dictionary.at(dictionary.spread, free.hue[active]),
         excess=excess,
     )
-    code[active] = _keep(number, beta[active], paint, evidence, brightest)[number] * beta[active]
-    return answer
+    code[active] = (
+        _group_gains(number, beta[active], cues, statistics, brightest)[number] * beta[active]
+    )
+    return result
 
 
 @dataclass(frozen=True)
-class _Paint:
-    """Of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom; how far
-    its atom's pixels `spread`, and how far it lies above the atom, `excess`, both as logarithms of
+class _PixelCues:
+    """Cues of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom;
+    `spread`, the scatter of the atom's pixels, and `excess` above the atom, both as logarithms of
     ratios.
     """
 
@@ -386,30 +389,31 @@ def _saturation(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
     return 1 - colour.min(axis=-1) / np.maximum(colour.max(axis=-1), _TINY)
 
 
-def _keep(
-    group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray, brightest: float
+def _group_gains(
+    group: np.ndarray, beta: np.ndarray, cues: _PixelCues, statistics: np.ndarray, brightest: float
 ) -> np.ndarray:
-    """How much of each group's code is kept, in [0, 1]: the product of six ramps over averages
-    weighted by beta.
+    """The gain of each group's code, in [0, 1]: the product of six ramps over averages weighted by
+    beta.
 
-    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`;
-    `brightest`: of the object's t. Each ramp asks one question: is the paint coloured, so that it
-    can be told from white; are the atom's other pixels of one paint; does the group stand out from
-    them; is it bright, as the image of a lamp is; does its brightness change where the
-    specular-free images do not; and does it fade at its border, as light does and paint does not.
+    `group`, `beta` (n,) of the active pixels; `statistics` (5, groups) as in `_group_statistics`;
+    `brightest`: of the object's t. The ramps test, in order: whether the reflectance is saturated,
+    hence distinct from white; whether the atom's other pixels share one reflectance; whether the
+    group exceeds them; whether it is as bright as the image of a light source; whether its
+    brightness changes where the specular-free images do not; and whether it fades at its border,
+    as specular light does and reflectance does not.
     """
     total = np.maximum(np.bincount(group, beta), _TINY)
 
     def mean(value: np.ndarray) -> np.ndarray:
         return np.bincount(group, value * beta) / total
 
-    for_light, for_paint, step, border, peak = evidence
+    specular_score, reflectance_score, step, border, peak = statistics
     return (
-        _ramp(mean(paint.saturation), 0.42, 0.52)
-        * _ramp(-mean(paint.spread), -0.35, -0.25)
-        * _ramp(mean(paint.excess / paint.spread), 1.5, 2.5)
+        _ramp(mean(cues.saturation), 0.42, 0.52)
+        * _ramp(-mean(cues.spread), -0.35, -0.25)
+        * _ramp(mean(cues.excess / cues.spread), 1.5, 2.5)
         * _ramp(mean(beta) / brightest, 0.08, 0.18)
-        * _ramp(for_light / np.maximum(for_light + for_paint, _TINY), 0.5, 0.6)
+        * _ramp(specular_score / np.maximum(specular_score + reflectance_score, _TINY), 0.5, 0.6)
         * _ramp(-step / np.maximum(border * peak, _TINY), -0.12, -0.08)
     )
 
@@ -419,19 +423,19 @@ def _ramp(value: np.ndarray, none: float, full: float) -> np.ndarray:
 
 
 @jit
-def _change(colour, watched, y, x, v, u):
+def _change(colour, considered, y, x, v, u):
     """Between two pixels: the change of the specular-free images in units of beta, the step of
     beta, and the larger beta.
 
     `colour` (H, W, 5): cosine and sine of the hue, alpha, R, beta. |F - F'|^2 = (alpha - alpha')^2
-    + alpha alpha' |u - u'|^2 for unit vectors u of the hue: the second part is SF1's, the first one
-    SF2's; `watched` says which count.
+    + alpha alpha' |u - u'|^2 for unit vectors u of the hue: the second part belongs to SF1, the
+    first to SF2; `considered` selects them.
     """
     one, two = colour[y, x], colour[v, u]
     square = 0.0
-    if watched[0]:
+    if considered[0]:
         square += one[2] * two[2] * ((one[0] - two[0]) ** 2 + (one[1] - two[1]) ** 2)
-    if watched[1]:
+    if considered[1]:
         square += (one[2] - two[2]) ** 2
     return min(one[3], two[3]) * np.sqrt(square), abs(one[4] - two[4]), max(one[4], two[4])
 
@@ -445,9 +449,9 @@ def _root(parent, pixel):
 
 
 @jit
-def _groups(colour, active, watched, edge, floor):
-    """Of each pixel (H, W) the first one, as row * W + column, of the region that it is connected
-    with; edges and inactive pixels part.
+def _groups(colour, active, considered, edge, floor):
+    """The first pixel, as row * W + column, of the connected region of each pixel (H, W); edges and
+    inactive pixels separate regions.
     """
     height, width = active.shape
     parent = np.arange(height * width)
@@ -455,7 +459,7 @@ def _groups(colour, active, watched, edge, floor):
         for x in range(width):
             for v, u in ((y, x + 1), (y + 1, x)):
                 if v < height and u < width and active[y, x] and active[v, u]:
-                    change, _, peak = _change(colour, watched, y, x, v, u)
+                    change, _, peak = _change(colour, considered, y, x, v, u)
                     if change <= max(edge * peak, floor):
                         one, two = _root(parent, y * width + x), _root(parent, v * width + u)
                         parent[max(one, two)] = min(one, two)
@@ -465,10 +469,10 @@ def _groups(colour, active, watched, edge, floor):
 
 
 @jit
-def _evidence(colour, group, mask, watched, edge, floor, count):
-    """Sums (5, count) over the neighbours of each group: changes of beta that speak for light and
-    for paint, steps of beta at the border, how many neighbours the border has, and the largest
-    beta. `group` (H, W) is -1 where not active.
+def _group_statistics(colour, group, mask, considered, edge, floor, count):
+    """Sums (5, count) over the neighbours of each group: changes of beta attributed to specular
+    light and to reflectance, steps of beta at the border, the number of border neighbours, and
+    the largest beta. `group` (H, W) is -1 where not active.
     """
     height, width = mask.shape
     sums = np.zeros((5, count))
@@ -485,15 +489,15 @@ def _evidence(colour, group, mask, watched, edge, floor, count):
                     or max(group[y, x], group[v, u]) < 0
                 ):
                     continue
-                change, step, peak = _change(colour, watched, y, x, v, u)
+                change, step, peak = _change(colour, considered, y, x, v, u)
                 light = step if change < edge * step else 0.0
                 if change > max(edge * peak, floor) and step < edge * peak:
                     light += peak
-                paint = step if change >= edge * step and step >= edge * peak else 0.0
+                reflectance = step if change >= edge * step and step >= edge * peak else 0.0
                 for one, two in ((group[y, x], group[v, u]), (group[v, u], group[y, x])):
                     if one >= 0:
                         sums[0, one] += light
-                        sums[1, one] += paint
+                        sums[1, one] += reflectance
                         if one != two:
                             sums[2, one] += step
                             sums[3, one] += 1

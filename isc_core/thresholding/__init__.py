@@ -56,4 +56,4 @@ def maximise(
     for module in (chaotic_clonal, clonal_selection, particle_swarm):
         if optimiser == module.__name__.rpartition(".")[2]:
             return module.maximise(objective, count, evaluations, seed)
-    raise InputError(f"no optimiser is called {optimiser!r}: choose one of {', '.join(OPTIMISERS)}")
+    raise InputError(f"unknown optimiser {optimiser!r}: choose one of {', '.join(OPTIMISERS)}")

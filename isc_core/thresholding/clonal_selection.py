@@ -27,10 +27,10 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from .optimum import Account, Optimum
+from .optimum import Budget, Optimum
 from .otsu import LEVELS, OtsuObjective
 
-_TOP = LEVELS - 2  # the highest threshold that leaves a level above it
+_TOP = LEVELS - 2  # the highest threshold with a level above it
 
 
 @dataclass(frozen=True)
@@ -131,13 +131,13 @@ def search(
     _check(options)
     clones = max(1, round(options.clone_share * options.population))
     replaced = round(options.replaced_share * options.population)
-    account = Account(objective, evaluations, options.population)
+    budget = Budget(objective, evaluations, options.population)
     antibodies = _new(numbers, options.population, count)
-    values = account.evaluate(antibodies)
-    while account.left >= options.population * clones + replaced:
+    values = budget.evaluate(antibodies)
+    while budget.left >= options.population * clones + replaced:
         steps = np.repeat(_steps(values, options.decay), clones)
         offspring = _mutated(np.repeat(antibodies, clones, axis=0), steps, numbers)
-        offspring_values = account.evaluate(offspring).reshape(-1, clones)
+        offspring_values = budget.evaluate(offspring).reshape(-1, clones)
         best = np.argmax(offspring_values, axis=1)
         chosen = np.arange(options.population), best
         better = offspring_values[chosen] >= values
@@ -148,8 +148,8 @@ def search(
         if replaced:
             worst = np.argsort(values, kind="stable")[:replaced]
             antibodies[worst] = _new(numbers, replaced, count)
-            values[worst] = account.evaluate(antibodies[worst])
-    return account.close()
+            values[worst] = budget.evaluate(antibodies[worst])
+    return budget.close()
 
 
 def mutation_rate(affinity: np.ndarray, decay: float) -> np.ndarray:
@@ -176,13 +176,13 @@ def _steps(values: np.ndarray, decay: float) -> np.ndarray:
 
 
 def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers) -> np.ndarray:
-    """The `clones` (n, K), a run of each one's thresholds moved by one step of at most its entry of
-    `steps` (n,), and sorted.
+    """The `clones` (n, K), with a run of thresholds of each moved by one step of at most its entry
+    of `steps` (n,), sorted.
     """
     size, count = clones.shape
     chance = numbers.uniform((size, 3))
-    sway = 2 * chance[:, 0] - 1
-    moves = np.where(sway < 0, -1, 1) * np.maximum(1, np.ceil(np.abs(sway) * steps)).astype(
+    signed = 2 * chance[:, 0] - 1
+    moves = np.where(signed < 0, -1, 1) * np.maximum(1, np.ceil(np.abs(signed) * steps)).astype(
         np.int64
     )
     ends = np.sort((chance[:, 1:] * count).astype(np.int64), axis=1)

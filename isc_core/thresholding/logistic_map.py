@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import InputError
 
 DEGENERATE = (0.0, 0.25, 0.5, 0.75, 1.0)
-_FORGET = 64  # steps after which rounding has replaced every digit of a start
+_BURN_IN = 64  # steps after which rounding has replaced every digit of the start
 
 
 def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarray:
@@ -54,8 +54,8 @@ def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarr
     x = np.asarray(start, np.float64)
     if not ((x > 0) & (x < 1)).all() or (rate == 4 and np.isin(x, DEGENERATE).any()):
         raise InputError(
-            f"an orbit must start within (0, 1), at rate 4 at none of {DEGENERATE}: it would stand "
-            "still"
+            f"an orbit must start within (0, 1) and, at rate 4, outside {DEGENERATE}, where it is "
+            "constant"
         )
     values = np.empty((length, *x.shape))
     for k in range(length):
@@ -116,24 +116,24 @@ class ChaoticNumbers:
         self._restarts = 0
         self._seed = seed
         self._x = self._starts(np.arange(orbits))
-        self._advance(_FORGET)
+        self._advance(_BURN_IN)
         self._block = np.empty(0)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
         """Return the next numbers, of `shape`."""
-        wanted = int(np.prod(shape))
-        blocks, held = [self._block], len(self._block)
-        while held < wanted:
+        count = int(np.prod(shape))
+        blocks, available = [self._block], len(self._block)
+        while available < count:
             self._advance(self._stride)
             blocks.append(np.minimum(uniformised(self._x), np.nextafter(1, 0)))
-            held += len(self._x)
+            available += len(self._x)
         numbers = np.concatenate(blocks)
-        self._block = numbers[wanted:]
-        return numbers[:wanted].reshape(shape)
+        self._block = numbers[count:]
+        return numbers[:count].reshape(shape)
 
     def _starts(self, which: np.ndarray) -> np.ndarray:
         """Starts of the orbits `which` (n,), spread over (0, 1) by multiples of two irrational
-        numbers; none of them degenerate.
+        numbers; none is degenerate.
         """
         turns = (
             (which + 1) * np.sqrt(2)
@@ -147,7 +147,7 @@ class ChaoticNumbers:
         x = self._x
         for _ in range(steps):
             x = 4 * x * (1 - x)
-        stuck = np.isin(x, DEGENERATE)  # an orbit that met such a point earlier still lies on one
+        stuck = np.isin(x, DEGENERATE)  # an orbit that has reached such a point stays on one
         if stuck.any():
             self._restarts += 1
             x[stuck] = self._starts(np.flatnonzero(stuck))

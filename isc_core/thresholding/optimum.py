@@ -1,4 +1,4 @@
-"""The result of a threshold optimiser, and the account of its budget."""
+"""The result of a threshold optimiser, and its budget of evaluations."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -31,7 +31,7 @@ class Optimum:
     history: np.ndarray
 
 
-class Account:
+class Budget:
     """Evaluates candidates within a budget and records the best one and the history."""
 
     def __init__(
@@ -44,7 +44,7 @@ class Account:
         if budget < least:
             raise InputError(
                 f"the search needs at least {least} evaluations, not {budget}: raise the budget or "
-                "make the population smaller"
+                "reduce the population"
             )
         self._objective = objective
         self.left = budget

@@ -46,7 +46,7 @@ def quantise(values: np.ndarray, peak: float) -> np.ndarray:
     if not (peak > 0 and np.isfinite(peak) and np.isfinite(values).all()):
         raise InputError(
             "thresholds need finite values and a peak above 0: check that the photo is not black "
-            "or broken"
+            "or damaged"
         )
     return np.clip(
         np.rint(np.asarray(values, np.float64) * ((LEVELS - 1) / peak)), 0, LEVELS - 1
@@ -118,27 +118,27 @@ def exact(objective: OtsuObjective, count: int) -> Optimum:
     Optimum
     """
     best = objective.terms[0].copy()  # of the first class alone, by its end
-    best[0] = -np.inf  # it holds level 0 at least: thresholds are levels
+    best[0] = -np.inf  # the first class contains at least level 0
     choices = []
     for _ in range(count):
         total = best[:, None] + objective.terms
         choices.append(np.argmax(total, axis=0))
         best = np.max(total, axis=0)
     end = LEVELS
-    found = []
+    reversed_thresholds = []
     for starts in reversed(choices):
         end = int(starts[end])
-        found.append(end - 1)
-    thresholds = np.array(found[::-1])
+        reversed_thresholds.append(end - 1)
+    thresholds = np.array(reversed_thresholds[::-1])
     value = float(objective(thresholds[None])[0])
     return Optimum(thresholds, value, 1, np.array([[1, value]]))
 
 
 def _class_terms(share: np.ndarray) -> np.ndarray:
-    """Terms (257, 257): what a class of the levels a..b-1 adds at [a, b]; minus infinity where b <
-    a, 0 for classes without pixels.
+    """Terms (257, 257): the contribution of a class of the levels a..b-1 at [a, b]; minus infinity
+    for b < a, 0 for classes without pixels.
     """
-    levels = np.arange(LEVELS) - share @ np.arange(LEVELS)  # about the mean, where nothing cancels
+    levels = np.arange(LEVELS) - share @ np.arange(LEVELS)  # about the mean, to avoid cancellation
     weight = np.concatenate([[0.0], np.cumsum(share)])
     moment = np.concatenate([[0.0], np.cumsum(share * levels)])
     weights = weight[None, :] - weight[:, None]

@@ -22,10 +22,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .optimum import Account, Optimum
+from .optimum import Budget, Optimum
 from .otsu import LEVELS, OtsuObjective
 
-_TOP = LEVELS - 2  # the highest threshold that leaves a level above it
+_TOP = LEVELS - 2  # the highest threshold with a level above it
 
 
 @dataclass(frozen=True)
@@ -87,28 +87,30 @@ def maximise(
     options = options or SwarmOptions()
     _check(options)
     generator = np.random.default_rng(seed)
-    account = Account(objective, evaluations, options.particles)
+    budget = Budget(objective, evaluations, options.particles)
     shape = (options.particles, count)
-    # Sorted, so that the first coordinate of every particle means the lowest threshold.
-    places = np.sort(generator.uniform(0, _TOP, shape), axis=1)
+    # Sorted, so that the first coordinate of every particle is the lowest threshold.
+    positions = np.sort(generator.uniform(0, _TOP, shape), axis=1)
     velocities = np.zeros(shape)
-    own = places.copy()
-    own_values = account.evaluate(_thresholds(places))
-    while account.left >= options.particles:
-        leader = own[np.argmax(own_values)]
+    best = positions.copy()
+    best_values = budget.evaluate(_thresholds(positions))
+    while budget.left >= options.particles:
+        leader = best[np.argmax(best_values)]
         pulls = generator.random((2, *shape)) * options.attraction
         inertia = (
             options.last_inertia
-            + (options.inertia - options.last_inertia) * account.left / evaluations
+            + (options.inertia - options.last_inertia) * budget.left / evaluations
         )
-        velocities = inertia * velocities + pulls[0] * (own - places) + pulls[1] * (leader - places)
+        velocities = (
+            inertia * velocities + pulls[0] * (best - positions) + pulls[1] * (leader - positions)
+        )
         velocities = np.clip(velocities, -options.top_speed, options.top_speed)
-        places = np.clip(places + velocities, 0, _TOP)
-        values = account.evaluate(_thresholds(places))
-        better = values > own_values
-        own[better] = places[better]
-        own_values = np.maximum(values, own_values)
-    return account.close()
+        positions = np.clip(positions + velocities, 0, _TOP)
+        values = budget.evaluate(_thresholds(positions))
+        better = values > best_values
+        best[better] = positions[better]
+        best_values = np.maximum(values, best_values)
+    return budget.close()
 
 
 def _check(options: SwarmOptions) -> None:
@@ -118,5 +120,5 @@ def _check(options: SwarmOptions) -> None:
         raise InputError("inertia and last_inertia must lie within [0, 1)")
 
 
-def _thresholds(places: np.ndarray) -> np.ndarray:
-    return np.sort(np.rint(places).astype(np.int64), axis=1)
+def _thresholds(positions: np.ndarray) -> np.ndarray:
+    return np.sort(np.rint(positions).astype(np.int64), axis=1)

@@ -1,1 +1,1 @@
-"""Published separation methods, one a file, named by author and year."""
+"""Published separation methods, one per file, named by author and year."""

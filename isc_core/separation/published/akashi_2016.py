@@ -95,8 +95,8 @@ class Akashi2016Options:
     weigh_evidence: bool = True
 
 
-# Ten random starts end between 32.7 and 35.9 dB on one of the published images; this seed is one of
-# the better ones.
+# Ten random starts reach 32.7 to 35.9 dB on one of the published images; this seed is one of the
+# better ones.
 _SIHR = Akashi2016Options(
     start="random",
     seed=4,
@@ -111,7 +111,7 @@ _SIHR = Akashi2016Options(
 
 VARIANTS: dict[str, Akashi2016Options] = {
     "improved": Akashi2016Options(),
-    # Five starts on all pixels would take a quarter of an hour; a sample tells the colours as well.
+    # Five starts on all pixels would take a quarter of an hour; a sample yields the same colours.
     "paper": replace(_SIHR, starts=5, sample=8192, squared=True, own_scale=True),
     "sihr": _SIHR,
 }
@@ -174,17 +174,17 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "akashi_2016")
     image = np.where(mask[..., None], image, 0.0)
-    linear = mask & (largest(image) > 0)
-    if clipped is not None and (linear & ~clipped).any():
-        linear &= ~clipped
-    share = saturation_gate(image, linear) if options.weigh_evidence else 1.0
+    valid = mask & (largest(image) > 0)
+    if clipped is not None and (valid & ~clipped).any():
+        valid &= ~clipped
+    share = saturation_gate(image, valid) if options.weigh_evidence else 1.0
     if share == 0:
         return white_layers(image, mask, np.zeros(mask.shape), clipped)
     unit = (float(image.max()) if options.own_scale else 1.0) / 255
     pixels = np.ascontiguousarray(image[mask].T) / unit
-    telling = linear[mask]
-    best = best_fit(pixels, np.flatnonzero(telling), options, monitor)
-    codes = _all_codes(pixels, telling, best, options, monitor)
+    informative = valid[mask]
+    best = best_fit(pixels, np.flatnonzero(informative), options, monitor)
+    codes = _all_codes(pixels, informative, best, options, monitor)
     if options.rest_is_diffuse:
         white = np.zeros(mask.shape)
         white[mask] = np.minimum(codes[0] * best.colours[0, 0], pixels.min(axis=0)) * unit
@@ -209,7 +209,7 @@ def _check_options(options: Akashi2016Options) -> None:
 
 
 def best_fit(
-    pixels: np.ndarray, telling: np.ndarray, options: Akashi2016Options, monitor: Monitor
+    pixels: np.ndarray, informative: np.ndarray, options: Akashi2016Options, monitor: Monitor
 ) -> Fit:
     """Return the fit of least objective among all starts.
 
@@ -217,7 +217,7 @@ def best_fit(
     ----------
     pixels : (3, n) ndarray
         In units where white is 255.
-    telling : (m,) ndarray of int
+    informative : (m,) ndarray of int
         The pixels that fit the colours; a sample of them if there are more than `options.sample`.
     options : Akashi2016Options
     monitor : Monitor
@@ -230,10 +230,12 @@ def best_fit(
     for number in range(options.starts):
         random = np.random.default_rng([options.seed, number])
         stage = monitor.part(0.8 * number / options.starts, 0.8 * (number + 1) / options.starts)
-        chosen = telling
-        if 0 < options.sample < len(telling):
+        chosen = informative
+        if 0 < options.sample < len(informative):
             chosen = np.sort(
-                np.random.default_rng(options.seed).choice(telling, options.sample, replace=False)
+                np.random.default_rng(options.seed).choice(
+                    informative, options.sample, replace=False
+                )
             )
         fitted = np.ascontiguousarray(pixels[:, chosen])
         begin = random_start if options.start == "random" else _hue_start
@@ -269,7 +271,7 @@ def _hue_start(
     pixels: np.ndarray, count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """White and, for each peak of the hue histogram, the mean of its purest pixels; codes by
-    likeness. Shapes as in `random_start`.
+    similarity. Shapes as in `random_start`.
     """
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     chroma = high - low
@@ -325,12 +327,12 @@ def fit_colours(
     for iteration in range(options.iterations):
         cross, remaining, gram, total = _improve_codes(pixels, colours, codes, options.sparsity)
         colours = _improve_colours(colours, remaining, gram)
-        # ||I - W H||^2 from the sums alone; rounding may take it below 0.
-        left = max(
+        # ||I - W H||^2 from the sums alone; rounding can make it negative.
+        error = max(
             energy - 2 * float((colours * cross).sum()) + float(((colours @ gram) * colours).sum()),
             0.0,
         )
-        objective = (left if options.squared else np.sqrt(left)) / 2 + options.sparsity * total
+        objective = (error if options.squared else np.sqrt(error)) / 2 + options.sparsity * total
         if abs(last - objective) < options.tolerance * objective:
             break
         last = objective
@@ -345,10 +347,10 @@ def _improve_codes(
     """One update of `codes`, in place; the sums I H' (3, 1 + k), V H' (3, 1 + k), H H' (1 + k, 1 +
     k) and sum H.
 
-    Blocks of pixels stay in the processor's cache for all that is done to them.
+    Processing in blocks keeps the pixels in the CPU cache.
     """
     size = colours.shape[1]
-    own = colours.T @ colours
+    products = colours.T @ colours
     cross, remaining, gram, total = (
         np.zeros((3, size)),
         np.zeros((3, size)),
@@ -357,7 +359,7 @@ def _improve_codes(
     )
     for first in range(0, pixels.shape[1], _BLOCK):
         block, code = pixels[:, first : first + _BLOCK], codes[:, first : first + _BLOCK]
-        code *= (colours.T @ block) / (own @ code + sparsity + _TINY)
+        code *= (colours.T @ block) / (products @ code + sparsity + _TINY)
         without_white = np.maximum(block - colours[0, 0] * code[0], 0)
         cross += block @ code.T
         remaining += without_white @ code.T
@@ -369,28 +371,32 @@ def _improve_codes(
 def _improve_colours(colours: np.ndarray, remaining: np.ndarray, gram: np.ndarray) -> np.ndarray:
     """One update of the surface colours; white (column 0) stays.
 
-    The brackets keep each column's length at its least cost.
+    The bracketed terms keep the columns at unit length.
     """
-    surface, wanted = colours[:, 1:], remaining[:, 1:]
-    given = surface @ gram[1:, 1:]
-    up = wanted + surface * (surface * given).sum(axis=0)
-    down = given + surface * (surface * wanted).sum(axis=0)
+    surface, cross = colours[:, 1:], remaining[:, 1:]
+    current = surface @ gram[1:, 1:]
+    up = cross + surface * (surface * current).sum(axis=0)
+    down = current + surface * (surface * cross).sum(axis=0)
     return np.concatenate([colours[:, :1], _unit(surface * up / np.maximum(down, _TINY))], axis=1)
 
 
 def _all_codes(
-    pixels: np.ndarray, telling: np.ndarray, fit: Fit, options: Akashi2016Options, monitor: Monitor
+    pixels: np.ndarray,
+    informative: np.ndarray,
+    fit: Fit,
+    options: Akashi2016Options,
+    monitor: Monitor,
 ) -> np.ndarray:
-    """Codes (1 + k, n) of all pixels (3, n): the fit's own where it has them all, else by descent
-    with its colours.
+    """Codes (1 + k, n) of all pixels (3, n): those of the fit if it used all informative pixels,
+    else by descent with its colours.
     """
     codes = np.zeros((fit.colours.shape[1], pixels.shape[1]))
-    if fit.codes.shape[1] == telling.sum():
-        codes[:, telling] = fit.codes
-        if telling.all() or not pixels[:, ~telling].any():
+    if fit.codes.shape[1] == informative.sum():
+        codes[:, informative] = fit.codes
+        if informative.all() or not pixels[:, ~informative].any():
             return codes
     for first in range(0, pixels.shape[1], _BLOCK):
-        monitor.report("mixes of the pixels", 0.8 + 0.2 * first / pixels.shape[1])
+        monitor.report("codes of the pixels", 0.8 + 0.2 * first / pixels.shape[1])
         block = slice(first, first + _BLOCK)
         codes[:, block] = descend(
             fit.colours.T @ pixels[:, block],
@@ -402,7 +408,7 @@ def _all_codes(
 
 
 @jit
-def descend(like, own, sparsity, codes):
+def descend(like, products, sparsity, codes):
     """Minimise 1/2 h' own h - (like - sparsity)' h over h >= 0 for each pixel.
 
     Coordinate descent until no code changes by 0.02.
@@ -411,7 +417,7 @@ def descend(like, own, sparsity, codes):
     ----------
     like : (m, n) ndarray
         W'I, the inner products of colours and pixels.
-    own : (m, m) ndarray
+    products : (m, m) ndarray
         W'W.
     sparsity : float
     codes : (m, n) ndarray
@@ -430,8 +436,8 @@ def descend(like, own, sparsity, codes):
                 rest = like[k, pixel] - sparsity
                 for j in range(size):
                     if j != k:
-                        rest -= own[k, j] * codes[j, pixel]
-                code = max(rest / own[k, k], 0.0)
+                        rest -= products[k, j] * codes[j, pixel]
+                code = max(rest / products[k, k], 0.0)
                 change = max(change, abs(code - codes[k, pixel]))
                 codes[k, pixel] = code
             if change < 0.02:

@@ -112,8 +112,8 @@ VARIANTS: dict[str, Kim2013Options] = {
 # Even the brightest highlight has a small weight in the diffuse colour, for a reflectance that is
 # seen nowhere else.
 _LEAST_WEIGHT = 1e-4
-# Between 1 (plain Gauss-Seidel) and 2; the first term makes the system well conditioned, so that
-# little is best.
+# Between 1 (plain Gauss-Seidel) and 2; the first term makes the system well conditioned, so a small
+# value is best.
 _OVER_RELAXATION = 1.2
 _SMALLEST = 1e-12
 
@@ -188,10 +188,10 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "kim_2013")
 
-    def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
-        scale = float(seen[mask].max())
+    def find(inside: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
+        scale = float(inside[mask].max())
         return scale * _specular_of(
-            build_scene(seen / scale, linear, base / scale, options), options, monitor
+            build_scene(inside / scale, linear, base / scale, options), options, monitor
         )
 
     return bright_layers(
@@ -240,8 +240,8 @@ def build_scene(image: np.ndarray, mask: np.ndarray, base: float, options: Kim20
 
 
 def _cells(image: np.ndarray, mask: np.ndarray, options: Kim2013Options) -> np.ndarray:
-    """Where the mask's pixels lie in the bilateral grid, (4, n): row, column and two coordinates of
-    hue, in cells, from 2 on.
+    """Positions of the mask's pixels in the bilateral grid, (4, n): row, column and two
+    coordinates of hue, in cells, starting at 2.
     """
     rows, columns = np.nonzero(mask)
     rows, columns = rows - rows.min(), columns - columns.min()
@@ -276,12 +276,12 @@ def _specular_of(scene: Scene, options: Kim2013Options, monitor: Monitor) -> np.
     return specular
 
 
-def _albedos(scene: Scene, specular: np.ndarray, trust: float) -> np.ndarray:
-    """Unit vectors (n, 3) of the diffuse colour of the mask's pixels: means of what is diffuse now,
-    over like hues around.
+def _albedos(scene: Scene, specular: np.ndarray, tau: float) -> np.ndarray:
+    """Unit vectors (n, 3) of the diffuse colour of the mask's pixels: means of the current
+    diffuse estimate over nearby pixels of similar hue.
     """
     s = specular[scene.mask]
-    weight = np.maximum(np.exp(-s / max(trust * scene.base, _SMALLEST)), _LEAST_WEIGHT)
+    weight = np.maximum(np.exp(-s / max(tau * scene.base, _SMALLEST)), _LEAST_WEIGHT)
     nearest = np.ravel_multi_index(tuple(np.rint(scene.cells).astype(np.intp)), scene.grid)
     colours = np.empty((len(s), 3))
     for channel in range(3):
@@ -311,8 +311,8 @@ def colour_term(scene: Scene, albedos: np.ndarray) -> tuple[np.ndarray, np.ndarr
     whiteness = albedos.sum(axis=1)
     pull, target = np.zeros_like(scene.low), np.zeros_like(scene.low)
     pull[scene.mask] = np.maximum(3 - whiteness**2, 0)
-    beside = colours.sum(axis=1) - whiteness * np.einsum("ij,ij->i", albedos, colours)
-    target[scene.mask] = beside / np.maximum(pull[scene.mask], _SMALLEST)
+    across = colours.sum(axis=1) - whiteness * np.einsum("ij,ij->i", albedos, colours)
+    target[scene.mask] = across / np.maximum(pull[scene.mask], _SMALLEST)
     return pull, np.clip(target, 0, scene.low)
 
 
@@ -347,7 +347,7 @@ def smooth_layer(
 
 
 def _weights(steps: np.ndarray, both: np.ndarray, options: Kim2013Options) -> np.ndarray:
-    """alpha times psi'(d) / 2 d of the steps d, zero between pixels that are not `both` in the
+    """alpha times psi'(d) / 2 d of the steps d, zero unless `both` pixels are in the
     mask.
     """
     return np.where(both, options.smoothness / np.hypot(steps / options.gradient, 1), 0)

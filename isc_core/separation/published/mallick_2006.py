@@ -105,10 +105,10 @@ VARIANTS: dict[str, Mallick2006Options] = {
 }
 
 _LEVELS = 255.0
-# Stands for phi outside the mask: a neighbour so high never erodes a pixel.
+# Value of phi outside the mask: a neighbour this high never erodes a pixel.
 _FAR = np.float32(1e9)
-# A pixel that moves slower than this does not move.
-_SLOWEST = 1e-3
+# Speeds below this count as zero.
+_MIN_SPEED = 1e-3
 
 
 def separate(
@@ -150,9 +150,9 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "mallick_2006")
 
-    def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
-        box, specular = mask_slices(mask), np.zeros(mask.shape, seen.dtype)
-        specular[box] = _specular_of(seen[box], linear[box], options, monitor)
+    def find(inside: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
+        box, specular = mask_slices(mask), np.zeros(mask.shape, inside.dtype)
+        specular[box] = _specular_of(inside[box], linear[box], options, monitor)
         return specular
 
     return bright_layers(
@@ -176,35 +176,35 @@ def _check_options(options: Mallick2006Options) -> None:
 def _specular_of(
     image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor
 ) -> np.ndarray:
-    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`, with no more pixels a side than
-    the options allow.
+    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`, computed with at most
+    `options.longest` pixels a side.
     """
     if options.longest is None or max(mask.shape) <= options.longest:
-        return _hills(image, mask, options, monitor)
+        return _eroded_light(image, mask, options, monitor)
     averages, share = pull(image.astype(np.float32), mask.astype(np.float32))
     coarse = _specular_of(averages, share > 0, options, monitor)
     nothing = np.zeros((*mask.shape, 1), np.float32), np.zeros_like(mask)
     return np.where(mask, push(*nothing, coarse[..., None])[..., 0], 0)
 
 
-def _hills(
+def _eroded_light(
     image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor
 ) -> np.ndarray:
-    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`: what erosion takes off."""
-    framed = np.pad(mask, 1)
+    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`: the light that erosion removes."""
+    padded = np.pad(mask, 1)
     scale = _LEVELS / image[mask].max()
     red, green, blue = (np.pad(image[..., c] * scale, 1).astype(np.float32) for c in range(3))
     s = (red + green + blue) / np.float32(math.sqrt(3))
     u = (2 * red - green - blue) / np.float32(math.sqrt(6))
     v = (green - blue) / np.float32(math.sqrt(2))
     rho = np.hypot(u, v)
-    phi = np.where(framed, np.arctan2(s, rho), _FAR)
-    hue_u, hue_v = (_smoothed(channel, framed, options.smoothing) for channel in (u, v))
-    speed, across, down = _flow(rho, hue_u, hue_v, framed, options)
-    eroded = _evolved(phi, speed, across, down, options.steps, options.step, monitor.part(0, 0.7))
+    phi = np.where(padded, np.arctan2(s, rho), _FAR)
+    hue_u, hue_v = (_smoothed(channel, padded, options.smoothing) for channel in (u, v))
+    speed, across, down = _flow(rho, hue_u, hue_v, padded, options)
+    eroded = _evolve(phi, speed, across, down, options.steps, options.step, monitor.part(0, 0.7))
     if options.restoring_steps:
-        upside_down = np.where(framed, -eroded, _FAR)
-        restored = -_evolved(
+        upside_down = np.where(padded, -eroded, _FAR)
+        restored = -_evolve(
             upside_down,
             speed,
             across,
@@ -214,9 +214,9 @@ def _hills(
             monitor.part(0.7, 1),
         )
         eroded = np.minimum(restored, phi)
-    lower = framed & (eroded < phi)
+    lower = padded & (eroded < phi)
     diffuse = np.where(lower, rho * np.tan(np.where(lower, eroded, 0)), s)
-    return np.where(framed, np.maximum(s - diffuse, 0) / (math.sqrt(3) * scale), 0)[1:-1, 1:-1]
+    return np.where(padded, np.maximum(s - diffuse, 0) / (math.sqrt(3) * scale), 0)[1:-1, 1:-1]
 
 
 def _smoothed(values: np.ndarray, mask: np.ndarray, deviation: float) -> np.ndarray:
@@ -231,11 +231,10 @@ def _smoothed(values: np.ndarray, mask: np.ndarray, deviation: float) -> np.ndar
 def _flow(
     rho: np.ndarray, u: np.ndarray, v: np.ndarray, mask: np.ndarray, options: Mallick2006Options
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Speed g and the unit direction (x, y) of constant hue, zero where the hue is even; each (H,
-    W) float32.
+    """Speed g and the unit direction (x, y) of constant hue, zero where the hue is constant;
+    each (H, W) float32.
 
-    `rho` is every pixel's own, so that grey ones stay; `u`, `v` are the smoothed ones that are
-    differentiated.
+    `rho` is not smoothed, so that grey pixels stay; `u` and `v`, which are differentiated, are.
     """
     speed, across, down = np.zeros_like(u), np.zeros_like(u), np.zeros_like(u)
     _measure_flow(
@@ -245,7 +244,7 @@ def _flow(
 
 
 @jit
-def _measure_flow(own_rho, u, v, mask, edge, chroma, texture, speed, across, down):
+def _measure_flow(pixel_rho, u, v, mask, edge, chroma, texture, speed, across, down):
     for y in range(1, u.shape[0] - 1):
         for x in range(1, u.shape[1] - 1):
             rho = math.hypot(u[y, x], v[y, x])
@@ -257,7 +256,7 @@ def _measure_flow(own_rho, u, v, mask, edge, chroma, texture, speed, across, dow
             ux, vx = (u[y, right] - u[y, left]) / 2, (v[y, right] - v[y, left]) / 2
             uy, vy = (u[below, x] - u[above, x]) / 2, (v[below, x] - v[above, x]) / 2
             slope = math.hypot(u[y, x] * ux + v[y, x] * vx, u[y, x] * uy + v[y, x] * vy) / rho
-            speed[y, x] = math.tanh(own_rho[y, x] / (2 * chroma)) / (
+            speed[y, x] = math.tanh(pixel_rho[y, x] / (2 * chroma)) / (
                 1 + math.exp(min(slope - edge, 50.0))
             )
             turn_x, turn_y = (
@@ -269,7 +268,7 @@ def _measure_flow(own_rho, u, v, mask, edge, chroma, texture, speed, across, dow
                 across[y, x], down[y, x] = -turn_y / turn, turn_x / turn
 
 
-def _evolved(
+def _evolve(
     phi: np.ndarray,
     speed: np.ndarray,
     across: np.ndarray,
@@ -278,7 +277,7 @@ def _evolved(
     step: float,
     monitor: Monitor,
 ) -> np.ndarray:
-    """`phi` (H, W) after erosion. Its frame, and whatever does not move, keep their values."""
+    """`phi` (H, W) after erosion; its frame and pixels without speed keep their values."""
     here, there = phi.astype(np.float32), phi.astype(np.float32)
     for done in range(steps):
         monitor.report("eroding highlights", done / steps)
@@ -291,7 +290,7 @@ def _evolved(
 def _erode(phi, speed, across, down, step, result):
     for y in range(1, phi.shape[0] - 1):
         for x in range(1, phi.shape[1] - 1):
-            if speed[y, x] < _SLOWEST:
+            if speed[y, x] < _MIN_SPEED:
                 continue
             here = phi[y, x]
             if across[y, x] == 0 and down[y, x] == 0:

@@ -119,12 +119,12 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "shen_2009")
     domain = np.ones_like(mask) if options.whole_frame else mask
-    seen = np.where(domain[..., None] & np.isfinite(image), image, 0)
+    inside = np.where(domain[..., None] & np.isfinite(image), image, 0)
     usable = domain if clipped is None else domain & ~clipped
     return white_layers(
         np.where(mask[..., None], image, 0),
         mask,
-        _specular_of(seen, domain, usable, options),
+        _specular_of(inside, domain, usable, options),
         clipped,
     )
 
@@ -164,10 +164,12 @@ def _specular_of(
         return _gains(inside, ring)[1] * excess
     inside, ring = _means(image, low, regions, count, usable, options.ring_width)
     levels = ring[:, :3].min(axis=1)
-    inside[:, 3] -= levels  # the excess over the region's own level, of which its ring has none
+    inside[:, 3] -= levels  # the excess over the region's own level,which is 0 in its ring
     ring[:, 3] = 0
-    owner = _owners(regions, above)
-    return np.where(owner > 0, _gains(inside, ring)[owner] * np.maximum(low - levels[owner], 0), 0)
+    nearest = _nearest_regions(regions, above)
+    return np.where(
+        nearest > 0, _gains(inside, ring)[nearest] * np.maximum(low - levels[nearest], 0), 0
+    )
 
 
 def _threshold(low: np.ndarray, deviations: float) -> float:
@@ -187,7 +189,7 @@ def _means(
     where there is no usable pixel.
 
     Where rings of neighbouring regions meet, the pixel belongs to the one with the higher number;
-    it is never inside of any region.
+    it is never inside a region.
     """
     around = np.where(regions > 0, 0, ndimage.maximum_filter(regions, width, mode="nearest"))
     values = np.concatenate([image, excess[..., None]], axis=2)
@@ -207,18 +209,18 @@ def _gains(inside: np.ndarray, ring: np.ndarray) -> np.ndarray:
     or its ring is unknown.
     """
     step = inside - ring
-    known = step[:, 3] > 0
-    rise = np.where(known, step[:, :3].min(axis=1), 0)
-    return np.where(known, np.maximum(rise, 0) / np.where(known, step[:, 3], 1), 0)
+    valid = step[:, 3] > 0
+    rise = np.where(valid, step[:, :3].min(axis=1), 0)
+    return np.where(valid, np.maximum(rise, 0) / np.where(valid, step[:, 3], 1), 0)
 
 
-def _owners(regions: np.ndarray, above: np.ndarray) -> np.ndarray:
-    """For each pixel (H, W) `above` the threshold the number of the nearest region that it hangs
-    together with, else 0.
+def _nearest_regions(regions: np.ndarray, above: np.ndarray) -> np.ndarray:
+    """The number of the nearest connected region for each pixel (H, W) `above` the threshold,
+    else 0.
     """
     nearest = ndimage.distance_transform_edt(
         regions == 0, return_distances=False, return_indices=True
     )
     islands, _ = ndimage.label(above, _EIGHT)
-    together = above & (islands == islands[tuple(nearest)])
-    return np.where(together, regions[tuple(nearest)], 0)
+    connected = above & (islands == islands[tuple(nearest)])
+    return np.where(connected, regions[tuple(nearest)], 0)

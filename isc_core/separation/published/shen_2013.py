@@ -30,7 +30,7 @@ from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
 from ..support.clipped import explain_clipped
-from ..support.layers import DOUBT
+from ..support.layers import HIDDEN_SHARE
 
 
 @dataclass(frozen=True)
@@ -77,9 +77,9 @@ VARIANTS: dict[str, Shen2013Options] = {
 
 @dataclass(frozen=True)
 class _Pixels:
-    """The pixels of the mask, or of the frame, in a row: `colours` (n, 3); `high`, `low` (n,)
-    largest and smallest channel; `base` is u, the mean of `low`; `usable` (n,) which of them are
-    linear, i.e. not clipped, and may enter statistics.
+    """The pixels of the mask, or of the frame, as a list: `colours` (n, 3); `high`, `low` (n,)
+    largest and smallest channel; `base` is u, the mean of `low`; `usable` (n,)which pixels are
+    not clipped and may enter statistics.
     """
 
     colours: np.ndarray
@@ -154,8 +154,8 @@ def _check_options(options: Shen2013Options) -> None:
 
 
 def _gather(image: np.ndarray, domain: np.ndarray, clipped: np.ndarray | None) -> _Pixels:
-    # Column by column: which pixel founds a cluster depends on the order, and the published figures
-    # come from this one.
+    # Column by column: the clusters depend on the order of the pixels, and the published figures
+    # use this one.
     colours = np.asarray(image, np.float32).transpose(1, 0, 2)[domain.T]
     colours = np.where(np.isfinite(colours), colours, 0)
     usable = np.ones(len(colours), bool) if clipped is None else ~clipped.T[domain.T]
@@ -164,29 +164,29 @@ def _gather(image: np.ndarray, domain: np.ndarray, clipped: np.ndarray | None) -
 
 
 def _specular_of(pixels: _Pixels, options: Shen2013Options) -> tuple[np.ndarray, np.ndarray]:
-    """Specular (n,) in [0, low], and the error (n,) to be expected of it."""
+    """Specular (n,) in [0, low], and its expected error (n,)."""
     specular = np.zeros_like(pixels.low)
-    doubt = DOUBT * pixels.low
+    error = HIDDEN_SHARE * pixels.low
     bright = np.flatnonzero(pixels.low > pixels.base)
     if not len(bright) or saturation(pixels.colours[bright]) < options.bright_saturation:
-        doubt[bright] = pixels.low[bright]
-        return specular, doubt
+        error[bright] = pixels.low[bright]
+        return specular, error
     labels = _cluster(_features(pixels, bright), options)
     for label in range(labels.max() + 1):
         members = bright[labels == label]
         members = members[pixels.usable[members]]
-        telling = members[pixels.chroma[members] > pixels.base]
-        if not len(telling):
-            doubt[members] = pixels.low[members]
+        coloured = members[pixels.chroma[members] > pixels.base]
+        if not len(coloured):
+            error[members] = pixels.low[members]
             continue
         diffuse_ratio = np.quantile(
-            pixels.high[telling] / pixels.chroma[telling], options.ratio_quantile
+            pixels.high[coloured] / pixels.chroma[coloured], options.ratio_quantile
         )
         removed = pixels.high[members] - diffuse_ratio * pixels.chroma[members]
         specular[members] = np.clip(removed, 0, pixels.low[members]) * fade_in(
             pixels.low[members], float(pixels.base), options.fade
         )
-    return specular, specular + doubt
+    return specular, specular + error
 
 
 def _features(pixels: _Pixels, which: np.ndarray) -> np.ndarray:
@@ -199,19 +199,21 @@ def _features(pixels: _Pixels, which: np.ndarray) -> np.ndarray:
 
 
 def _cluster(features: np.ndarray, options: Shen2013Options) -> np.ndarray:
-    """Labels (n,) from 0: leaders in scan order gather all within `radius`, then every pixel goes
-    to the nearest mean, once.
+    """Labels (n,) from 0: leaders in scan order collect all pixels within the radius, then each
+    pixel is assigned once to the nearest mean.
 
-    Leaders lie further apart than the radius in a bounded plane, so there are only a few, and the
-    loop is short.
+    Leaders are further apart than the radius in a bounded plane, so the loop is short.
     """
     labels = np.full(len(features), -1)
-    open_ = np.arange(len(features))
+    remaining = np.arange(len(features))
     count = 0
-    while len(open_):
-        near = np.abs(features[open_] - features[open_[0]]).sum(axis=1) <= options.cluster_radius
-        labels[open_[near]] = count
-        open_ = open_[~near]
+    while len(remaining):
+        near = (
+            np.abs(features[remaining] - features[remaining[0]]).sum(axis=1)
+            <= options.cluster_radius
+        )
+        labels[remaining[near]] = count
+        remaining = remaining[~near]
         count += 1
     means = np.stack([features[labels == k].mean(axis=0) for k in range(count)])
     distance = np.stack([np.abs(features - mean).sum(axis=1) for mean in means])
@@ -229,7 +231,7 @@ def _spread(
     error: np.ndarray,
     base: np.float32,
 ) -> Separation:
-    """Puts results of the domain's pixels, in column order, back into the frame, zero outside the
+    """Write results of the domain's pixels, in column order, into the frame; zero outside the
     mask.
     """
     white = np.zeros(mask.shape, np.float32)

@@ -113,19 +113,19 @@ VARIANTS: dict[str, Tan2005Options] = {
 }
 
 _BRIGHT_QUANTILE = 0.999
-# The one diffuse chromaticity that makes the specular-free image; any will do.
+# Diffuse chromaticity of the specular-free image; any value will do.
 _FREE = 0.6
-# Labels of a pixel: done for now, not to be touched, specular towards the next pixel of its row or
-# column, on a border, too even.
-_DIFFUSE, _DARK, _ROW, _COLUMN, _BORDER, _EVEN = 0, 1, 2, 3, 4, 5
+# Labels of a pixel: diffuse, excluded, specular relative to the next pixel of its row or column, on
+# an edge, in a uniform area.
+_DIFFUSE, _DARK, _ROW, _COLUMN, _EDGE, _UNIFORM = 0, 1, 2, 3, 4, 5
 
 
 @dataclass(frozen=True)
 class _Pixels:
-    """What the sweeps work on; all (H, W) but `colours` (H, W, 3). `colours` changes, and so do
-    `total`, their sum, `peak`, c, and where not `by_colour` the shares `red` and `green`, once a
-    sweep, where `stale`. `free`: e. `limit`: the largest L. `neighbour`: which pixels may be the
-    second of a pair. `label`: as above.
+    """State of the sweeps; all (H, W) but `colours` (H, W, 3). Each sweep changes `colours`, then,
+    where `stale`, `total`, their sum, `peak`, c, and unless `by_colour` the shares `red` and
+    `green`. `free`: e. `limit`: the largest L. `neighbour`: which pixels may be the second of a
+    pair. `label`: as above.
     """
 
     colours: np.ndarray
@@ -179,15 +179,15 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "tan_2005")
     domain = np.ones_like(mask) if options.whole_frame else mask
-    seen = np.where(domain[..., None], np.nan_to_num(image), 0).astype(float)
-    used = domain & _bright(seen, domain, options)
+    inside = np.where(domain[..., None], np.nan_to_num(image), 0).astype(float)
+    used = domain & _bright(inside, domain, options)
     if clipped is not None:
         used &= ~clipped
-    share = saturation_gate(seen, used) if options.weigh_evidence else 1.0
+    share = saturation_gate(inside, used) if options.weigh_evidence else 1.0
     specular = np.zeros(mask.shape)
     if share > 0:
-        specular = share * _specular_of(seen, used, options, monitor)
-    return white_layers(np.where(mask[..., None], seen, 0), mask, specular, clipped)
+        specular = share * _specular_of(inside, used, options, monitor)
+    return white_layers(np.where(mask[..., None], inside, 0), mask, specular, clipped)
 
 
 def _check_options(options: Tan2005Options) -> None:
@@ -226,13 +226,13 @@ def _specular_of(
     """Specular (H, W) of `image` (H, W, 3); zero where it is not `used` (H, W) bool."""
     shape = used.shape
     if not options.whole_frame:
-        # The sweeps stop short of the last row and column: let those be none of the object's.
+        # The sweeps skip the last row and column: pad, so that these are not the object's.
         image, used = np.pad(image, [(0, 1), (0, 1), (0, 0)]), np.pad(used, [(0, 1), (0, 1)])
     pixels = _prepared(image, used, options)
     before = pixels.total.copy()
     count = math.floor(options.start / options.step + 1e-9) + 1
     for done in range(count):
-        monitor.report("comparing derivatives with the specular-free image's", done / count)
+        monitor.report("comparing derivatives with the specular-free image", done / count)
         _sweep_until_settled(pixels, math.exp(max(options.start - done * options.step, 0)), options)
         pixels.label[used] = _DIFFUSE
     return ((before - pixels.total) / 3)[: shape[0], : shape[1]]
@@ -267,7 +267,7 @@ def _prepared(image: np.ndarray, used: np.ndarray, options: Tan2005Options) -> _
 
 
 def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options) -> None:
-    """Sweeps until the number of specular pairs no longer falls, for epsilon = log `factor`."""
+    """Sweep until the number of specular pairs no longer falls, for epsilon = log `factor`."""
     compare = (
         pixels.total,
         pixels.free,
@@ -276,8 +276,8 @@ def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options
         factor,
         options.log_of_difference,
     )
-    left = _mark(*compare)
-    while left:
+    pairs = _mark(*compare)
+    while pairs:
         _move(
             *(
                 pixels.colours,
@@ -299,23 +299,23 @@ def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options
             pixels.stale,
             not options.by_colour,
         )
-        before, left = left, _mark(*compare)
-        if left >= before:
+        before, pairs = pairs, _mark(*compare)
+        if pairs >= before:
             break
 
 
 @jit
 def _mark(total, free, neighbour, label, factor, log_of_difference):
-    """Labels every open pixel as specular towards one of its next neighbours, or diffuse; the
-    number of specular ones.
+    """Label every open pixel as specular relative to its right or lower neighbour, or diffuse;
+    return the number of specular ones.
 
     |log a - log b| > epsilon is a > b exp(epsilon) or b > a exp(epsilon): no logarithm, and nothing
     undefined where both are zero.
     """
-    found = 0
+    count = 0
     for y in range(total.shape[0] - 1):
         for x in range(total.shape[1] - 1):
-            if label[y, x] == _DARK or label[y, x] == _BORDER or label[y, x] == _EVEN:
+            if label[y, x] == _DARK or label[y, x] == _EDGE or label[y, x] == _UNIFORM:
                 continue
             label[y, x] = _DIFFUSE
             here, free_here = total[y, x], free[y, x]
@@ -326,7 +326,7 @@ def _mark(total, free, neighbour, label, factor, log_of_difference):
                     a, b = total[y, x + 1] * free_here, free[y, x + 1] * here
                 if a > factor * b or b > factor * a:
                     label[y, x] = _ROW
-                    found += 1
+                    count += 1
                     continue
             if neighbour[y + 1, x]:
                 if log_of_difference:
@@ -335,14 +335,14 @@ def _mark(total, free, neighbour, label, factor, log_of_difference):
                     a, b = total[y + 1, x] * free_here, free[y + 1, x] * here
                 if a > factor * b or b > factor * a:
                     label[y, x] = _COLUMN
-                    found += 1
-    return found
+                    count += 1
+    return count
 
 
 @jit
 def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by_colour):
-    """Gives, pair by pair, the pixel with the smaller c the other one's as its diffuse
-    chromaticity, as far as its limit.
+    """Set, pair by pair, the diffuse chromaticity of the pixel with the smaller c to the other's,
+    up to its limit.
     """
     for y in range(label.shape[0] - 1):
         for x in range(label.shape[1] - 1):
@@ -352,14 +352,14 @@ def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by
             redder = abs(red[other_y, other_x] - red[y, x]) > colour_step
             greener = abs(green[other_y, other_x] - green[y, x]) > colour_step
             if (redder or greener) if by_colour else (redder and greener):
-                label[y, x] = _BORDER
+                label[y, x] = _EDGE
                 continue
             v, u, target = y, x, peak[other_y, other_x]
             if peak[y, x] >= target:
                 v, u, target = other_y, other_x, peak[y, x]
             target = min(target, limit[v, u])
             if target - peak[v, u] < noise:
-                label[y, x] = _EVEN
+                label[y, x] = _UNIFORM
                 continue
             r, g, b = colours[v, u, 0], colours[v, u, 1], colours[v, u, 2]
             white = (max(r, g, b) - target * (r + g + b)) / (1 - 3 * target)
@@ -373,9 +373,8 @@ def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by
 
 @jit
 def _refresh(colours, total, peak, red, green, stale, shares):
-    """Brings totals and chromaticities up to the changed colours;
-
-    `red` and `green` only where `shares`.
+    """Recompute totals and chromaticities of the changed colours; `red` and `green` only if
+    `shares`.
     """
     for y in range(total.shape[0]):
         for x in range(total.shape[1]):

@@ -83,8 +83,7 @@ VARIANTS: dict[str, Yang2010Options] = {
 }
 
 _BRIGHT_QUANTILE = 0.999
-# A diffuse chromaticity this near to grey, 1/3, leaves the specular part undefined: then it is
-# zero.
+# At a diffuse chromaticity this near to grey, 1/3, the specular part is undefined; it is set to 0.
 _GREY = 1 / 3 + 1e-6
 # Cells around the grid: one for the blur, one for the interpolation.
 _MARGIN = 2
@@ -145,16 +144,16 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "yang_2010")
     domain = np.ones_like(mask) if options.whole_frame else mask
-    seen = np.where(domain[..., None], np.nan_to_num(image), 0)
-    used = domain & ~_too_dark(largest(seen), domain, options)
+    inside = np.where(domain[..., None], np.nan_to_num(image), 0)
+    used = domain & ~_too_dark(largest(inside), domain, options)
     if clipped is not None:
         used &= ~clipped
     specular = np.zeros(mask.shape)
     if used.any():
-        specular[used] = _specular_of(seen, domain, used, options, monitor)
+        specular[used] = _specular_of(inside, domain, used, options, monitor)
     if options.weigh_evidence:
-        specular *= saturation_gate(seen, used)
-    return white_layers(np.where(mask[..., None], seen, 0), mask, specular, clipped)
+        specular *= saturation_gate(inside, used)
+    return white_layers(np.where(mask[..., None], inside, 0), mask, specular, clipped)
 
 
 def _check_options(options: Yang2010Options) -> None:
@@ -202,8 +201,8 @@ def _specular_of(
         if above <= options.tolerance:
             break
         np.maximum(diffuse, smooth, out=diffuse)
-    known = diffuse > _GREY
-    return np.where(known, (high - diffuse * total) / np.where(known, 1 - 3 * diffuse, 1), 0)
+    valid = diffuse > _GREY
+    return np.where(valid, (high - diffuse * total) / np.where(valid, 1 - 3 * diffuse, 1), 0)
 
 
 def make_grid(
@@ -263,7 +262,7 @@ def filter_in_grid(values: np.ndarray, grid: BilateralGrid) -> np.ndarray:
 
 @jit
 def _scatter(values, at, sums, counts):
-    """Adds every value to the cell that is nearest to it, and one to the cell's count."""
+    """Add every value to its nearest cell, and one to the cell's count."""
     for i in range(len(values)):
         r, c, g = int(at[i, 0] + 0.5), int(at[i, 1] + 0.5), int(at[i, 2] + 0.5)
         sums[r, c, g] += values[i]
@@ -272,7 +271,7 @@ def _scatter(values, at, sums, counts):
 
 @jit
 def _interpolate(cells, at, out):
-    """Trilinear interpolation of `cells` at every place of `at` (n, 3)."""
+    """Trilinear interpolation of `cells` at the positions `at` (n, 3)."""
     for i in range(len(out)):
         r, c, g = int(at[i, 0]), int(at[i, 1]), int(at[i, 2])
         y, x, z = at[i, 0] - r, at[i, 1] - c, at[i, 2] - g

@@ -113,14 +113,14 @@ VARIANTS: dict[str, Yoon2006Options] = {
 }
 
 _BRIGHT_QUANTILE = 0.999
-# Where the two-band image is less than this share of the total there is no colour to compare.
+# Two-band images below this share of the total have no colour to compare.
 _GREY = 1e-6
 
 
 @dataclass(frozen=True)
 class _TwoBand:
-    """Per pixel (H, W): `ratio` t = sum I / f, 0 where it is not `known`; `band` f; `red`, `green`,
-    the shares of F; `known`, whether the pixel has a colour and may be compared; `first`, whether
+    """Per pixel (H, W): `ratio` t = sum I / f, 0 where it is not `valid`; `band` f; `red`, `green`,
+    the shares of F; `valid`, whether the pixel has a colour; `first`, whether
     it may be the first of a pair.
     """
 
@@ -128,7 +128,7 @@ class _TwoBand:
     band: np.ndarray
     red: np.ndarray
     green: np.ndarray
-    known: np.ndarray
+    valid: np.ndarray
     first: np.ndarray
 
 
@@ -172,17 +172,17 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "yoon_2006")
     domain = np.ones_like(mask) if options.whole_frame else mask
-    seen = np.where(domain[..., None], np.nan_to_num(image), 0).astype(float)
-    pixels = _two_band(seen, domain, domain if clipped is None else domain & ~clipped, options)
+    inside = np.where(domain[..., None], np.nan_to_num(image), 0).astype(float)
+    pixels = _two_band(inside, domain, domain if clipped is None else domain & ~clipped, options)
     monitor.report("comparing neighbours", 0.0)
     ratio = (
         _by_regions(pixels, options) if options.regions else _by_sweeps(pixels, options, monitor)
     )
-    total = seen[..., 0] + seen[..., 1] + seen[..., 2]
-    specular = np.where(pixels.known, (total - ratio * (total - 3 * smallest(seen))) / 3, 0)
+    total = inside[..., 0] + inside[..., 1] + inside[..., 2]
+    specular = np.where(pixels.valid, (total - ratio * (total - 3 * smallest(inside))) / 3, 0)
     if options.weigh_evidence:
-        specular *= saturation_gate(seen, pixels.known)
-    return white_layers(np.where(mask[..., None], seen, 0), mask, specular, clipped)
+        specular *= saturation_gate(inside, pixels.valid)
+    return white_layers(np.where(mask[..., None], inside, 0), mask, specular, clipped)
 
 
 def _check_options(options: Yoon2006Options) -> None:
@@ -204,38 +204,38 @@ def _two_band(
     low, high = smallest(image), largest(image)
     total = image[..., 0] + image[..., 1] + image[..., 2]
     band = total - 3 * low
-    known = usable & (band > _GREY * total)
+    valid = usable & (band > _GREY * total)
     if options.relative_dark:
-        known &= high >= options.dark * np.quantile(high[domain], _BRIGHT_QUANTILE)
-        first = known
+        valid &= high >= options.dark * np.quantile(high[domain], _BRIGHT_QUANTILE)
+        first = valid
     else:
-        first = known & (low >= options.dark)
-    ratio = np.where(known, total / np.where(known, band, 1), 0)
-    red, green = two_band_shares(image, known, options.window)
-    return _TwoBand(ratio, band, red, green, known, first)
+        first = valid & (low >= options.dark)
+    ratio = np.where(valid, total / np.where(valid, band, 1), 0)
+    red, green = two_band_shares(image, valid, options.window)
+    return _TwoBand(ratio, band, red, green, valid, first)
 
 
 def _by_regions(pixels: _TwoBand, options: Yoon2006Options) -> np.ndarray:
     """t (H, W), for every known pixel the quantile over the pixels of its region and cell of
     colour.
     """
-    parent = np.arange(pixels.known.size)
+    parent = np.arange(pixels.valid.size)
     for first, second in (_pairs(pixels, options.colour_step, axis) for axis in (1, 0)):
         _unite(first, second, parent)
     _flatten(parent)
-    known = pixels.known
-    cell = colour_cells(pixels.red[known], pixels.green[known], options.cells)
-    group = parent[known.ravel()] * options.cells**2 + cell
-    ratio = np.zeros(known.shape)
-    ratio[known] = group_quantile(group, pixels.ratio[known], options.quantile)
+    valid = pixels.valid
+    cell = colour_cells(pixels.red[valid], pixels.green[valid], options.cells)
+    group = parent[valid.ravel()] * options.cells**2 + cell
+    ratio = np.zeros(valid.shape)
+    ratio[valid] = group_quantile(group, pixels.ratio[valid], options.quantile)
     return ratio
 
 
 def _by_sweeps(pixels: _TwoBand, options: Yoon2006Options, monitor: Monitor) -> np.ndarray:
-    """t (H, W) after sweeps along the pairs until nothing is left to move."""
+    """t (H, W) after sweeps along the pairs until no pixel changes."""
     if options.toolbox_order:
-        turned = (np.ascontiguousarray(array.T) for array in vars(pixels).values())
-        pixels = _TwoBand(*turned)
+        transposed = (np.ascontiguousarray(array.T) for array in vars(pixels).values())
+        pixels = _TwoBand(*transposed)
         pair_lists = [_column_pairs(pixels, options.colour_step)]
     else:
         pair_lists = [_pairs(pixels, options.colour_step, axis) for axis in (1, 0)]
@@ -246,38 +246,38 @@ def _by_sweeps(pixels: _TwoBand, options: Yoon2006Options, monitor: Monitor) -> 
             _sweep(first, second, ratio, band, options.tolerance) for first, second in pair_lists
         ):
             break
-    ratio = ratio.reshape(pixels.known.shape)
+    ratio = ratio.reshape(pixels.valid.shape)
     return ratio.T if options.toolbox_order else ratio
 
 
 def _pairs(pixels: _TwoBand, colour_step: float, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Flat indices of all pixels that are of one colour with the next one along the axis, and of
-    those next ones.
+    """Flat indices of the pixels whose colour matches the next one's along the axis, and of
+    those neighbours.
     """
     here, there = (np.s_[:-1], np.s_[1:]) if axis == 0 else (np.s_[:, :-1], np.s_[:, 1:])
-    like = pixels.first[here] & pixels.known[there]
+    like = pixels.first[here] & pixels.valid[there]
     for share in (pixels.red, pixels.green):
         like &= np.abs(share[here] - share[there]) <= colour_step
     rows, columns = np.nonzero(like)
-    width = pixels.known.shape[1]
+    width = pixels.valid.shape[1]
     first = rows * width + columns
     return first, first + (width if axis == 0 else 1)
 
 
 def _column_pairs(pixels: _TwoBand, colour_step: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same of turned arrays, as one line of columns, in which every pair is broken that would
-    end a row of the photo.
+    """The pairs of transposed arrays as one line of columns, without pairs across the end of a
+    column.
     """
     line = _TwoBand(*(array.reshape(1, -1) for array in vars(pixels).values()))
     first, second = _pairs(line, colour_step, axis=1)
-    kept = second % pixels.known.shape[0] != 0
+    kept = second % pixels.valid.shape[0] != 0
     return first[kept], second[kept]
 
 
 @jit
 def _sweep(first, second, ratio, band, tolerance):
-    """Lowers the larger t of each pair to the smaller one, in order, where more than `tolerance` of
-    light moves; how often it did.
+    """Lower the larger t of each pair to the smaller one, in order, where more than `tolerance` of
+    light changes; return the number of changes.
     """
     moved = 0
     for k in range(len(first)):
@@ -294,9 +294,7 @@ def _sweep(first, second, ratio, band, tolerance):
 
 @jit
 def _unite(first, second, parent):
-    """Joins the trees of every pair, halving the paths on the way; the root is the tree's smallest
-    index.
-    """
+    """Join the trees of every pair, with path halving; the root is the tree's smallest index."""
     for k in range(len(first)):
         p, q = first[k], second[k]
         while parent[p] != p:
@@ -313,6 +311,6 @@ def _unite(first, second, parent):
 
 @jit
 def _flatten(parent):
-    """Lets every node point at its root: a node's parent never comes after it."""
+    """Point every node at its root; a node's parent never comes after it."""
     for i in range(len(parent)):
         parent[i] = parent[parent[i]]

@@ -1,1 +1,1 @@
-"""What several separation methods share: checks, guards, statistics, and the resulting layers."""
+"""Shared parts of separation methods: checks, gates, statistics, and the resulting layers."""

@@ -63,6 +63,6 @@ def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
     """Raise `InputError`, naming the method, unless some pixel of the mask has colour."""
     if not has_colour(image, mask):
         raise InputError(
-            f"the photo has no colour, and {method} tells highlights by colour alone: use --method "
-            "isc, or a colour photo"
+            f"the photo has no colour, which {method} needs to find highlights: use --method isc, "
+            "or a colour photo"
         )

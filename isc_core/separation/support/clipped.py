@@ -21,11 +21,11 @@ from ...imaging.channels import largest, mean_channel, smallest
 from ...inpainting.pull_push import fill
 from ...scene.decomposition import Separation
 
-# A channel this near to the pixel's largest, which is full, counts as full too: scaling and
+# A channel at this share of the pixel's largest, clipped one counts as clipped too: scaling and
 # compression blur the limit.
 _FULL = 0.95
-# From where to where a pixel's smallest channel, and white light in or around it, speak for a
-# highlight: shares of its largest channel.
+# Ramps over a pixel's smallest channel, and over white light in or around it, that indicate a
+# highlight; shares of its largest channel.
 _WHITE = (0.6, 0.8)
 _LIT = (0.03, 0.1)
 
@@ -46,17 +46,17 @@ def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) ->
     -------
     Separation
     """
-    known = mask & ~clipped
-    if not clipped.any() or not known.any():
+    valid = mask & ~clipped
+    if not clipped.any() or not valid.any():
         return split
     image = (split.diffuse + split.specular + split.residual)[clipped]
     removed = mean_channel(split.specular)
-    around = fill(np.concatenate([split.diffuse, removed[..., None]], axis=2), known)[clipped]
+    around = fill(np.concatenate([split.diffuse, removed[..., None]], axis=2), valid)[clipped]
     high = largest(image)
     full = image >= _FULL * high[:, None]
     light = np.maximum(around[:, 3], removed[clipped])
-    believed = np.maximum(_ramp(smallest(image), high, _WHITE), _ramp(light, high, _LIT))
-    white = believed * _white_over(image, around[:, :3], full)
+    gain = np.maximum(_ramp(smallest(image), high, _WHITE), _ramp(light, high, _LIT))
+    white = gain * _white_over(image, around[:, :3], full)
     rest = image - white[:, None]
     diffuse, specular, residual = split.diffuse.copy(), split.specular.copy(), split.residual.copy()
     diffuse[clipped] = np.where(full, np.clip(around[:, :3], np.maximum(rest, 0), image), rest)
@@ -69,7 +69,7 @@ def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) ->
 
 def _white_over(image: np.ndarray, around: np.ndarray, full: np.ndarray) -> np.ndarray:
     """s (n,) of clipped colours `image` (n, 3) over the diffuse ones `around` (n, 3), where `full`
-    (n, 3) bool says which channels are.
+    (n, 3) bool marks the clipped channels.
     """
     over = np.maximum(image - around, 0)
     return np.where(full.all(axis=1), largest(over), smallest(np.where(full, np.inf, over))).astype(
@@ -78,8 +78,8 @@ def _white_over(image: np.ndarray, around: np.ndarray, full: np.ndarray) -> np.n
 
 
 def _ramp(value: np.ndarray, high: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
-    """From 0 where `value` is the first share of `high` to 1 from the second on; all (n,), 0 where
-    both are.
+    """Linear ramp (n,): 0 up to the first share of `high`, 1 from the second on; 0 where both
+    are 0.
     """
     return np.clip(
         (value - ends[0] * high) / np.maximum((ends[1] - ends[0]) * high, np.float32(1e-30)), 0, 1

@@ -17,32 +17,32 @@ from ...imaging.channels import smallest
 
 
 def two_band_shares(
-    image: np.ndarray, known: np.ndarray, window: int
+    image: np.ndarray, valid: np.ndarray, window: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the shares of red and green in the averaged two-band image.
 
     Parameters
     ----------
     image : (H, W, 3) ndarray
-    known : (H, W) bool ndarray
+    valid : (H, W) bool ndarray
     window : int
         Side of the averaging square in pixels; odd.
 
     Returns
     -------
     red, green : (H, W) ndarray
-        In [0, 1]; 0 where not known, or without any colour.
+        In [0, 1]; 0 where not valid, or without colour.
     """
     low = smallest(image)
     band = image[..., 0] + image[..., 1] + image[..., 2] - 3 * low
     layers = [
-        np.where(known, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band)
+        np.where(valid, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band)
     ]
     if window > 1:
         layers = [ndimage.uniform_filter(layer, window, mode="constant") for layer in layers]
-    known = known & (layers[2] > 0)
-    over = np.where(known, layers[2], 1)
-    red, green = (np.where(known, layer / over, 0) for layer in layers[:2])
+    valid = valid & (layers[2] > 0)
+    over = np.where(valid, layers[2], 1)
+    red, green = (np.where(valid, layer / over, 0) for layer in layers[:2])
     return red, green
 
 
@@ -70,8 +70,8 @@ def group_quantile(group: np.ndarray, values: np.ndarray, quantile: float) -> np
     order = order[np.argsort(group[order], kind="stable")]
     starts = np.flatnonzero(np.diff(group[order], prepend=-1))
     sizes = np.diff(starts, append=len(group))
-    found = np.empty_like(values)
-    found[order] = np.repeat(
+    quantiles = np.empty_like(values)
+    quantiles[order] = np.repeat(
         values[order[starts + (quantile * (sizes - 1)).astype(np.int64)]], sizes
     )
-    return found
+    return quantiles

@@ -39,17 +39,15 @@ class Paths:
 
     def average(self, layers: np.ndarray) -> np.ndarray:
         """Return `layers` (n, H, W), smoothed along the paths."""
-        found = np.ascontiguousarray(
-            layers.transpose(2, 0, 1)
-        )  # the axis that is walked along comes first
+        smooth = np.ascontiguousarray(layers.transpose(2, 0, 1))  # the filtered axis comes first
         for step in range(_PASSES):
             sigma = self.reach * np.sqrt(3) * 2 ** (_PASSES - 1 - step) / np.sqrt(4**_PASSES - 1)
             log_feedback = -np.sqrt(2) / sigma
-            _walk(found, np.exp(log_feedback * self.across.T))
-            found = np.ascontiguousarray(found.transpose(2, 1, 0))
-            _walk(found, np.exp(log_feedback * self.down))
-            found = np.ascontiguousarray(found.transpose(2, 1, 0))
-        return found.transpose(1, 2, 0)
+            _filter_recursively(smooth, np.exp(log_feedback * self.across.T))
+            smooth = np.ascontiguousarray(smooth.transpose(2, 1, 0))
+            _filter_recursively(smooth, np.exp(log_feedback * self.down))
+            smooth = np.ascontiguousarray(smooth.transpose(2, 1, 0))
+        return smooth.transpose(1, 2, 0)
 
     def weighted(self, value: np.ndarray, weight: np.ndarray) -> np.ndarray:
         """Return the average (H, W) of `value` with `weight` >= 0, both (H, W)."""
@@ -79,10 +77,10 @@ class Paths:
         return mode
 
 
-def _walk(layers: np.ndarray, feedback: np.ndarray) -> None:
-    """One pass forward and back over the first axis of `layers` (W, n, H), in place;
+def _filter_recursively(layers: np.ndarray, feedback: np.ndarray) -> None:
+    """One pass forward and back over the first axis of `layers` (W, n, H), in place.
 
-    `feedback` (W, H) of the step into each place.
+    `feedback` (W, H): of the step into each pixel.
     """
     last = len(layers)
     for j in range(1, last):

@@ -43,13 +43,12 @@ WIDTHS = (0.006, 0.015, 0.04)  # of the object's diagonal
 KINDS = ("slope", "curvature", "difference")
 FILTERS = tuple((kind, width) for width in WIDTHS for kind in KINDS)
 BINS = 25  # odd: the middle one is around 0
-_REACH = (
-    4.0  # asinh(r / spread) at the outermost edges, about 27 spreads; what lies beyond counts there
-)
-_POOLED = 0.05  # of the diagonal: the neighbourhood whose evidence is averaged
-_DARK = 0.05  # of the mean intensity: below, logarithms are of noise
-_LONGEST = 192  # pixels of the object at which filters run; larger ones are averaged over blocks
-_SURE = 0.02  # no answer is nearer to 0 or 1
+# asinh(r / spread) at the outermost edges, about 27 spreads; larger values fall into the last bins.
+_REACH = 4.0
+_POOLED = 0.05  # of the diagonal: sigma of the averaging of the log-likelihood ratios
+_DARK = 0.05  # of the mean intensity: below it, logarithms are dominated by noise
+_MAX_SIDE = 192  # pixels: longer objects are block-averaged before filtering
+_MARGIN = 0.02  # distance that probabilities keep from 0 and 1
 _ARRAYS = ("spread", "without", "highlight", "temperature")
 
 
@@ -88,9 +87,9 @@ class FilterTable:
         total = np.zeros(outputs.shape[0])
         for number, unit in enumerate(self.spread):
             values = outputs[:, number]
-            known = np.isfinite(values)
-            found = np.where(known, ratio[number][bins(np.where(known, values, 0), unit)], 0)
-            total += found.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+            valid = np.isfinite(values)
+            terms = np.where(valid, ratio[number][bins(np.where(valid, values, 0), unit)], 0)
+            total += terms.sum(axis=1) / np.maximum(valid.sum(axis=1), 1)
         return total
 
 
@@ -138,13 +137,13 @@ def read_table(path: str | Path) -> FilterTable:
 def _read(data: bytes, name: str) -> FilterTable:
     try:
         arrays = parse_arrays(data, name)
-        with np.errstate(invalid="ignore"):  # what is no number is refused below
+        with np.errstate(invalid="ignore"):  # non-finite values are rejected below
             spread, without, highlight, temperature = (
                 np.asarray(arrays[key], float) for key in _ARRAYS
             )
     except (ValueError, KeyError) as error:
         raise InputError(
-            f"{name} is no table of filter statistics: fit one with "
+            f"{name} is not a table of filter statistics: fit one with "
             "benchmarks.separation.filter_statistics"
         ) from error
     shape = (len(FILTERS), BINS)
@@ -159,7 +158,7 @@ def _read(data: bytes, name: str) -> FilterTable:
         for values in (spread, without, highlight, temperature)
     ):
         raise InputError(
-            f"{name} holds other filters than this version has: fit it anew with "
+            f"{name} does not match the filters of this version: refit it with "
             "benchmarks.separation.filter_statistics"
         )
     return FilterTable(spread, without, highlight, float(temperature))
@@ -202,7 +201,7 @@ def highlight_prior(
         pooled = ndimage.map_coordinates(filled, places, order=1, mode="nearest")
     probability = np.full(mask.shape, 0.5, np.float32)
     probability[box] = np.where(
-        mask[box], np.clip(1 / (1 + np.exp(-np.clip(pooled, -50, 50))), _SURE, 1 - _SURE), 0.5
+        mask[box], np.clip(1 / (1 + np.exp(-np.clip(pooled, -50, 50))), _MARGIN, 1 - _MARGIN), 0.5
     )
     return probability
 
@@ -221,7 +220,7 @@ def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.nda
     side : int
         Of the blocks.
     """
-    factor = -(-max(mask.shape) // _LONGEST)
+    factor = -(-max(mask.shape) // _MAX_SIDE)
     if factor == 1:
         return intensity, mask, 1
     padded = [(0, -n % factor) for n in mask.shape]
@@ -247,9 +246,9 @@ def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.nda
 
 def pooled_evidence(intensity: np.ndarray, mask: np.ndarray, table: FilterTable) -> np.ndarray:
     """Return Lambda (H, W) of an intensity >= 0 inside `mask`; 0 outside."""
-    found = np.zeros(mask.shape)
-    found[mask] = table.evidence(filter_outputs(intensity, mask))
-    return np.where(mask, masked_gaussian(found, mask, _POOLED * _diagonal(mask)), 0)
+    ratios = np.zeros(mask.shape)
+    ratios[mask] = table.evidence(filter_outputs(intensity, mask))
+    return np.where(mask, masked_gaussian(ratios, mask, _POOLED * _diagonal(mask)), 0)
 
 
 def filter_outputs(intensity: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -287,12 +286,12 @@ def filter_outputs(intensity: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def _neighbour(values: np.ndarray, mask: np.ndarray, step: int, axis: int) -> np.ndarray:
-    """The values `step` pixels before, along the axis; NaN where that is not in the mask."""
-    known = np.pad(np.where(mask, values, np.nan), 1, constant_values=np.nan)
-    return np.roll(known, step, axis)[1:-1, 1:-1]
+    """The values `step` pixels before, along the axis; NaN outside the mask."""
+    padded = np.pad(np.where(mask, values, np.nan), 1, constant_values=np.nan)
+    return np.roll(padded, step, axis)[1:-1, 1:-1]
 
 
 def _diagonal(mask: np.ndarray) -> float:
-    """Of the object's box, in pixels."""
+    """Diagonal of the object's box, in pixels."""
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return float(np.hypot(rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1))

@@ -142,13 +142,13 @@ def far_from_borders(steps: Steps, mask: np.ndarray, blur: float, unit: float) -
 
 
 def roughness(
-    specular: np.ndarray, trust: np.ndarray, mask: np.ndarray, scale: float, fine: float
+    specular: np.ndarray, weight: np.ndarray, mask: np.ndarray, scale: float, fine: float
 ) -> tuple[float, np.ndarray]:
     """Return the share of fine detail in what exceeds its surroundings.
 
     Parameters
     ----------
-    specular, trust : (H, W) ndarray
+    specular, weight : (H, W) ndarray
         The layer, and the weight of its pixels.
     mask : (H, W) bool ndarray
     scale, fine : float
@@ -160,18 +160,18 @@ def roughness(
         Over all raised pixels; 0 for a smooth highlight, near 1 for texture and noise.
     local : (H, W) ndarray
     """
-    raised = np.where(mask, specular - weighted_gaussian(specular, trust, scale, 1e-6), 0)
+    raised = np.where(mask, specular - weighted_gaussian(specular, weight, scale, 1e-6), 0)
     detail = np.square(raised - ndimage.gaussian_filter(raised, fine))
-    weight = np.where(mask, np.square(trust), 0)
-    up = weight * (raised > 0)
+    squared = np.where(mask, np.square(weight), 0)
+    up = squared * (raised > 0)
     over_all = np.sqrt(
         (up * detail).sum(dtype=float) / max((up * np.square(raised)).sum(dtype=float), _TINY)
     )
-    below = ndimage.gaussian_filter(weight * np.square(raised), scale) + _TINY
-    return float(over_all), np.sqrt(ndimage.gaussian_filter(weight * detail, scale) / below)
+    below = ndimage.gaussian_filter(squared * np.square(raised), scale) + _TINY
+    return float(over_all), np.sqrt(ndimage.gaussian_filter(squared * detail, scale) / below)
 
 
-def paint_mixing(
+def reflectance_mixing(
     specular: np.ndarray, chroma: np.ndarray, ratio: np.ndarray, mask: np.ndarray, scale: float
 ) -> np.ndarray:
     """Return how much of the layer's rise is white reflectance: 1; for light about 0.

@@ -20,8 +20,8 @@ import numpy as np
 from scipy import ndimage
 
 _BLUR = np.array([0.25, 0.5, 0.25])
-# Every hue knows a little of all pixels, so that a hue without votes has an answer.
-_OF_ALL = 20.0
+# Weight of all pixels' histogram in that of each hue, so that a hue without votes has a value.
+_POOLED = 20.0
 
 
 def hue_of(image: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
@@ -106,7 +106,7 @@ class HueGrid:
         for axis in (0, 1):
             ndimage.convolve1d(near, 2 * _BLUR, axis=axis, output=near, mode="constant")
         total = everywhere.sum(axis=0) + 1e-9
-        return near, everywhere + _OF_ALL * total / total.sum()
+        return near, everywhere + _POOLED * total / total.sum()
 
     def places(self, rows: np.ndarray, columns: np.ndarray, hue: np.ndarray) -> "Places":
         """Return the positions of pixels (n,) among the cells; hues in [0, 6)."""
@@ -170,12 +170,12 @@ def quantile(histograms: np.ndarray, share: float) -> np.ndarray:
         In [0, 1] of the histograms' range.
     """
     summed = np.cumsum(histograms, axis=-1)
-    wanted = share * summed[..., -1]
-    bin_ = np.minimum((summed < wanted[..., None]).sum(axis=-1), histograms.shape[-1] - 1)[
+    target = share * summed[..., -1]
+    bin_ = np.minimum((summed < target[..., None]).sum(axis=-1), histograms.shape[-1] - 1)[
         ..., None
     ]
     inside = np.take_along_axis(histograms, bin_, -1)[..., 0]
     before = np.take_along_axis(summed, bin_, -1)[..., 0] - inside
     return (
-        bin_[..., 0] + np.clip((wanted - before) / np.maximum(inside, 1e-9), 0, 1)
+        bin_[..., 0] + np.clip((target - before) / np.maximum(inside, 1e-9), 0, 1)
     ) / histograms.shape[-1]

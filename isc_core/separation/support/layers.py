@@ -14,9 +14,9 @@ from ...imaging.channels import fade_in, mean_channel, saturation, smallest
 from ...scene.decomposition import Separation
 from .clipped import explain_clipped
 
-# A highlight can hide in a pixel's smallest channel; the share of it that stays in doubt where a
+# A highlight can hide in a pixel's smallest channel; the share of it that counts as error where a
 # method could decide.
-DOUBT = 0.3
+HIDDEN_SHARE = 0.3
 
 
 def white_layers(
@@ -42,7 +42,7 @@ def white_layers(
     diffuse = np.where(mask[..., None], np.maximum(image - white[..., None], 0), 0).astype(
         np.float32
     )
-    return _finished(image, mask, diffuse, np.repeat(white[..., None], 3, axis=2), clipped)
+    return _separation(image, mask, diffuse, np.repeat(white[..., None], 3, axis=2), clipped)
 
 
 def bright_layers(
@@ -74,16 +74,16 @@ def bright_layers(
     -------
     Separation
     """
-    seen = np.where(mask[..., None], image, 0)
-    low = smallest(seen)
+    inside = np.where(mask[..., None], image, 0)
+    low = smallest(inside)
     base = float(low[mask].mean(dtype=float))
     specular = np.zeros_like(low)
     linear = mask if clipped is None else mask & ~clipped
-    if linear.any() and saturation(seen[mask & (low > base)]) >= least_saturation:
-        specular = find(seen, linear, base)
+    if linear.any() and saturation(inside[mask & (low > base)]) >= least_saturation:
+        specular = find(inside, linear, base)
         if fade is not None:
             specular = specular * fade_in(low, base, fade)
-    return white_layers(seen, mask, specular, clipped)
+    return white_layers(inside, mask, specular, clipped)
 
 
 def diffuse_layers(
@@ -104,13 +104,13 @@ def diffuse_layers(
     Separation
         The residual is 0 except where clipped.
     """
-    known = np.where(np.isfinite(diffuse), diffuse, image)
-    kept = np.where(mask[..., None], np.clip(known, 0, image), 0).astype(np.float32)
+    finite = np.where(np.isfinite(diffuse), diffuse, image)
+    kept = np.where(mask[..., None], np.clip(finite, 0, image), 0).astype(np.float32)
     specular = np.where(mask[..., None], np.maximum(image - kept, 0), 0).astype(np.float32)
-    return _finished(image, mask, kept, specular, clipped)
+    return _separation(image, mask, kept, specular, clipped)
 
 
-def _finished(
+def _separation(
     image: np.ndarray,
     mask: np.ndarray,
     diffuse: np.ndarray,
@@ -119,7 +119,7 @@ def _finished(
 ) -> Separation:
     low = np.where(mask, smallest(image), 0)
     base = max(float(low[mask].mean(dtype=float)), 1e-30) if mask.any() else 1.0
-    error = mean_channel(specular) + DOUBT * low
+    error = mean_channel(specular) + HIDDEN_SHARE * low
     confidence = np.where(mask, np.exp(-error / base), 0).astype(np.float32)
     split = Separation(diffuse, specular, np.zeros_like(diffuse), confidence)
     return split if clipped is None else explain_clipped(split, clipped & mask, mask)

@@ -21,18 +21,18 @@ covered.
 
 import numpy as np
 
-_LEFT = 1e-3  # of a pixel's largest channel, and of each channel: what stays at least
+_MIN_SHARE = 1e-3  # of a pixel's largest channel, and of each channel: least diffuse value
 
 
-def held_to_light(seen: np.ndarray, diffuse: np.ndarray, tint: float) -> np.ndarray:
+def limit_tint(image: np.ndarray, diffuse: np.ndarray, tint: float) -> np.ndarray:
     """Return the diffuse layer whose difference from the photo has the colour of light.
 
     Parameters
     ----------
-    seen : (H, W, 3) ndarray
+    image : (H, W, 3) ndarray
         The photo.
     diffuse : (H, W, 3) ndarray
-        Not above `seen`.
+        Not above `image`.
     tint : float
         Largest ratio of two of the light's channels, at least 1.
 
@@ -41,13 +41,13 @@ def held_to_light(seen: np.ndarray, diffuse: np.ndarray, tint: float) -> np.ndar
     (H, W, 3) float32 ndarray
         Not negative.
     """
-    taken = np.maximum(seen - diffuse, 0)
+    removed = np.maximum(image - diffuse, 0)
     weight = 1 / np.square(
-        np.maximum(diffuse, _LEFT * np.maximum(seen.max(axis=2, keepdims=True), 1e-9))
+        np.maximum(diffuse, _MIN_SHARE * np.maximum(image.max(axis=2, keepdims=True), 1e-9))
     )
-    level = (weight * taken).sum(axis=2, keepdims=True) / weight.sum(axis=2, keepdims=True)
+    level = (weight * removed).sum(axis=2, keepdims=True) / weight.sum(axis=2, keepdims=True)
     near = np.minimum(
-        np.clip(taken, level / np.sqrt(tint), level * np.sqrt(tint)), (1 - _LEFT) * seen
+        np.clip(removed, level / np.sqrt(tint), level * np.sqrt(tint)), (1 - _MIN_SHARE) * image
     )
     light = np.minimum(near, tint * near.min(axis=2, keepdims=True))
-    return (seen - light).astype(np.float32)
+    return (image - light).astype(np.float32)

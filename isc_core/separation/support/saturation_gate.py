@@ -18,8 +18,8 @@ import numpy as np
 from ...imaging.channels import saturation
 from .highlight_cues import ramp
 
-# Measured on objects with and without visible highlights: .11-.46 where removal by colour did harm,
-# .54-.74 where it helped.
+# Measured on objects with and without visible highlights: .11-.46 where removal by colour was
+# harmful, .54-.74 where it helped.
 _GREY, _COLOURED = 0.45, 0.55
 
 

@@ -10,7 +10,7 @@ from isc_core.errors import InputError
 from isc_core.networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
 from isc_core.networks.layers import convolved, depth_to_space, space_to_depth
 from isc_core.separation import separate
-from isc_core.separation.support.light_tint import held_to_light
+from isc_core.separation.support.light_tint import limit_tint
 
 
 def small_network(rng):
@@ -127,7 +127,7 @@ def test_confidence_sorts_pixels_by_their_error():
 def test_what_is_taken_off_is_not_more_coloured_than_light(tint):
     rng = np.random.default_rng(4)
     seen = rng.uniform(0.01, 1, (40, 50, 3)).astype(np.float32)
-    diffuse = held_to_light(seen, seen * rng.uniform(0.05, 1, seen.shape).astype(np.float32), tint)
+    diffuse = limit_tint(seen, seen * rng.uniform(0.05, 1, seen.shape).astype(np.float32), tint)
     light = seen - diffuse
     assert (diffuse >= 0).all() and light.min() > -1e-6
     assert (light.max(-1) <= tint * light.min(-1) + 1e-6).all()
@@ -135,10 +135,10 @@ def test_what_is_taken_off_is_not_more_coloured_than_light(tint):
 
 def test_light_that_is_white_stays_and_green_light_on_green_paint_goes_back():
     paint = np.array([0.3, 0.5, 0.05], np.float32) * np.ones((4, 5, 1), np.float32)
-    assert np.allclose(held_to_light(paint + 0.2, paint, 1.5), paint, atol=1e-6)
-    assert np.allclose(held_to_light(paint, paint, 1.5), paint)
+    assert np.allclose(limit_tint(paint + 0.2, paint, 1.5), paint, atol=1e-6)
+    assert np.allclose(limit_tint(paint, paint, 1.5), paint)
     green = np.array([0.1, 0.18, 0.01], np.float32)
-    kept = held_to_light(paint + green, paint, 1.0)
+    kept = limit_tint(paint + green, paint, 1.0)
     level = (paint + green - kept)[0, 0]
     costs = [np.square((level[0] + d - green) / paint[0, 0]).sum() for d in (-0.001, 0, 0.001)]
     assert np.ptp(level) < 1e-6 and costs[1] == min(costs), (
@@ -163,7 +163,7 @@ def test_the_mirror_image_is_asked_only_where_that_is_wanted():
 
 def test_options_and_files_that_mean_nothing_are_refused(tmp_path):
     image, _, mask = ball(40)
-    with pytest.raises(InputError, match="long side"):
+    with pytest.raises(InputError, match="long_side"):
         separate("network", image, mask, changes={"long_side": 8})
     with pytest.raises(InputError, match="doubt"):
         separate("network", image, mask, changes={"doubt": -1.0})
@@ -172,7 +172,7 @@ def test_options_and_files_that_mean_nothing_are_refused(tmp_path):
             separate("network", image, mask, changes={"tint": wrong})
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no layer network"):
+    with pytest.raises(InputError, match=r"bad\.npz is not a layer network"):
         LayerNetwork.read(bad)
     np.savez(bad, weight00=np.zeros((9, 2, 2)), bias00=np.zeros(2))
     with pytest.raises(InputError, match="not the weights"):

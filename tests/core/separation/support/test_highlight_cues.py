@@ -8,8 +8,8 @@ from isc_core.separation.support.highlight_cues import (
     Steps,
     far_from_borders,
     noise_level,
-    paint_mixing,
     ramp,
+    reflectance_mixing,
     roughness,
     steps_of,
 )
@@ -189,7 +189,7 @@ RATIO = PAINT.min() / np.ptp(PAINT)
 def mixing_of(image: np.ndarray, scale: float = 4.0) -> np.ndarray:
     """Paint mixing (H, W) of an image (H, W, 3) of the one paint and white."""
     chroma = np.ptp(image, axis=2)
-    return paint_mixing(
+    return reflectance_mixing(
         image.min(axis=2) - RATIO * chroma, chroma, np.full(chroma.shape, RATIO), WHOLE, scale
     )
 
@@ -220,4 +220,4 @@ def test_where_chroma_rises_with_the_light_no_paint_is_mixed_in() -> None:
 @pytest.mark.parametrize("shape", [(1, 1), (1, 20), (20, 1), (2, 2), (4, 4)])
 def test_mixing_of_specks_is_none(shape: tuple[int, int]) -> None:
     layer = np.random.default_rng(4).random(shape)
-    assert not paint_mixing(layer, 1 - layer, layer, np.ones(shape, bool), 2.5).any()
+    assert not reflectance_mixing(layer, 1 - layer, layer, np.ones(shape, bool), 2.5).any()
