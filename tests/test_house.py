@@ -299,6 +299,80 @@ def test_every_public_function_says_what_it_does() -> None:
     assert not silent, "\n".join(silent)
 
 
+def public_definitions(path: Path) -> Iterator[tuple[str, ast.FunctionDef]]:
+    """The public functions of a module and the public methods of its public classes, by name."""
+    for node in parsed(path).body:
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            yield node.name, node
+        elif isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield from (
+                (f"{node.name}.{method.name}", method)
+                for method in node.body
+                if isinstance(method, ast.FunctionDef) and not method.name.startswith("_")
+            )
+
+
+def has_section(docstring: str, title: str) -> bool:
+    return re.search(rf"^{title}\n-{{{len(title)}}}$", docstring, re.MULTILINE) is not None
+
+
+def test_public_functions_document_their_parameters() -> None:
+    """A docstring of more than one line has numpydoc's `Parameters` where there are any."""
+    silent = []
+    for path in sources("isc_core"):
+        for name, function in public_definitions(path):
+            given = function.args
+            parameters = {
+                argument.arg
+                for argument in [
+                    *(given.posonlyargs + given.args + given.kwonlyargs),
+                    *filter(None, (given.vararg, given.kwarg)),
+                ]
+            } - {"self", "cls"}
+            docstring = ast.get_docstring(function) or ""
+            if parameters and "\n" in docstring and not has_section(docstring, "Parameters"):
+                silent.append(f"{where(path, function)} {name}")
+    assert not silent, "\n".join(silent)
+
+
+def test_public_dataclasses_document_their_fields() -> None:
+    """Each field has its entry in the section `Attributes`, if the docstring exceeds one line."""
+    silent = []
+    for path in sources("isc_core"):
+        for node in parsed(path).body:
+            if not isinstance(node, ast.ClassDef) or node.name.startswith("_"):
+                continue
+            if not any("dataclass" in ast.unparse(one) for one in node.decorator_list):
+                continue
+            docstring = ast.get_docstring(node) or ""
+            if "\n" not in docstring:
+                continue
+            entries = re.findall(r"^([\w, ]+) : ", docstring, re.MULTILINE)
+            documented = {name.strip() for entry in entries for name in entry.split(",")}
+            silent += [
+                f"{where(path, node)} {node.name}.{field.target.id}"
+                for field in node.body
+                if isinstance(field, ast.AnnAssign)
+                and isinstance(field.target, ast.Name)
+                and not field.target.id.startswith("_")
+                and (field.target.id not in documented or not has_section(docstring, "Attributes"))
+            ]
+    assert not silent, "\n".join(silent)
+
+
+def test_lines_have_at_most_100_columns() -> None:
+    """Ruff checks the length of every line (E501), also of docstrings and comments."""
+    ruff = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["ruff"]
+    assert ruff["line-length"] == 100
+    assert "E" in ruff["lint"]["select"] and "E501" not in ruff["lint"]["ignore"]
+    exempt = [
+        str(path.relative_to(ROOT))
+        for path in sources(*PACKAGES)
+        if "noqa: E501" in path.read_text(encoding="utf-8")
+    ]
+    assert not exempt, "\n".join(exempt)
+
+
 def test_the_command_starts_without_numba() -> None:
     """Some machines have no build of Numba: the plain NumPy engine must do there."""
     code = (

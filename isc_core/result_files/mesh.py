@@ -47,8 +47,8 @@ from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 
-_BRIGHT = 0.9  # linear base colour that the 99.5th percentile of the reflectance is given
-_LEAST_DEPTH = (
+_BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
+_MIN_NORMAL_Z = (
     1e-3  # smallest z of a vertex normal: it faces the viewer, and its tangent is defined
 )
 
@@ -86,11 +86,26 @@ class MeshOptions:
 class MeshResult:
     """A mesh with its material and how it relates to the maps.
 
-    `mesh`: metres, +Y up, facing +Z. `reflectance_scale`: k, base colour = k * reflectance.
-    `metres_per_pixel`: of the maps. `origin`: (column, row, height) in pixels of the world's
-    origin. `stride`: pixels from vertex to vertex. `vertex_pixel`: (V, 2) row and column of each
-    vertex. `base_color`: (H, W, 3) linear, k * reflectance continued beyond the mask. `detail`: (H,
-    W, 3) unit vectors of the normal map in tangent space. `options`, `gloss`: as given.
+    Attributes
+    ----------
+    mesh : trimesh.Trimesh
+        In metres, +Y up, facing +Z.
+    reflectance_scale : float
+        k: base colour = k * reflectance.
+    metres_per_pixel : float
+        Of the maps.
+    origin : tuple of float
+        (column, row, height), in pixels, of the world's origin.
+    stride : int
+        Pixels from vertex to vertex.
+    vertex_pixel : (V, 2) ndarray
+        Row and column of each vertex.
+    base_color : (H, W, 3) ndarray
+        Linear, k * reflectance, continued beyond the mask.
+    detail : (H, W, 3) ndarray
+        Unit vectors of the normal map in tangent space.
+    options : MeshOptions
+    gloss : SpecularFit
     """
 
     mesh: trimesh.Trimesh
@@ -110,7 +125,7 @@ class MeshResult:
         return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
-        """Return the light (9, 3), `recovered` / k, that gives the diffuse image with the texture."""
+        """Return the light (9, 3), `recovered` / k: with the texture it gives the diffuse image."""
         light = np.array(recovered, np.float64)
         light[0] -= log(self.reflectance_scale) * sqrt(4 * pi)
         return light
@@ -126,8 +141,8 @@ class MeshResult:
         )
 
     def _add_specular(self, buffers: dict[str, bytes], tree: dict[str, Any]) -> None:
-        """Writes KHR_materials_specular into glTF's tree and the texture's picture among its
-        buffers, which trimesh cannot.
+        """Add KHR_materials_specular to the glTF tree and its texture to the buffers; trimesh lacks
+        the extension.
         """
         variation = self.gloss.variation
         largest = 1.0 if variation is None else float(variation.max())
@@ -200,7 +215,7 @@ def build_mesh(
         If the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
-    _require_sound(height, normal, mask, reflectance, options)
+    _check_inputs(height, normal, mask, reflectance, options)
     stride, cells = _grid_cells(mask, options.max_faces)
     limited = limit_rim(height, mask, options.rim)
     rows, columns = (np.arange(0, n, stride) for n in mask.shape)
@@ -215,7 +230,7 @@ def build_mesh(
     detail = _detail_normals(normal, mask, smooth, cells, stride)
     color, k = base_color(reflectance, mask, options.bleed)
     visual = trimesh.visual.TextureVisuals(
-        # trimesh counts v from the bottom of the texture and turns it over when it writes.
+        # In trimesh v starts at the bottom of the texture and is flipped on export.
         uv=np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
         material=_material(color, detail, options, gloss),
     )
@@ -282,13 +297,13 @@ def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
     limited = np.where(mask, height, 0.0).astype(np.float64)
     step = np.zeros(mask.shape)
     for ring in range(rings + 1, 0, -1):
-        here = depth == ring
+        current = depth == ring
         base, weight = _neighbour_mean(limited, depth > ring)
-        known = here & (weight > 0)
+        updated = current & (weight > 0)
         if ring <= rings:
             slack = 1.5 * _neighbour_mean(step, depth > ring)[0] + 0.5
-            limited = np.where(known, np.clip(limited, base - slack, base + slack), limited)
-        step = np.where(known, np.abs(limited - base), step)
+            limited = np.where(updated, np.clip(limited, base - slack, base + slack), limited)
+        step = np.where(updated, np.abs(limited - base), step)
     outermost = (depth == 1) & (rings > 0)
     return np.where(outermost, _neighbour_mean(limited, outermost, 5)[0], limited)
 
@@ -296,8 +311,8 @@ def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
 def _neighbour_mean(
     values: np.ndarray, valid: np.ndarray, size: int = 3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of the valid pixels in each pixel's `size` x `size` neighbourhood, and how many were
-    valid.
+    """Mean of the valid pixels in each pixel's `size` x `size` neighbourhood, and their
+    number.
     """
     weight = ndimage.uniform_filter(valid.astype(np.float64), size, mode="constant") * size**2
     total = ndimage.uniform_filter(np.where(valid, values, 0.0), size, mode="constant") * size**2
@@ -305,7 +320,7 @@ def _neighbour_mean(
     return total / np.maximum(count, 1), count
 
 
-def _require_sound(
+def _check_inputs(
     height: np.ndarray,
     normal: np.ndarray,
     mask: np.ndarray,
@@ -315,12 +330,11 @@ def _require_sound(
     for name, values in (("height", height), ("normal", normal), ("reflectance", reflectance)):
         if values.shape[:2] != mask.shape:
             raise InputError(
-                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: give maps of one "
-                "size"
+                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: use maps of one size"
             )
         if not np.isfinite(values[mask]).all():
             raise InputError(
-                f"the {name} map holds NaN or infinite values inside the mask: repair it or "
+                f"the {name} map has NaN or infinite values inside the mask: repair it or "
                 "exclude them from the mask"
             )
     if not (
@@ -334,34 +348,34 @@ def _require_sound(
 
 
 def _grid_cells(mask: np.ndarray, max_faces: int) -> tuple[int, np.ndarray]:
-    """The smallest stride that keeps to `max_faces`, and which cells, (rows - 1, columns - 1) bool,
+    """The smallest stride within `max_faces`, and which cells, (rows - 1, columns - 1) bool,
     lie wholly inside the mask.
     """
     cells = _cells_inside(mask, 1)
     if not cells.any():
         raise InputError(
-            "the mask holds no block of 2 x 2 pixels to build a mesh of: mark a larger region or "
+            "the mask has no block of 2 x 2 pixels to build a mesh from: mark a larger region or "
             "use a larger photo"
         )
     stride = max(1, ceil(sqrt(2 * int(cells.sum()) / max_faces)))
     while stride > 1 and not (cells := _cells_inside(mask, stride)).any():
         stride -= (
-            1  # an object thinner than the cells it would be allowed: rather many faces than none
+            1  # an object thinner than these cells: exceed max_faces rather than build no mesh
         )
     return stride, cells if stride > 1 else _cells_inside(mask, 1)
 
 
 def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
     size = stride + 1
-    whole = ndimage.minimum_filter(
+    inside = ndimage.minimum_filter(
         mask.astype(np.uint8), size, mode="constant", origin=-(size // 2)
     ).astype(bool)
-    return whole[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
+    return inside[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
 
 
 def _triangles(cells: np.ndarray, grid: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """The grid's vertices in use, (V,) flat indices, and the faces, (F, 3), counter-clockwise as
-    seen by the viewer.
+    """The grid's vertices in use, (V,) flat indices, and the faces, (F, 3), counter-clockwise for
+    the viewer.
 
     Each cell is split from its top left to its bottom right.
     """
@@ -385,20 +399,20 @@ def _vertex_normals(normal: np.ndarray, mask: np.ndarray, stride: int) -> np.nda
 
 
 def _facing(vectors: np.ndarray) -> np.ndarray:
-    """Unit vectors that face the viewer; (0, 0, 1) in place of nothing."""
+    """Unit vectors that face the viewer; (0, 0, 1) for zero vectors."""
     vectors = vectors.copy()
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     vectors = np.where(
         length > 0, vectors / np.where(length > 0, length, 1), np.array([0, 0, 1], vectors.dtype)
     )
-    vectors[..., 2] = np.maximum(vectors[..., 2], _LEAST_DEPTH)
+    vectors[..., 2] = np.maximum(vectors[..., 2], _MIN_NORMAL_Z)
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _detail_normals(
     normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells: np.ndarray, stride: int
 ) -> np.ndarray:
-    """The normals of the tangent-space map, (H, W, 3): each pixel's normal as seen from the
+    """The normals of the tangent-space map, (H, W, 3): each pixel's normal relative to the
     interpolated vertex normal.
 
     The tangent is the direction in which the texture's column grows on the surface, the bitangent
@@ -407,9 +421,9 @@ def _detail_normals(
     flat = np.broadcast_to(np.array([0, 0, 1], np.float32), mask.shape + (3,))
     if stride == 1:
         return flat
-    shown = np.kron(cells, np.ones((stride, stride), bool))
-    shown = np.pad(
-        shown, [(0, max(0, n - m)) for n, m in zip(mask.shape, shown.shape, strict=True)]
+    covered = np.kron(cells, np.ones((stride, stride), bool))
+    covered = np.pad(
+        covered, [(0, max(0, n - m)) for n, m in zip(mask.shape, covered.shape, strict=True)]
     )[: mask.shape[0], : mask.shape[1]]
     base = _facing(_interpolated(smooth, mask.shape, stride))
     tangent = np.stack([base[..., 2], np.zeros_like(base[..., 0]), -base[..., 0]], -1)
@@ -418,7 +432,7 @@ def _detail_normals(
     local = np.stack(
         [np.einsum("hwc,hwc->hw", normal, axis) for axis in (tangent, bitangent, base)], -1
     )
-    return np.where((shown & mask)[..., None], local, flat)
+    return np.where((covered & mask)[..., None], local, flat)
 
 
 def _color_picture(linear: np.ndarray) -> Image.Image:
@@ -458,8 +472,8 @@ def _roughness(options: MeshOptions, gloss: SpecularFit) -> float:
 
 
 def _alpha_png(values: np.ndarray) -> bytes:
-    """(H, W) in [0, 1] as the alpha of a white PNG, with room up to a multiple of 4 bytes, as
-    buffers have to begin there.
+    """(H, W) in [0, 1] as the alpha of a white PNG, padded to a multiple of 4 bytes, the
+    alignment of buffers.
     """
     pixels = np.full((*values.shape, 4), 255, np.uint8)
     pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
@@ -477,5 +491,5 @@ def _material(
         normalTexture=_vector_picture(detail),
         metallicFactor=options.metallic,
         roughnessFactor=_roughness(options, gloss),
-        doubleSided=True,  # the mesh has no back: seen from behind it should not vanish
+        doubleSided=True,  # the mesh is open at the back, and should stay visible from behind
     )
