@@ -53,7 +53,7 @@ def where(path: Path, node: ast.AST) -> str:
 
 
 def absolute_imports(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
-    """Each import of a module by its full name, wherever it stands, by the name's first part."""
+    """Each absolute import, at any level of the module, by the first part of the name."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node, alias.name.split(".")[0]) for alias in node.names)
@@ -70,7 +70,7 @@ def absolute_imports(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
 
 
 def called(node: ast.Call) -> str:
-    """The last part of the name of what is called."""
+    """The last part of the called name."""
     return node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
 
 
@@ -454,7 +454,7 @@ def plain(name: str) -> str:
 
 
 def test_the_readme_names_commands_and_options_that_exist() -> None:
-    """Every `isc COMMAND` of the README starts, and knows the options that stand in its section."""
+    """Every `isc COMMAND` of the README starts, and knows the options of its section."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     commands = sorted(set(re.findall(r"\bisc ([a-z][a-z-]+)\b", readme)))
     start = "import sys; from isc_core.cli.main import main; sys.exit(main())"

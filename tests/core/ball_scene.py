@@ -1,4 +1,4 @@
-"""A made scene with everything known: a chequered ball under a coloured light, with a highlight."""
+"""A synthetic scene with ground truth: a chequered ball, a coloured light, a highlight."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the tests of the command share: photos of a made ball, and how a command is run."""
+"""Helpers of the tests of the command: photos of a synthetic ball, and running a command."""
 
 import subprocess
 import sys
@@ -21,7 +21,7 @@ def ball_codes(radius: float = 20.0) -> np.ndarray:
 
 
 def write_image(path: Path, rgb: np.ndarray) -> Path:
-    """Writes (H, W) or (H, W, 3) RGB codes as the suffix of `path` says."""
+    """Writes (H, W) or (H, W, 3) RGB codes in the format of the suffix of `path`."""
     assert cv2.imwrite(str(path), rgb[..., ::-1] if rgb.ndim == 3 else rgb)
     return path
 

@@ -1,4 +1,4 @@
-"""Balls whose kind is known: coloured ones under lights, and mirrors in their surroundings."""
+"""Balls of known material: glossy ones under directional lights, mirrors in an environment."""
 
 import numpy as np
 

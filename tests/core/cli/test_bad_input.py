@@ -355,7 +355,7 @@ def test_an_option_that_means_nothing(
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
 
 
-# --- what is known beforehand ---------------------------------------------------------------------
+# --- known inputs ---------------------------------------------------------------------------------
 
 
 def saved(

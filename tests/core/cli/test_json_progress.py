@@ -1,4 +1,4 @@
-"""`isc --progress json`: what a program is told, and how it stops the work."""
+"""`isc --progress json`: the events that a program receives, and how it cancels the work."""
 
 import json
 import subprocess
@@ -153,7 +153,7 @@ def test_a_start_can_be_cancelled(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ignored", [False, True])
 def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool) -> None:
-    """Also where the program's own parent has told it to ignore Ctrl-C."""
+    """Also where the program inherits that Ctrl-C is ignored."""
     before = SLEEPY + (
         "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)" if ignored else ""
     )

@@ -187,7 +187,7 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     assert (printed.out, printed.err) == ("", "")
 
 
-# --- what is known beforehand ---------------------------------------------------------------------
+# --- known inputs ---------------------------------------------------------------------------------
 
 
 def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
@@ -641,7 +641,7 @@ def through_terminal(script: str) -> str:
         while True:
             try:
                 block = os.read(parent, 4096)
-            except OSError:  # how a terminal says on Linux that everybody has left
+            except OSError:  # Linux: the other end of the terminal is closed
                 break
             if not block:
                 break

@@ -334,7 +334,7 @@ def test_the_smallest_change_of_light_changes_least(scene: Decomposition, lobe: 
     before = d.image[d.mask]
     for yaw, exposure, most in ((0.01, 1.0, 0.002), (0.0, 1.0001, 0.002), (1.0, 1.0, 0.2)):
         rotation = turn(yaw=yaw)
-        light = NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)
+        light = NewLight(coefficients=turned_light(d.illumination, rotation), rotation=rotation)
         assert (
             np.abs(relight(d, light, Relighting(exposure=exposure)).image[d.mask] - before).max()
             < most * before.max()
@@ -347,7 +347,7 @@ def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> 
     for yaw in (0.0, 30.0, 60.0):
         rotation = turn(yaw=yaw)
         new = relight(
-            d, NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)
+            d, NewLight(coefficients=turned_light(d.illumination, rotation), rotation=rotation)
         ).specular
         weight = luminance(new) ** 2
         centres.append((weight * columns).sum() / weight.sum())
@@ -372,7 +372,7 @@ def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Dec
 
 
 def test_a_clipped_highlight_stays_white_on_other_paint(scene: Decomposition) -> None:
-    """What the sensor cut off was of the old albedo's colour, and says nothing of the new one's."""
+    """Light lost to clipping had the old albedo's colour: it does not determine the new one's."""
     light, full = scene.diffuse + scene.specular, 0.4
     d = replace(
         scene,

@@ -1,4 +1,4 @@
-"""What renderers are told of the gloss, on a ball whose lobe, light and albedo are known."""
+"""The specular level for renderers, on a ball of known lobe, light and albedo."""
 
 from dataclasses import replace
 
