@@ -35,7 +35,7 @@ from scipy import ndimage
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import psnr
-from isc_core.result_files.contact_sheet import Shown, edit_sheet
+from isc_core.result_files.contact_sheet import MapPanel, edit_sheet
 from isc_core.shading.environment_map import shading_under
 
 from .closed_loop_cases import PHOTOS, RENDERED, CaseOptions, LoopCase, RelitTruth, loop_cases
@@ -303,7 +303,7 @@ def relit_table(rows: Sequence[RelitRow]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def loop_panels(name: str, renders: Renders) -> list[Shown]:
+def loop_panels(name: str, renders: Renders) -> list[MapPanel]:
     """Show the photo, its maps and their renders."""
     r, peak = renders.result, white(renders.result.image, renders.result.mask)
     level = white(r.shading, r.mask)
@@ -316,10 +316,10 @@ def loop_panels(name: str, renders: Renders) -> list[Shown]:
         (r.shading / level, "Shading map"),
         (r.reflectance_scale * renders(RenderVariant(white=True)) / level, "Blender, white"),
     )
-    return [Shown(values, r.mask, label) for values, label in shown]
+    return [MapPanel(values, r.mask, label) for values, label in shown]
 
 
-def relit_panels(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> list[Shown]:
+def relit_panels(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> list[MapPanel]:
     """Show the photo, the truth in a new light, and the renders of recovered and true maps.
 
     Parameters
@@ -333,7 +333,7 @@ def relit_panels(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -
 
     Returns
     -------
-    list of Shown
+    list of MapPanel
         The panels.
     """
     mask, peak = ideal.result.mask, white(new.image, ideal.result.mask)
@@ -348,11 +348,11 @@ def relit_panels(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -
         for one, label in ((diffuse, "diffuse"), (glossy, "lobe"))
     ]
     shown += [(new.diffuse, "Truth, diffuse"), (perfect, "Blender, true maps")]
-    return [Shown(values / peak, mask, label) for values, label in shown]
+    return [MapPanel(values / peak, mask, label) for values, label in shown]
 
 
 def save_sheet(
-    path: Path, title: str, subtitle: str, panels: Sequence[Shown], columns: int
+    path: Path, title: str, subtitle: str, panels: Sequence[MapPanel], columns: int
 ) -> None:
     """Write a comparison sheet, reduced to page width.
 
@@ -362,7 +362,7 @@ def save_sheet(
         The PNG file.
     title, subtitle : str
         Above the panels.
-    panels : sequence of Shown
+    panels : sequence of MapPanel
         Images.
     columns : int
         Panels per row.
@@ -391,7 +391,7 @@ def measure(given: argparse.Namespace) -> None:
     options = CaseOptions(given.output, given.photos, given.size, max(16, 4 * given.samples))
     loops: list[LoopRow] = []
     relits: list[RelitRow] = []
-    panels: dict[str, list[Shown]] = {"rendered": [], "photos": [], "relit": []}
+    panels: dict[str, list[MapPanel]] = {"rendered": [], "photos": [], "relit": []}
     for case in loop_cases(options, given.names or (RENDERED + (PHOTOS if given.photos else ()))):
         renders = _renders(given, case.name, case.result)
         loops.append(loop_row(case.name, renders))
@@ -409,7 +409,7 @@ def _renders(given: argparse.Namespace, name: str, result: Path) -> Renders:
 
 
 def _relit(
-    given: argparse.Namespace, case: LoopCase, renders: Renders, panels: list[Shown]
+    given: argparse.Namespace, case: LoopCase, renders: Renders, panels: list[MapPanel]
 ) -> list[RelitRow]:
     rows = []
     if case.truth is not None:
@@ -424,7 +424,7 @@ def _write(
     given: argparse.Namespace,
     loops: list[LoopRow],
     relits: list[RelitRow],
-    panels: dict[str, list[Shown]],
+    panels: dict[str, list[MapPanel]],
 ) -> None:
     (given.output / "tables.md").write_text(
         loop_table(loops) + "\n" + relit_table(relits), encoding="utf-8"

@@ -38,7 +38,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.exr import read_channels
 from isc_core.photo import read_linear, read_photo
-from isc_core.result_files.contact_sheet import Answer, comparison_sheet
+from isc_core.result_files.contact_sheet import LabelledSeparation, comparison_sheet
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import IMPROVED, METHODS, variants
 
@@ -199,7 +199,9 @@ def _sheet(
             split = Separation(
                 decode(diffuse), decode(specular), np.zeros_like(diffuse), confidence
             )
-            answers.append(Answer(method, f"{row.psnr:.1f} dB, MSE x {row.mse_ratio:.2g}", split))
+            answers.append(
+                LabelledSeparation(method, f"{row.psnr:.1f} dB, MSE x {row.mse_ratio:.2g}", split)
+            )
     sheet = comparison_sheet(
         f"{case.group}: {case.name}",
         decode(truth.image),
@@ -272,14 +274,14 @@ def photos(given: argparse.Namespace) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _answer(folder: Path, method: str, coded: bool) -> Answer:
+def _answer(folder: Path, method: str, coded: bool) -> LabelledSeparation:
     channels = read_channels(folder / "separation.exr")
     diffuse, specular = (
         np.stack([channels[f"{layer}.{c}"] for c in "RGB"], -1) for layer in ("diffuse", "specular")
     )
     if coded:
         diffuse, specular = srgb_to_linear(diffuse), srgb_to_linear(specular)
-    return Answer(
+    return LabelledSeparation(
         method, "", Separation(diffuse, specular, np.zeros_like(diffuse), channels["confidence.Y"])
     )
 

@@ -1,4 +1,4 @@
-"""Editing a decomposed photo: other lights, other gloss, other colours. One kind of edit a file.
+"""Editing a decomposed photo: other lights, other gloss, other colours. One kind of edit per file.
 
 An edit is a function of a `Decomposition` and of its own options that returns an `edited.Edited`:
 new layers; the input never changes. Arrays are linear Rec.709, frames and units those of

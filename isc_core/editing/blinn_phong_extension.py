@@ -38,10 +38,10 @@ from .edited import MOST_GAIN, Edited, edited, light_color
 from .lobes import known_lobe, strength_of
 
 METHODS = ("remap", "render")
-_SKY_ROWS = 16
-# of the brightest: below, a separation finds less and less of a highlight, until it ends in an edge
-_FOUND = 0.25
-_CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
+_ENVIRONMENT_ROWS = 16
+# of the brightest: below, a separation recovers a shrinking share of a highlight, ending in an edge
+_RECOVERED = 0.25
+_CENTRE = 99.9  # percentile: the lobe's centre, robust to a few wrong pixels
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,16 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
         specular = specular * gloss.gain
     if gloss.metal == 0:
         return edited(d, specular=specular, notes=tuple(notes))
-    paint = np.maximum(d.reflectance, 0)
-    seen = paint * light_color(d)
-    tint = seen / np.maximum(seen.max(-1, keepdims=True), 1e-6)
-    sky = environment_from_shading(d.illumination, _SKY_ROWS)
+    reflectance = np.maximum(d.reflectance, 0)
+    tinted = reflectance * light_color(d)
+    tint = tinted / np.maximum(tinted.max(-1, keepdims=True), 1e-6)
+    environment = environment_from_shading(d.illumination, _ENVIRONMENT_ROWS)
     lobe = Lobe(gloss.exponent or gloss.present or DEFAULT_EXPONENT)
-    mirrored = np.zeros_like(d.image)
-    mirrored[d.mask] = paint[d.mask] * lobe_in_environment(lobe, d.normal[d.mask], sky)
-    metallic = specular * (1 - gloss.metal + gloss.metal * tint) + gloss.metal * mirrored
+    reflected = np.zeros_like(d.image)
+    reflected[d.mask] = reflectance[d.mask] * lobe_in_environment(
+        lobe, d.normal[d.mask], environment
+    )
+    metallic = specular * (1 - gloss.metal + gloss.metal * tint) + gloss.metal * reflected
     return edited(d, (1 - gloss.metal) * d.diffuse, metallic, tuple(notes))
 
 
@@ -133,7 +135,7 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
     if exponent == present:
         return specular
     level = np.minimum(specular.max(-1, keepdims=True) / white_of(specular, mask, _CENTRE), 1)
-    least = 1e-6 if exponent > present else _FOUND
+    least = 1e-6 if exponent > present else _RECOVERED
     shape = np.where(level > 1e-6, np.maximum(level, least) ** (exponent / present - 1), 0)
     return specular * shape * ((exponent + 8) / (present + 8))
 
@@ -141,16 +143,16 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
 def _new_lobe(
     d: Decomposition, gloss: Gloss, light: DirectionalLight | None, notes: list[str]
 ) -> np.ndarray:
-    """The specular layer of the exponent that is asked for."""
+    """The specular layer at the requested exponent."""
     if not d.specular[d.mask].any():
         notes.append(
             "the object has no specular light to change: isc edit RESULT highlight gives it some"
         )
         return d.specular
-    known = known_lobe(d)
-    present = gloss.present or (known.nearest_exponent if known is not None else None)
-    asks_light = gloss.method == "render" and light is None
-    fit = explain_specular(d) if present is None or asks_light else None
+    fitted = known_lobe(d)
+    present = gloss.present or (fitted.nearest_exponent if fitted is not None else None)
+    needs_light = gloss.method == "render" and light is None
+    fit = explain_specular(d) if present is None or needs_light else None
     if present is None and fit is not None and fit.determined:
         present = fit.exponent
     if present is None:
@@ -159,9 +161,11 @@ def _new_lobe(
         )
         present = DEFAULT_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
-    under = light or (fit.light if fit is not None else None)
-    if gloss.method == "remap" or under is None:
+    used_light = light or (fit.light if fit is not None else None)
+    if gloss.method == "remap" or used_light is None:
         return remapped(d.specular, d.mask, present, exponent)
-    tone = replace(under, irradiance=under.irradiance / float(luminance(under.irradiance)))
-    rendered = lobe_under(Lobe(exponent), d.normal, tone)
+    unit_light = replace(
+        used_light, irradiance=used_light.irradiance / float(luminance(used_light.irradiance))
+    )
+    rendered = lobe_under(Lobe(exponent), d.normal, unit_light)
     return strength_of(d, Lobe(exponent), rendered, None) * rendered

@@ -23,11 +23,11 @@ from .chroma import to_oklab
 from .edited import light_color
 
 LARGEST_COUNT = 12
-_LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; below the second the ratios are mostly noise
-_ALIKE = 0.045  # centres nearer than this are one reflectance
-_ROUNDS, _TRIES, _SAMPLES = 60, 12, 20000
-_SOFT = 1e-3  # of the white's square: contrasts of the reflectance that do not matter
-_SURE = 0.7  # shares within 15 % of none and all are none and all
+_LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; the L below which chroma ratios are mostly noise
+_MERGE_DISTANCE = 0.045  # centres closer than this are merged
+_ROUNDS, _CANDIDATES, _SAMPLES = 60, 12, 20000
+_REGULARISATION = 1e-3  # of the white's square: contrasts of the reflectance below it are smoothed
+_SOFT_RANGE = 0.7  # width of the soft range: shares within 15 % of 0 and 1 become 0 and 1
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class Clusters:
         mask = self.labels >= 0
         member = (self.labels == number - 1).astype(float)[..., None]
         slope, offset = affine_fit(
-            self.reflectance, member, mask, _SOFT * white_of(self.reflectance, mask) ** 2
+            self.reflectance, member, mask, _REGULARISATION * white_of(self.reflectance, mask) ** 2
         )
         share = np.einsum("hwgc,hwg->hwc", slope, self.reflectance)[..., 0] + offset[..., 0]
-        return np.where(mask, np.clip((share - 0.5) / _SURE + 0.5, 0, 1), 0)
+        return np.where(mask, np.clip((share - 0.5) / _SOFT_RANGE + 0.5, 0, 1), 0)
 
 
 def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
@@ -106,29 +106,29 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
         If `count` or `seed` is out of range.
     """
     if count not in range(1, LARGEST_COUNT + 1):
-        raise InputError(f"{count} clusters are not possible: give 1 to {LARGEST_COUNT}")
+        raise InputError(f"{count} clusters are not possible: choose 1 to {LARGEST_COUNT}")
     if seed < 0:
-        raise InputError(f"{seed} is no seed of random numbers: give 0 or more")
-    seen = np.maximum(d.reflectance * light_color(d), 0)
-    reflectance = seen[d.mask]
-    lab = to_oklab(reflectance / white_of(seen, d.mask))
+        raise InputError(f"{seed} is not a valid seed: choose 0 or more")
+    tinted = np.maximum(d.reflectance * light_color(d), 0)
+    reflectance = tinted[d.mask]
+    lab = to_oklab(reflectance / white_of(tinted, d.mask))
     points = np.stack([_LIGHTNESS * lab[:, 0], *(lab[:, 1:] / np.maximum(lab[:, :1], _DARK)).T], -1)
     centers = _means(points[:: max(1, len(points) // _SAMPLES)], count, np.random.default_rng(seed))
-    labels = _joined(centers)[_nearest(points, centers)]
+    labels = _merged(centers)[_nearest(points, centers)]
     sizes = np.bincount(labels, minlength=len(centers))
     order = np.argsort(-sizes, kind="stable")[: int((sizes > 0).sum())]
     rank = np.zeros(len(centers), int)
     rank[order] = np.arange(len(order))
-    picture = np.full(d.mask.shape, -1)
-    picture[d.mask] = rank[labels]
+    label_map = np.full(d.mask.shape, -1)
+    label_map[d.mask] = rank[labels]
     colors = np.stack([reflectance[rank[labels] == k].mean(0) for k in range(len(order))])
-    return Clusters(picture, colors, sizes[order] / len(points), seen)
+    return Clusters(label_map, colors, sizes[order] / len(points), tinted)
 
 
-def _joined(centers: np.ndarray) -> np.ndarray:
-    """(K,) for each centre the first one that it is alike to, along a chain of likeness."""
+def _merged(centers: np.ndarray) -> np.ndarray:
+    """(K,) for each centre the first one that it merges with, along chains of close centres."""
     label = np.arange(len(centers))
-    near = np.linalg.norm(centers[:, None] - centers, axis=-1) < _ALIKE
+    near = np.linalg.norm(centers[:, None] - centers, axis=-1) < _MERGE_DISTANCE
     for i, j in np.argwhere(near):
         label[label == label[j]] = min(label[i], label[j])
         label[label == label[i]] = min(label[i], label[j])
@@ -156,14 +156,14 @@ def _starts(points: np.ndarray, count: int, generator: np.random.Generator) -> n
     centers = [points[generator.integers(len(points))]]
     distance = np.square(points - centers[0]).sum(1)
     while len(centers) < count and distance.max() > 1e-10:
-        tries = generator.choice(len(points), _TRIES, p=distance / distance.sum())
-        totals = [np.minimum(distance, np.square(points - points[i]).sum(1)) for i in tries]
+        candidates = generator.choice(len(points), _CANDIDATES, p=distance / distance.sum())
+        totals = [np.minimum(distance, np.square(points - points[i]).sum(1)) for i in candidates]
         best = int(np.argmin([total.sum() for total in totals]))
-        centers.append(points[tries[best]])
+        centers.append(points[candidates[best]])
         distance = totals[best]
     return np.stack(centers)
 
 
 def _nearest(points: np.ndarray, centers: np.ndarray) -> np.ndarray:
-    # The points' own squares are the same for all centres.
+    # The squares of the points are omitted: they are equal for all centres.
     return np.argmin(np.square(centers).sum(1) - 2 * points @ centers.T, axis=1)

@@ -30,9 +30,9 @@ from ..photo import Photo
 from ..scene.decomposition import Decomposition
 from .edited import Edited
 
-_EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white tell little
+_EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white are unreliable
 _CHUNK = 1_000_000  # pixels at a time
-_OFF = 3.0  # pixels of the maps that the object's box may differ
+_BOX_TOLERANCE = 3.0  # pixels of the maps: tolerance between the two boxes
 
 
 def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
@@ -87,27 +87,25 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
     InputError
         If the photo or its mask is not that of the result.
     """
-    stated = d.provenance.input.get("scale")
+    recorded = d.provenance.input.get("scale")
     size = d.provenance.input.get("size")
-    if not isinstance(stated, int | float) or not 0 < stated <= 1 or not isinstance(size, list):
+    if not isinstance(recorded, int | float) or not 0 < recorded <= 1 or not isinstance(size, list):
         raise InputError(
-            "the result does not say at which scale of its photo the maps are: decompose the photo "
-            "again"
+            "the result does not record the scale of its maps: decompose the photo again"
         )
     height, width = photo.mask.shape
-    expected = tuple(max(1, int(np.ceil(n * stated - 1e-6))) for n in (height, width))
+    expected = tuple(max(1, int(np.ceil(n * recorded - 1e-6))) for n in (height, width))
     if size != [width, height] or expected != d.mask.shape:
         raise InputError(
             f"the result was made of a photo of {' x '.join(map(str, size))} pixels, this one has "
             f"{width} x {height}: give the same photo"
         )
-    boxes = np.array(mask_box(photo.mask)) * stated, np.array(mask_box(d.mask))
-    if np.abs(boxes[0] - boxes[1]).max() > _OFF:
+    boxes = np.array(mask_box(photo.mask)) * recorded, np.array(mask_box(d.mask))
+    if np.abs(boxes[0] - boxes[1]).max() > _BOX_TOLERANCE:
         raise InputError(
-            "the photo's mask is not the one that the result was made with: give the same mask "
-            "with --mask"
+            "the photo's mask differs from the one of the result: give the same mask with --mask"
         )
-    return float(stated)
+    return float(recorded)
 
 
 def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: float) -> np.ndarray:

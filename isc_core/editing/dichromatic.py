@@ -109,7 +109,7 @@ def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.n
         )
     if change.gamma != 1:
         level = result.max(-1, keepdims=True).astype(float) / white_of(layer, mask)
-        # The factor of gamma < 1 is unbounded at black, where there is nothing to lift.
+        # The factor of gamma < 1 is unbounded at black, which stays unchanged.
         result = result * np.where(level > 1e-6, np.maximum(level, 1e-6) ** (change.gamma - 1), 0)
     return result if change.gain == 1 else result * change.gain
 

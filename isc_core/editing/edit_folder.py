@@ -22,7 +22,7 @@ from ..io.atomic import new_folder, require_writable
 from ..io.decoders import write_png
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
-from ..result_files.contact_sheet import Panel, Shown, edit_sheet
+from ..result_files.contact_sheet import MapPanel, Panel, edit_sheet
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
 from .compositing import composite
@@ -126,13 +126,13 @@ def save_edit(
     """
     image, mask, before, raster = _picture(d, edit, original)
     pair = [
-        Shown(before, mask, "Before"),
-        Shown(image, mask, "After" if sheet.layers else "In the best light"),
+        MapPanel(before, mask, "Before"),
+        MapPanel(image, mask, "After" if sheet.layers else "In the best light"),
     ]
     layers = (
         [
-            Shown(edit.diffuse, d.mask, "Diffuse, after"),
-            Shown(edit.specular, d.mask, "Specular, after"),
+            MapPanel(edit.diffuse, d.mask, "Diffuse, after"),
+            MapPanel(edit.specular, d.mask, "Specular, after"),
         ]
         if sheet.layers
         else []
@@ -164,8 +164,8 @@ def save_edit(
 def _linear_planes(
     image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None
 ) -> dict[str, np.ndarray]:
-    """R, G, B times alpha, and A; outside the mask what the photo's own EXR file stores, which that
-    product may round.
+    """R, G, B times alpha, and A; outside the mask the values of the photo's EXR file, which that
+    product could round.
     """
     alpha = raster.alpha
     cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
@@ -195,15 +195,15 @@ def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
     PIL.Image.Image
     """
     reflectance = d.reflectance * light_color(d)
-    shown = [Shown(reflectance, d.mask, "Reflectance")]
+    maps = [MapPanel(reflectance, d.mask, "Reflectance")]
     for number, share in enumerate(clusters.shares, 1):
         weight = clusters.weight(number)[..., None]
         grey = np.full(3, _FADED * white_of(reflectance, d.mask))
         values = weight * reflectance + (1 - weight) * grey
-        shown.append(
-            Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object")
+        maps.append(
+            MapPanel(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object")
         )
-    return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", shown)
+    return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", maps)
 
 
 def _picture(

@@ -1,4 +1,4 @@
-"""The result of an edit: the edited layers, and the picture that they make.
+"""The result of an edit: the edited layers, and their image.
 
 Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' +
 residual' where the residual is not negative; it belongs to a highlight and follows it, residual' =
@@ -19,8 +19,8 @@ import numpy as np
 from ..imaging.luminance import luminance
 from ..scene.decomposition import Decomposition
 
-MOST_GAIN = 1e6  # of any layer that is made stronger
-_MOST_LIGHT = 1e30  # far from what single precision cannot hold
+MOST_GAIN = 1e6  # largest gain of a layer
+_MOST_LIGHT = 1e30  # far below the range of single precision
 
 
 @dataclass(frozen=True)

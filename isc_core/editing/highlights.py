@@ -64,7 +64,7 @@ def add_highlight(
         ()
         if facing
         else (
-            "no part of the object mirrors this light to the viewer: there is no highlight to see",
+            "no part of the object reflects this light to the viewer: the highlight is not visible",
         )
     )
     return edited(d, specular=np.where(replacing, 0, d.specular) + new, notes=notes)

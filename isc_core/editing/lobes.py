@@ -19,7 +19,7 @@ from ..shading.lobe_rendering import Lobe
 from ..shading.radiance import directional, radiance
 from .edited import MOST_GAIN
 
-_TOO_BRIGHT = 2.0  # of the photo's white: kept energy never asks for more at a lobe's centre
+_MAX_CENTRE = 2.0  # of the photo's white: limit of a lobe's centre when its energy is preserved
 
 
 def known_lobe(d: Decomposition) -> Lobe | None:
@@ -74,7 +74,7 @@ def strength_of(d: Decomposition, lobe: Lobe, unscaled: np.ndarray, level: float
     unit_level = white / _centre(Lobe())
     present, rendered = luminance(d.specular[d.mask]).sum(), luminance(unscaled[d.mask]).sum()
     if level is None and present > 0 and rendered > 0:
-        return float(min(present / rendered, _TOO_BRIGHT * white / _centre(lobe)))
+        return float(min(present / rendered, _MAX_CENTRE * white / _centre(lobe)))
     return unit_level * (1.0 if level is None else level)
 
 

@@ -54,12 +54,9 @@ class ColourEdit:
         if self.target is not None:
             check_range("colour", self.target, 0, 1)
             if np.shape(self.target) != (3,):
-                raise InputError("a target colour has three numbers")
+                raise InputError("a target colour needs three numbers")
         if self.target_luminance and (self.target is None or not np.any(self.target)):
-            raise InputError(
-                "the brightness of a target colour is to be taken, but there is none, or it is "
-                "black"
-            )
+            raise InputError("target_luminance needs a target colour that is not black")
 
     @property
     def changes(self) -> bool:
@@ -93,13 +90,13 @@ def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = N
     """
     if region is not None and region.shape != d.mask.shape:
         raise InputError(
-            f"the region is {region.shape}, the maps {d.mask.shape}: give one of their size"
+            f"the region is {region.shape}, the maps are {d.mask.shape}: use a region of their size"
         )
     weight = np.where(d.mask, 1.0 if region is None else region, 0.0)
     check_range("the region's weight", weight, 0, 1)
     if not weight.any():
         raise InputError(
-            "the region holds nothing of the object: mark the part to be recoloured in white"
+            "the region does not overlap the object: mark the part to recolour in white"
         )
     if not change.changes:
         return edited(d)
@@ -107,13 +104,13 @@ def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = N
     share = weight[inside][:, None]
     tint = light_color(d)
     old = np.maximum(d.reflectance[inside] * tint, 0)
-    new = repainted(old, change, _room(d, tint), share)
+    new = change_colours(old, change, _max_level(d, tint), share)
     diffuse = d.diffuse.copy()
     diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * (d.shading[inside] / tint)
     return edited(d, diffuse)
 
 
-def repainted(
+def change_colours(
     colors: np.ndarray, change: ColourEdit, white: float, weight: np.ndarray
 ) -> np.ndarray:
     """Change colours.
@@ -139,40 +136,42 @@ def repainted(
         np.hypot(lab[:, 1], lab[:, 2]),
         np.arctan2(lab[:, 2], lab[:, 1]),
     )
-    wanted = change.value * old
+    target_level = change.value * old
     if change.target is not None:
-        goal = to_oklab(np.maximum(change.target, 1e-6))
-        chroma = float(np.hypot(goal[1], goal[2])) * lightness / float(goal[0])
-        hue = np.full_like(hue, np.arctan2(goal[2], goal[1]))
+        target_lab = to_oklab(np.maximum(change.target, 1e-6))
+        chroma = float(np.hypot(target_lab[1], target_lab[2])) * lightness / float(target_lab[0])
+        hue = np.full_like(hue, np.arctan2(target_lab[2], target_lab[1]))
         if change.target_luminance:
             mean = float((weight[:, 0] * old).sum() / weight.sum())
-            wanted = wanted * float(luminance(change.target)) / max(mean, 1e-9)
+            target_level = target_level * float(luminance(change.target)) / max(mean, 1e-9)
     hue, chroma = hue + np.deg2rad(change.hue), chroma * change.saturation
     color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
     return _at_luminance(
-        np.maximum(color, 0), wanted, np.maximum(white * max(change.value, 1.0), colors.max(-1))
+        np.maximum(color, 0),
+        target_level,
+        np.maximum(white * max(change.value, 1.0), colors.max(-1)),
     )
 
 
-def _room(d: Decomposition, tint: np.ndarray) -> float:
-    """How bright a colour may become: as the object's brightest, or as what the photo shows white in
-    the object's brightest light.
+def _max_level(d: Decomposition, tint: np.ndarray) -> float:
+    """Largest value of a new colour: the object's brightest, or the one that reaches the photo's
+    white in the object's brightest light.
     """
     float_photo = d.provenance.input.get("bit_depth", 8) == 32
     white = white_of(d.image, d.mask) if float_photo else 1.0
     return max(white_of(d.reflectance * tint, d.mask), white / white_of(d.shading / tint, d.mask))
 
 
-def _at_luminance(color: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Colours (N, 3) >= 0 scaled to the luminance `wanted` (N,), and mixed with the grey of it
-    where a channel would exceed `most` (N,).
+def _at_luminance(color: np.ndarray, target_level: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Colours (N, 3) >= 0 scaled to the luminance `target_level` (N,), and mixed with the grey of
+    that luminance where a channel would exceed `most` (N,).
     """
-    now = luminance(color)
-    grey = np.broadcast_to(wanted[:, None], color.shape)
+    current = luminance(color)
+    grey = np.broadcast_to(target_level[:, None], color.shape)
     scaled = np.where(
-        now[:, None] > 1e-12, color * (wanted / np.maximum(now, 1e-12))[:, None], grey
+        current[:, None] > 1e-12, color * (target_level / np.maximum(current, 1e-12))[:, None], grey
     )
-    excess = scaled.max(-1) - wanted
-    room = np.maximum(most - wanted, 0)
-    share = np.where(excess > room, room / np.maximum(excess, 1e-12), 1)[:, None]
+    excess = scaled.max(-1) - target_level
+    headroom = np.maximum(most - target_level, 0)
+    share = np.where(excess > headroom, headroom / np.maximum(excess, 1e-12), 1)[:, None]
     return grey + share * (scaled - grey)

@@ -40,10 +40,10 @@ from .edited import Edited, edited, light_color
 from .lobes import known_lobe, strength_of
 
 HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
-_MOST = 4.0  # times: how much brighter scaling makes a highlight
-_ROWS = 32  # of environments that matt surfaces are lit by
-_LOBE_ROWS = 16  # and of those that a lobe is rendered in, where every sample costs
-_FADE = 10.0  # degrees that a light moves until its highlights are new ones
+_MAX_SCALE = 4.0  # largest factor by which scaling brightens a highlight
+_ROWS = 32  # of environment maps for diffuse shading
+_LOBE_ROWS = 16  # of environment maps for lobes, where every sample is costly
+_FADE = 10.0  # degrees of a light's motion over which highlights change from kept to rendered
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,14 @@ class NewLight:
     directional : DirectionalLight or None
     environment : (rows, 2 rows, 3) ndarray or None
         Environment map of linear radiance, not negative.
-    turned : (3, 3) ndarray or None
+    rotation : (3, 3) ndarray or None
         Rotation from the recovered light to `coefficients`; None for another light.
     """
 
     coefficients: np.ndarray | None = None
     directional: DirectionalLight | None = None
     environment: np.ndarray | None = None
-    turned: np.ndarray | None = None
+    rotation: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if (
@@ -74,7 +74,7 @@ class NewLight:
             != 1
         ):
             raise InputError(
-                "a new light is one of: coefficients, one distant light, an environment"
+                "a new light needs exactly one of coefficients, directional and environment"
             )
         if self.environment is not None:
             rows = len(self.environment)
@@ -92,17 +92,19 @@ class NewLight:
             return sh_shading(normals, self.coefficients)
         if self.directional is not None:
             return self.directional.shading(normals)
-        return shading_under(np.asarray(self._sky(_ROWS), float), np.asarray(normals, float))
+        return shading_under(
+            np.asarray(self._environment(_ROWS), float), np.asarray(normals, float)
+        )
 
     def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
         """Return the radiance (N, 3) of a lobe of strength 1 on unit normals (N, 3)."""
         if self.directional is not None:
             ambient = np.broadcast_to(self.directional.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
-            under = lobe_under(lobe, normals, self.directional)
-            return under + lobe_in_environment(lobe, normals, ambient)
-        return lobe_in_environment(lobe, normals, self._sky(_LOBE_ROWS))
+            direct = lobe_under(lobe, normals, self.directional)
+            return direct + lobe_in_environment(lobe, normals, ambient)
+        return lobe_in_environment(lobe, normals, self._environment(_LOBE_ROWS))
 
-    def _sky(self, rows: int) -> np.ndarray:
+    def _environment(self, rows: int) -> np.ndarray:
         if self.coefficients is not None:
             return environment_from_shading(self.coefficients, rows)
         assert self.environment is not None
@@ -172,8 +174,8 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     new = light.shading(normals)
     if not luminance(new).any():
         raise InputError(
-            "no part of the object sees the new light: bring it to the front, or give it an "
-            "ambient rest"
+            "the new light reaches no visible part of the object: move it to the front, or add "
+            "ambient light"
         )
     old = d.shading[d.mask].astype(float)
     factor = np.full(3, choice.exposure)
@@ -187,11 +189,11 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
                 / luminance(d.reflectance[d.mask] * new * tint).sum()
             )
         )
-    turned = np.eye(3) if same else light.turned
+    rotation = np.eye(3) if same else light.rotation
     highlights, note = _highlights(
-        d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, turned
+        d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, rotation
     )
-    diffuse = d.diffuse if untouched else d.reflectance * _spread(new * factor, d.mask)
+    diffuse = d.diffuse if untouched else d.reflectance * _as_map(new * factor, d.mask)
     return edited(d, diffuse, highlights, (note,) if note else ())
 
 
@@ -202,14 +204,14 @@ def _highlights(
     normals: np.ndarray,
     ratio: np.ndarray,
     factor: np.ndarray,
-    turned: np.ndarray | None,
+    rotation: np.ndarray | None,
 ) -> tuple[np.ndarray, str]:
-    """The new specular layer, and what to say of it.
+    """The new specular layer, and a note on it.
 
-    `turned` (3, 3): how the present light became this one, None for another one.
+    `rotation` (3, 3): from the present light to this one; None for an unrelated light.
     """
     lobe = choice.lobe or known_lobe(d)
-    how = (
+    mode = (
         choice.highlights
         if choice.highlights != "auto"
         else "render"
@@ -217,64 +219,64 @@ def _highlights(
         else "scale"
     )
     present = d.specular
-    if how == "keep" or not present[d.mask].any():
+    if mode == "keep" or not present[d.mask].any():
         return present, ""
-    if how == "remove":
+    if mode == "remove":
         return np.zeros_like(present), ""
-    if how == "scale":
-        told = (
+    if mode == "scale":
+        note = (
             ""
             if choice.highlights == "scale"
             else "no lobe is known, so the highlights follow the shading and do not move"
         )
-        return _spread(present[d.mask] * np.minimum(ratio, _MOST), d.mask), told
+        return _as_map(present[d.mask] * np.minimum(ratio, _MAX_SCALE), d.mask), note
     lobe = lobe or Lobe()
-    lamp = None if turned is None else _lamp(d)
-    if lamp is None or turned is None:
+    source = None if rotation is None else _dominant_light(d)
+    if source is None or rotation is None:
         before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
-        told = (
+        note = (
             ""
             if light.coefficients is None
             else "the highlights are rendered in a smooth light, so they are broad"
         )
-        return _spread(strength * factor * light.lobe(lobe, normals), d.mask), told
-    moved = replace(lamp, direction=turned @ lamp.direction)
-    before, after = (_spread(lobe_under(lobe, normals, one), d.mask) for one in (lamp, moved))
-    kept = (
-        _still(lamp.direction, moved.direction)
+        return _as_map(strength * factor * light.lobe(lobe, normals), d.mask), note
+    moved = replace(source, direction=rotation @ source.direction)
+    before, after = (_as_map(lobe_under(lobe, normals, one), d.mask) for one in (source, moved))
+    still = (
+        _kept_share(source.direction, moved.direction)
         if choice.highlights == "auto" and choice.lobe is None
         else 0.0
     )
-    return factor * (kept * present + (1 - kept) * strength_of(d, lobe, before, None) * after), ""
+    return factor * (still * present + (1 - still) * strength_of(d, lobe, before, None) * after), ""
 
 
-def _lamp(d: Decomposition) -> DirectionalLight | None:
-    """The one light that the highlights come from, of luminance 1 across its beam, or None where
-    nothing tells it.
+def _dominant_light(d: Decomposition) -> DirectionalLight | None:
+    """The light that causes the highlights, with luminance 1 perpendicular to its beam; None if it
+    is unknown.
     """
-    found = explain_specular(d)
+    fit = explain_specular(d)
     lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
-    if not found.determined and not lights:
+    if not fit.determined and not lights:
         return None
-    if found.determined:
-        direction, color = found.light.direction, found.light.irradiance
+    if fit.determined:
+        direction, color = fit.light.direction, fit.light.irradiance
     else:
         direction, color = lights[0].direction, lights[0].strength_light
     return DirectionalLight(direction, color / max(float(luminance(color)), 1e-12))
 
 
-def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _as_map(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """`values` (N, 3) of the mask's pixels as a map (H, W, 3)."""
     layer = np.zeros((*mask.shape, 3))
     layer[mask] = values
     return layer
 
 
-def _still(before: np.ndarray, after: np.ndarray) -> float:
-    """The share of the present highlights that stays when their light moves from one unit vector to
+def _kept_share(before: np.ndarray, after: np.ndarray) -> float:
+    """The share of the present highlights to keep when their light moves from one unit vector to
     another.
     """
-    # Of the chord: exact for the smallest angles.
+    # From the chord, which is accurate for small angles.
     angle = np.degrees(2 * np.arcsin(min(float(np.linalg.norm(after - before)) / 2, 1.0)))
     return float(np.exp(-np.square(angle / _FADE)))

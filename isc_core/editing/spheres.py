@@ -29,7 +29,7 @@ def sphere_normals(size: int) -> tuple[np.ndarray, np.ndarray]:
     distance = np.hypot(x, y)
     shrink = np.minimum(
         1, 1 / np.maximum(distance, 1e-9)
-    )  # beyond the outline its normal, for the pixels that it crosses
+    )  # outside the outline: its normal, for the pixels that it crosses
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
     return normal, np.clip((1 - distance) * radius + 0.5, 0, 1)
 

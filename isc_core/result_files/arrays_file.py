@@ -73,7 +73,7 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     arrays = arrays_of(
         d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, bounded_specular(d))
     )
-    with path.open("wb") as file:  # given a name, NumPy would add a suffix to it
+    with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 
 

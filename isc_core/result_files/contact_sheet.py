@@ -1,4 +1,4 @@
-"""The contact sheet: one picture that shows a result, before anything else is opened.
+"""The contact sheet: one image with all maps of a result.
 
 Exposure: input, diffuse and specular share one exposure, so that they can be compared; reflectance
 has its own, and so has shading, which the light shares unless it would be too bright. An exposure
@@ -34,7 +34,7 @@ _TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
     (0.06, 0.3, 1.0),
     (0.06, 0.06, 0.06),
 )  # linear
-_FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
+_FULL_ERROR = 0.1  # of the photo's white: errors above it have the full colour
 
 
 @dataclass(frozen=True)
@@ -69,13 +69,13 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     """
     d = decomposition
     frame = _Frame.around(d.mask)
-    photo, paint, light = (
+    photo, albedo, light = (
         _exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
     )
     ball, coverage = _ball(d.illumination)
     ball_light = min(
         light, _exposure(ball[coverage > 0.5])
-    )  # the ball also shows directions that the object does not
+    )  # the ball shows more directions than the object
     colors = [
         (d.image, photo, "Input", ""),
         (d.diffuse, photo, "Diffuse", ""),
@@ -85,7 +85,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
             "Specular",
             f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light",
         ),
-        (d.reflectance, paint, "Reflectance", ""),
+        (d.reflectance, albedo, "Reflectance", ""),
         (d.shading, light, "Shading", ""),
     ]
     panels = [
@@ -101,7 +101,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
         )
     )
     panels.append(_relief(d, frame))
-    panels.append(Panel(ball_light * ball, coverage, "Light", "on a white ball"))
+    panels.append(Panel(ball_light * ball, coverage, "Light", "on a white sphere"))
     return _sheet(*_title(d), panels, columns=4)
 
 
@@ -159,8 +159,8 @@ def separation_sheet(
 
 
 @dataclass(frozen=True)
-class Answer:
-    """A separation to be compared with others: the method's name, a faint remark, the layers."""
+class LabelledSeparation:
+    """A separation to compare with others: the method's name, a remark in grey, and the layers."""
 
     label: str
     remark: str
@@ -171,7 +171,7 @@ def comparison_sheet(
     title: str,
     image: np.ndarray,
     mask: np.ndarray,
-    answers: Sequence[Answer],
+    separations: Sequence[LabelledSeparation],
     truth: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Image.Image:
     """Draw many separations of one photo: diffuse layer, specular layer and error of each.
@@ -179,7 +179,7 @@ def comparison_sheet(
     Errors of the diffuse layer are orange where too much light remains and blue where too much was
     removed, saturated from a tenth of the photo's white. Without ground truth the confidence takes
     their place, white where it is 1. The first three panels are the photo and the ground truth, or
-    the photo, its smallest channel and its chromaticity, which is all that methods by colour see.
+    the photo, its smallest channel and its chromaticity, the inputs of colour-based methods.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def comparison_sheet(
     image : (H, W, 3) ndarray
         Linear.
     mask : (H, W) bool ndarray
-    answers : sequence
+    separations : sequence
         Separations to compare, with labels.
     truth : tuple of (H, W, 3) ndarray, optional
         The true diffuse and specular layer.
@@ -214,11 +214,11 @@ def comparison_sheet(
             panel(gain * truth[1], "True specular", share),
         )
     panels = [panel(gain * image, "Input"), *second]
-    for answer in answers:
-        split = answer.split
+    for entry in separations:
+        split = entry.split
         share = f"{100 * _share(split.specular, image, mask):.1f} % of the light"
         panels += [
-            panel(gain * split.diffuse, answer.label, answer.remark),
+            panel(gain * split.diffuse, entry.label, entry.remark),
             panel(gain * split.specular, "Specular", share),
         ]
         if truth is None:
@@ -232,19 +232,19 @@ def comparison_sheet(
                 panel(
                     _error_colors(gain * (split.diffuse - truth[0])),
                     "Error",
-                    "orange: left over, blue: overdone",
+                    "orange: too little removed, blue: too much",
                 )
             )
     return _sheet(
         title,
-        f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations",
+        f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(separations)} separations",
         panels,
         columns=6,
     )
 
 
 @dataclass(frozen=True)
-class Shown:
+class MapPanel:
     """A map of the object on a sheet.
 
     Attributes
@@ -253,26 +253,30 @@ class Shown:
         Linear.
     mask : (H, W) bool ndarray
     label, remark : str
-    own : bool
-        In an exposure of its own.
+    own_exposure : bool
+        Scale to its own exposure instead of the first map's.
     """
 
     values: np.ndarray
     mask: np.ndarray
     label: str
     remark: str = ""
-    own: bool = False
+    own_exposure: bool = False
 
 
 def edit_sheet(
-    title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4
+    title: str,
+    subtitle: str,
+    maps: Sequence[MapPanel],
+    others: Sequence[Panel] = (),
+    columns: int = 4,
 ) -> Image.Image:
     """Draw the sheet of an edit.
 
     Parameters
     ----------
     title, subtitle : str
-    maps : sequence of Shown
+    maps : sequence of MapPanel
         In the exposure of the first of them.
     others : sequence of Panel
         (320, 320) pixels each, unchanged.
@@ -284,13 +288,13 @@ def edit_sheet(
     """
     first = _exposure(maps[0].values[maps[0].mask])
     panels = []
-    for shown in maps:
+    for entry in maps:
         frame, gain = (
-            _Frame.around(shown.mask),
-            _exposure(shown.values[shown.mask]) if shown.own else first,
+            _Frame.around(entry.mask),
+            _exposure(entry.values[entry.mask]) if entry.own_exposure else first,
         )
         panels.append(
-            Panel(gain * frame.scaled(shown.values), frame.coverage, shown.label, shown.remark)
+            Panel(gain * frame.scaled(entry.values), frame.coverage, entry.label, entry.remark)
         )
     panels += others
     return _sheet(title, subtitle, panels, min(columns, len(panels)))
@@ -307,8 +311,8 @@ def _error_colors(error: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Frame:
-    """How a map gets into a panel: the object's box, (first row, end row, first column, end
-    column), is scaled by `zoom` to its middle.
+    """Placement of a map in a panel: the object's box, (first row, end row, first column, end
+    column), scaled by `zoom` and centred.
     """
 
     mask: np.ndarray
@@ -323,8 +327,8 @@ class _Frame:
 
     @property
     def coverage(self) -> np.ndarray:
-        """How much of each pixel of the panel, (N, N), the object covers; a small object's outline
-        is rounded, not shown in steps.
+        """Coverage of each pixel of the panel, (N, N), by the object; the outline of a small object
+        is smoothed.
         """
         zoom = max(1.0, self.zoom)
         soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
@@ -333,8 +337,8 @@ class _Frame:
         return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
-        """A map, (H, W) or (H, W, C), as it appears in the panel, (N, N) or (N, N, C); 0 where the
-        mask is not.
+        """A map, (H, W) or (H, W, C), scaled to the panel, (N, N) or (N, N, C); 0 outside the
+        mask.
         """
         if values.ndim == 3:
             return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
@@ -347,7 +351,7 @@ class _Frame:
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
         first_row, end_row, first_column, end_column = self.box
-        # A border of nothing, so that the object's outline is soft all around.
+        # An empty border, so that the object's outline is soft all around.
         window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
         height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
         panel = np.zeros((_PANEL, _PANEL))
@@ -377,29 +381,29 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     distance = np.hypot(x, y)
     shrink = np.minimum(
         1, 1 / np.maximum(distance, 1e-9)
-    )  # beyond the outline: its normal, for the pixels it crosses
+    )  # outside the outline: its normal, for the pixels that it crosses
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
     return np.exp(real_sh(normal) @ illumination), np.clip((1 - distance) * radius + 0.5, 0, 1)
 
 
 def _relief(d: Decomposition, frame: _Frame) -> Panel:
-    """The height under a lamp at the upper left, with contour lines."""
+    """The height map shaded by a light at the upper left, with contour lines."""
     heights = d.height[d.mask]
     low, high = float(heights.min()), float(heights.max())
     spacing = _round_step((high - low) / 12)
     normal = frame.scaled(d.normal)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    lamp = np.array([-0.52, 0.58, 0.63])
-    key, sky = (
-        np.clip((normal @ lamp + 0.3) / 1.3, 0, 1) ** 1.5,
+    light = np.array([-0.52, 0.58, 0.63])
+    key, fill_light = (
+        np.clip((normal @ light + 0.3) / 1.3, 0, 1) ** 1.5,
         0.6 + 0.4 * normal[..., 1],
-    )  # a large lamp: a soft edge of shadow
+    )  # an area light: a soft shadow edge
     height = frame.scaled(d.height)
     tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
-    clay = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
-    color = clay * (
+    base = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
+    color = base * (
         0.95 * key[..., None] * np.array([1.0, 0.97, 0.9])
-        + 0.16 * sky[..., None] * np.array([0.75, 0.88, 1.0])
+        + 0.16 * fill_light[..., None] * np.array([0.75, 0.88, 1.0])
     )
     color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
     return Panel(
@@ -408,8 +412,8 @@ def _relief(d: Decomposition, frame: _Frame) -> Panel:
 
 
 def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
-    """How much of a contour line, [0, 1], lies on each pixel: at whole numbers of `level`, faded
-    where the lines run together.
+    """Coverage of each pixel by contour lines, [0, 1]: at integers of `level`, faded where they
+    converge.
     """
     slope = np.hypot(*np.gradient(level))
     distance = np.abs(level - np.rint(level)) / np.maximum(slope, 1e-6)  # pixels to the line
@@ -418,7 +422,7 @@ def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
 
 
 def _round_step(step: float) -> float:
-    """The nearest of 1, 2, 5 times a power of ten from above; 1 for nothing."""
+    """The smallest of 1, 2, 5 times a power of ten that is at least `step`; 1 for 0."""
     if step <= 0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(step))
@@ -429,23 +433,23 @@ def _title(d: Decomposition) -> tuple[str, str]:
     given, settings = d.provenance.input, d.provenance.settings
     diagnostics = d.provenance.diagnostics
     name = PurePath(str(given.get("name", ""))).name or "Decomposition"
-    words = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
-    words += [
+    parts = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
+    parts += [
         str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)
     ]
     if diagnostics.loss is not None:
-        words.append(f"loss {diagnostics.loss:.2f}")
+        parts.append(f"loss {diagnostics.loss:.2f}")
     if diagnostics.converged is not None:
-        words.append("converged" if diagnostics.converged else "stopped early")
+        parts.append("converged" if diagnostics.converged else "stopped early")
     if d.brdf is not None:
-        words.append(_gloss(d.brdf))
+        parts.append(_gloss(d.brdf))
     if diagnostics.warnings:
-        words.append("unreliable, see status.warnings")
-    return name, "   ·   ".join(words)
+        parts.append("unreliable, see status.warnings")
+    return name, "   ·   ".join(parts)
 
 
 def _gloss(fit: LobeFit) -> str:
-    """The fit in a few words; roughness as Blender and glTF count it."""
+    """Summary of the fit; roughness as in Blender and glTF."""
     if fit.blender_roughness is None:
         return (
             "no highlights" if fit.outcome == LobeFitOutcome.NO_SPECULAR else "gloss undetermined"
@@ -488,7 +492,7 @@ def _write(
     *,
     right: bool = False,
 ) -> float:
-    """Writes a line on the base line `place`, cut to `room` pixels; returns where it ends."""
+    """Draw a line of text at the baseline `place`, cut to `room` pixels; return its end."""
     font, text = ImageFont.load_default(size), readable(text)
     if font.getlength(text) > room:
         while text and font.getlength(text + "…") > room:

@@ -1,4 +1,4 @@
-"""The diagnostics of a result as they stand in decomposition.json, read back.
+"""Reading the diagnostics of a result from decomposition.json.
 
 Schema 2 holds what `Diagnostics.to_json` writes. Schema 1 held sentences: the entries "gloss" and
 "joint", and the list "doubts"; they are recognised by their beginnings. The file may be anybody's:
@@ -24,9 +24,9 @@ from ..scene.diagnostics import (
     WarningKind,
 )
 
-_Word = TypeVar("_Word", bound=StrEnum)
+_Member = TypeVar("_Word", bound=StrEnum)
 
-# How the sentences of schema 1 begin, or what they contain.
+# Prefixes and substrings of the sentences of schema 1.
 _OLD_JOINT = (
     ("no highlights but", JointOutcome.UNCHANGED),
     ("continuing the paint under them did not", JointOutcome.REMOVED),
@@ -77,12 +77,13 @@ def diagnostics_from_json(status: Any) -> Diagnostics:
     old = "doubts" in status or "gloss" in status or "kinds" in status
     return Diagnostics(
         converged=converged if isinstance(converged, bool) else None,
-        reason=_word(StopReason, status.get("reason")),
+        reason=_member(StopReason, status.get("reason")),
         loss=_number(status.get("loss")),
         terms=_numbers(status.get("terms")),
         iterations=_count(status.get("iterations")),
         evaluations=_count(status.get("evaluations")),
-        joint=_word(JointOutcome, status.get("joint")) or _said(_OLD_JOINT, status.get("joint")),
+        joint=_member(JointOutcome, status.get("joint"))
+        or _old_meaning(_OLD_JOINT, status.get("joint")),
         lobe=_old_lobe(status.get("gloss")) if old else _lobe(status.get("lobe")),
         light_colour=_light_colour(status.get("light_colour")),
         scene_classes=_numbers(status.get("kinds" if old else "scene_classes")),
@@ -110,40 +111,40 @@ def old_lobe_outcome(reason: str) -> LobeFitOutcome:
     ValueError
         If the sentence is unknown.
     """
-    outcome = _said(_OLD_LOBES, reason)
+    outcome = _old_meaning(_OLD_LOBES, reason)
     if outcome is None:
-        raise ValueError(f"the reason {reason[:80]!r} is not known")
+        raise ValueError(f"unknown reason {reason[:80]!r}")
     return outcome
 
 
 def _lobe(record: Any) -> LobeDiagnostics | None:
     if not isinstance(record, Mapping):
         return None
-    status = _word(LobeStatus, record.get("status"))
+    status = _member(LobeStatus, record.get("status"))
     if status is None:
         return None
     roughness = _triple(record.get("roughness_68"))
-    return LobeDiagnostics(status, _word(LobeFitOutcome, record.get("outcome")), roughness)
+    return LobeDiagnostics(status, _member(LobeFitOutcome, record.get("outcome")), roughness)
 
 
-def _old_lobe(said: Any) -> LobeDiagnostics | None:
-    """Of "roughness 0.24, 0.20 to 0.29 with ...", "roughness at most 0.24: why", or why not."""
-    if not isinstance(said, str):
+def _old_lobe(sentence: Any) -> LobeDiagnostics | None:
+    """Parse "roughness 0.24, 0.20 to 0.29 with ...", "roughness at most 0.24: why", or a reason."""
+    if not isinstance(sentence, str):
         return None
-    if said.startswith("not fitted"):
+    if sentence.startswith("not fitted"):
         return LobeDiagnostics(LobeStatus.NOT_FITTED)
-    if said.startswith("next to no highlights"):
+    if sentence.startswith("next to no highlights"):
         return LobeDiagnostics(LobeStatus.NO_HIGHLIGHTS, LobeFitOutcome.NO_SPECULAR)
-    if "too bright to show" in said:
+    if "too bright to show" in sentence:
         return LobeDiagnostics(LobeStatus.HIDDEN, LobeFitOutcome.NO_SPECULAR)
-    values = [float(number) for number in _DECIMALS.findall(said)]
-    if said.startswith("roughness at most") and values:
-        outcome = _said(_OLD_LOBES, said)
+    values = [float(number) for number in _DECIMALS.findall(sentence)]
+    if sentence.startswith("roughness at most") and values:
+        outcome = _old_meaning(_OLD_LOBES, sentence)
         return LobeDiagnostics(LobeStatus.FITTED, outcome, (0.0, values[0], values[0]))
-    if said.startswith("roughness") and len(values) >= 3:
+    if sentence.startswith("roughness") and len(values) >= 3:
         likely, low, high = values[:3]
         return LobeDiagnostics(LobeStatus.FITTED, LobeFitOutcome.DETERMINED, (low, likely, high))
-    outcome = _said(_OLD_LOBES, said)
+    outcome = _old_meaning(_OLD_LOBES, sentence)
     return None if outcome is None else LobeDiagnostics(LobeStatus.FITTED, outcome)
 
 
@@ -151,7 +152,7 @@ def _light_colour(record: Any) -> LightColourDiagnostics | None:
     if not isinstance(record, Mapping):
         return None
     estimate, confidence = _triple(record.get("estimate")), _number(record.get("confidence"))
-    outcome = _word(IlluminantOutcome, record.get("outcome")) or _said(
+    outcome = _member(IlluminantOutcome, record.get("outcome")) or _old_meaning(
         _OLD_LIGHTS, record.get("reason")
     )
     if estimate is None or confidence is None or outcome is None:
@@ -168,28 +169,32 @@ def _light_colour(record: Any) -> LightColourDiagnostics | None:
 
 def _warnings(records: Any) -> tuple[AssumptionWarning, ...]:
     given = (
-        [one for one in records if isinstance(one, Mapping)] if isinstance(records, list) else []
+        [record for record in records if isinstance(record, Mapping)]
+        if isinstance(records, list)
+        else []
     )
-    found = [(_word(WarningKind, one.get("kind")), _number(one.get("value"))) for one in given]
+    found = [
+        (_member(WarningKind, record.get("kind")), _number(record.get("value"))) for record in given
+    ]
     return tuple(AssumptionWarning(kind, value) for kind, value in found if kind is not None)
 
 
 def _old_warnings(lines: Any) -> tuple[AssumptionWarning, ...]:
     found = []
     for line in lines if isinstance(lines, list) else []:
-        kind = _said(_OLD_WARNINGS, line)
+        kind = _old_meaning(_OLD_WARNINGS, line)
         if kind is not None:
             share = _PERCENT.search(line)
             found.append(AssumptionWarning(kind, share and int(share[1]) / 100))
     return tuple(found)
 
 
-def _said(words: tuple[tuple[str, _Word], ...], sentence: Any) -> _Word | None:
+def _old_meaning(table: tuple[tuple[str, _Member], ...], sentence: Any) -> _Member | None:
     text = sentence if isinstance(sentence, str) else ""
-    return next((meaning for part, meaning in words if part in text), None)
+    return next((meaning for part, meaning in table if part in text), None)
 
 
-def _word(kind: type[_Word], value: Any) -> _Word | None:
+def _member(kind: type[_Member], value: Any) -> _Member | None:
     return kind(value) if isinstance(value, str) and value in kind.__members__.values() else None
 
 

@@ -48,7 +48,7 @@ _LOBE = {
 _LOBE_STATUS = {
     LobeStatus.NOT_FITTED: "not fitted: the separator none leaves no highlights to fit it to",
     LobeStatus.NO_HIGHLIGHTS: (
-        "next to no highlights: the object is diffuse, or its highlights cannot be distinguished "
+        "hardly any highlights: the object is diffuse, or its highlights cannot be distinguished "
         "from its albedo"
     ),
     LobeStatus.HIDDEN: "undetermined: clipping hides the highlights",

@@ -14,7 +14,7 @@ from ..io.npy import read_array
 from ..photo import read_raster
 from .result_folder import load
 
-CODE = 1 / 64  # photo pixels to one code of an integer file: 16 bits reach 1024 pixels
+CODE = 1 / 64  # photo pixels per code of an integer file: 16 bits span 1024 pixels
 _EXR = b"\x76\x2f\x31\x01"
 _NUMPY = b"\x93NUMPY"
 _CHANNELS = ("height.Z", "Z", "Y", "height.Y")
@@ -51,11 +51,11 @@ def read_height(
     if height.shape != shape:
         raise InputError(
             f"{path}: the height map is {_size(height.shape)} pixels, the photo {_size(shape)}: "
-            "give one of the photo's size"
+            "use one of the photo's size"
         )
     height = np.where(np.isfinite(height), height, np.nan) * (unit if scale is None else scale)
     if not np.isfinite(height).any():
-        raise InputError(f"{path}: the height map has no value anywhere, only holes")
+        raise InputError(f"{path}: the height map has no finite value")
     return height
 
 
@@ -80,20 +80,20 @@ def read_light(path: str | Path) -> np.ndarray:
     """
     path = Path(path)
     path = path / "decomposition.json" if path.is_dir() else path
-    found: Any = read_json(path, "a light is a decomposition.json or 9 lists of 3 numbers")
+    data: Any = read_json(path, "a light is a decomposition.json or 9 lists of 3 numbers")
     for key in ("illumination", "coefficients"):
-        found = found[key] if isinstance(found, dict) and key in found else found
-    light = numbers(found, (9, 3))
+        data = data[key] if isinstance(data, dict) and key in data else data
+    light = numbers(data, (9, 3))
     if light is None:
         raise InputError(
-            f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each "
+            f"{path} is not a light: expected 9 lists of 3 numbers, red, green and blue of each "
             "spherical harmonic"
         )
     return light
 
 
 def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
-    """The map as stored and its usual unit in photo pixels."""
+    """The map as stored, and its default unit in photo pixels."""
     try:
         with path.open("rb") as file:
             start = file.read(8)
@@ -106,8 +106,8 @@ def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     raster = read_raster(path, limits)
     if raster.values.shape[2] != 1 or raster.bit_depth < 16:
         raise InputError(
-            f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit "
-            "PNG, a TIFF, an EXR or .npy"
+            f"{path}: a height map needs one channel of 16 bits or more: save it as a grey 16-bit "
+            "PNG, TIFF, EXR or .npy"
         )
     values = raster.values[..., 0].astype(np.float64)
     return (values, 1.0) if raster.peak is None else (np.where(values > 0, values, np.nan), CODE)
@@ -121,7 +121,7 @@ def _of_exr(path: Path, limits: Limits) -> np.ndarray:
     )
     if name is None:
         raise InputError(
-            f"{path}: has no channel Y, Z or height.Z but {', '.join(list(channels)[:8])}: save "
+            f"{path}: no channel Y, Z or height.Z, only {', '.join(list(channels)[:8])}: save "
             "the height as one of these"
         )
     height = channels[name].astype(np.float64)
@@ -142,22 +142,21 @@ def _of_numpy(path: Path, limits: Limits) -> np.ndarray:
 
 
 def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
-    """A result's height on the photo's grid, NaN outside its mask; the nearest sample, so that its
-    holes do not grow.
+    """A result's height on the photo's grid, NaN outside its mask; nearest samples, to keep holes
+    from growing.
     """
     result = load(folder)
     scale = result.provenance.input.get("scale")
     if not isinstance(scale, int | float) or not 0 < scale <= 1:
         raise InputError(
-            f"{folder / 'decomposition.json'} does not say at which scale its maps are: it is "
-            "damaged"
+            f"{folder / 'decomposition.json'} has no usable input.scale: it is damaged"
         )
     if tuple(int(np.ceil(n * scale - 1e-6)) for n in shape) != result.mask.shape:
         raise InputError(
-            f"{folder} is the result of a photo of another size than {_size(shape)}: give one of "
-            "this photo"
+            f"{folder} is the result of a photo of another size than {_size(shape)}: use a result "
+            "of this photo"
         )
-    # As the map will be brought to the working grid, so that going there and back changes nothing.
+    # The inverse of the resampling to the working grid, so that a round trip changes nothing.
     return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale
 
 

@@ -9,7 +9,7 @@ from ..io.json_files import numbers
 from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
 from .diagnostics_json import old_lobe_outcome
 
-_LENGTH = 1e-3  # that a direction's may differ from 1
+_LENGTH_TOLERANCE = 1e-3  # tolerance of the length of a direction
 
 
 def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
@@ -32,7 +32,7 @@ def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> Lobe
     """
     alpha, strength = record["alpha"], record["strength"]
     if record["model"] not in CONVENTION.values():
-        raise ValueError(f"the lobe {str(record['model'])[:80]!r} is not known")
+        raise ValueError(f"unknown lobe {str(record['model'])[:80]!r}")
     if alpha is not None and not 0 < _number(alpha) <= 1:
         raise ValueError(f"alpha is {alpha}, not within (0, 1]")
     return LobeFit(
@@ -53,7 +53,7 @@ def _light(record: Mapping[str, Any]) -> LobeLight:
     if interval is None:
         raise ValueError("a light without an interval")
     direction = _numbers(record["direction"], (3,))
-    if abs(float(np.linalg.norm(direction)) - 1) > _LENGTH:
+    if abs(float(np.linalg.norm(direction)) - 1) > _LENGTH_TOLERANCE:
         raise ValueError("the direction of a light is not of length 1")
     return LobeLight(
         direction,
@@ -93,7 +93,7 @@ def _number(value: Any) -> float:
 
 
 def _outcome(record: Mapping[str, Any]) -> LobeFitOutcome:
-    """The outcome; of records of schema 1, which have a sentence instead, its meaning."""
+    """The outcome; records of schema 1 have a sentence instead, which is translated."""
     if not isinstance(record["determined"], bool):
         raise ValueError(f"{record['determined']} instead of true or false")
     if "outcome" not in record:

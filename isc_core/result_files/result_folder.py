@@ -1,4 +1,4 @@
-"""The folder of a result: what other programs read and what a person opens first.
+"""The folder of a result: maps, mesh, preview and provenance.
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
@@ -34,7 +34,7 @@ from .diagnostics_json import diagnostics_from_json
 from .lobe_json import lobe_fit_from_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 
-SCHEMA_VERSION = 2  # 2: diagnostics are values, no sentences
+SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
 LAYERS = {
     **dict.fromkeys(COLOR_MAPS, "RGB"),
     "normal": "XYZ",
@@ -58,10 +58,10 @@ DECOMPOSITION_FILES = (
     "preview.png",
     *(f"maps/{name}.exr" for name in SINGLE),
 )
-_OURS = (*DECOMPOSITION_FILES, ARRAYS)  # what may stand there besides is written on demand
+_RESULT_FILES = (*DECOMPOSITION_FILES, ARRAYS)  # including files written on demand
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
-_LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
-_ARRAY_BYTES_A_PIXEL = 129  # its maps are not compressed
+_LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
+_ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
 SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
 
 
@@ -99,7 +99,7 @@ def save(
         channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
     if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
-    with new_folder(folder, _OURS) as partial:
+    with new_folder(folder, _RESULT_FILES) as partial:
         monitor.report("writing maps", 0.0)
         write_channels(partial / "maps.exr", channels)
         (partial / "maps").mkdir()
@@ -216,7 +216,7 @@ def require_writable_result(
     InputError
         If it cannot.
     """
-    require_writable(folder, SEPARATION_FILES if separation else _OURS, inputs)
+    require_writable(folder, SEPARATION_FILES if separation else _RESULT_FILES, inputs)
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
@@ -229,13 +229,15 @@ def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> No
         Of the object.
     arrays : bool
     """
-    place = next(parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists())
-    least = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
-    if (free := shutil.disk_usage(place).free) < least:
+    existing = next(
+        parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists()
+    )
+    required = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
+    if (free := shutil.disk_usage(existing).free) < required:
         raise InputError(
-            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least "
-            f"{least / 1e6:.1f} are needed); "
-            "free some or choose another place"
+            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, "
+            f"{required / 1e6:.1f} MB needed); "
+            "free some space or choose another folder"
         )
 
 
@@ -266,8 +268,8 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """The value in the types of JSON: arrays as lists, paths as text that can be coded, numbers
-    that are not finite as null.
+    """The value in the types of JSON: arrays as lists, paths as printable text, non-finite numbers
+    as null.
     """
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
@@ -308,7 +310,7 @@ def _layers(
         name for group in names.values() for name in group if not np.isfinite(channels[name]).all()
     ]:
         raise InputError(
-            f"{path} holds NaN or infinite values in {broken[0]}: it is damaged; decompose the "
+            f"{path} has NaN or infinite values in {broken[0]}: it is damaged; decompose the "
             "photo again"
         )
     stacks = {
@@ -326,7 +328,7 @@ def _read_json(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} has no schema_version: it is not a result of isc decompose")
     if version > SCHEMA_VERSION:
         raise InputError(
-            f"{path} was written by a newer version (schema {version}, known here: "
+            f"{path} was written by a newer version (schema {version}, this version reads up to "
             f"{SCHEMA_VERSION}): update ISC"
         )
     return dict(description)
@@ -345,7 +347,7 @@ def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
 def _brdf(
     description: Mapping[str, Any], channels: Mapping[str, np.ndarray], folder: Path
 ) -> LobeFit | None:
-    """The fit; None where none was tried, as in results of earlier versions."""
+    """The fit; None without one, as in results of earlier versions."""
     if description.get("brdf") is None:
         return None
     predicted = _layers(channels, LOBE, folder / "maps.exr")["lobe"]
@@ -378,9 +380,7 @@ def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
 
 
 def _wrong_input(given: Mapping[str, Any]) -> str:
-    """The first entry of what is said of the photo that later work could stumble over; "" if there
-    is none. Any may lack.
-    """
+    """The first invalid entry of the record of the photo, "" if there is none. All are optional."""
     scale, size = numbers(given.get("scale", 1.0), ()), given.get("size", [1, 1])
     if scale is None or not 0 < scale <= 1:
         return "scale"
@@ -390,9 +390,9 @@ def _wrong_input(given: Mapping[str, Any]) -> str:
         or any(type(side) is not int or not 0 < side < _LONGEST_SIDE for side in size)
     ):
         return "size"
-    words = (
+    texts = (
         name
         for name in ("name", "sha256", "transfer", "mask_from")
         if not isinstance(given.get(name, ""), str)
     )
-    return next(words, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")
+    return next(texts, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")

@@ -18,9 +18,9 @@ from ...interface.options import (
 )
 from .action import ActionResult, EditAction
 from .options import add_direction, add_lobe, lobe_of, number, plain
-from .panels import ball_panel, recovered_light_panel
+from .panels import recovered_light_panel, sphere_panel
 
-_COEFFICIENTS = ("", ".json", ".npy")  # files of lights that are no pictures
+_COEFFICIENTS = ("", ".json", ".npy")  # suffixes of lights that are not images
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
@@ -29,29 +29,29 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     lobe = lobe_of(options)
     if lobe is not None and options.highlights not in ("auto", "render"):
         raise InputError(
-            "--exponent and --alpha are of rendered highlights, not of --highlights "
+            "--exponent and --alpha apply to rendered highlights, not to --highlights "
             f"{options.highlights}: give one of them"
         )
     choice = Relighting(options.highlights, lobe, options.exposure, not fixed)
     edit = relight(d, light, choice)
-    ball = ball_panel(
+    sphere = sphere_panel(
         light.shading(sphere_normals(320)[0].reshape(-1, 3)).reshape(320, 320, 3),
         "New light",
-        "on a white ball",
+        "on a white sphere",
     )
     measured = {} if light.coefficients is None else {"coefficients": plain(light.coefficients)}
-    return ActionResult(edit, measured, (recovered_light_panel(d), ball))
+    return ActionResult(edit, measured, (recovered_light_panel(d), sphere))
 
 
 def _new_light(
     d: Decomposition, options: argparse.Namespace, rotation: np.ndarray
 ) -> tuple[NewLight, bool]:
-    """The light, and whether its brightness is meant as it is."""
-    turned = not np.array_equal(rotation, np.eye(3))
+    """The light, and whether to keep its brightness."""
+    rotated = not np.array_equal(rotation, np.eye(3))
     if options.light is not None and options.direction is not None:
-        raise InputError("--light and --direction both name a light: give one of them")
+        raise InputError("--light and --direction both set the light: give one of them")
     if options.direction is None and (options.color is not None or options.ambient is not None):
-        raise InputError("--color and --ambient belong to the light of --direction: give that too")
+        raise InputError("--color and --ambient need --direction: give it too")
     if options.direction is not None:
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient
@@ -65,16 +65,18 @@ def _new_light(
         and not options.light.is_dir()
         and options.light.suffix.lower() not in _COEFFICIENTS
     ):
-        if turned:
+        if rotated:
             raise InputError(
-                "an environment picture is not turned here: turn the picture itself, or give a "
+                "an environment map cannot be rotated here: rotate the image itself, or give a "
                 "direction"
             )
         return NewLight(
             environment=read_linear(options.light, limits=limits_of(options), finite=True)
         ), False
     if options.light is None:
-        return NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation), True
+        return NewLight(
+            coefficients=turned_light(d.illumination, rotation), rotation=rotation
+        ), True
     return NewLight(coefficients=turned_light(_read_coefficients(options.light), rotation)), True
 
 
@@ -83,7 +85,7 @@ def _read_coefficients(path: Path) -> np.ndarray:
         return read_light(path)
     light = read_array(path)
     if light.shape != (9, 3) or light.dtype.kind not in "fiu" or not np.isfinite(light).all():
-        raise InputError(f"{path} holds no light: an array of 9 x 3 numbers is needed")
+        raise InputError(f"{path} is not a light: expected an array of 9 x 3 numbers")
     return light.astype(float)
 
 
@@ -98,7 +100,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
             type=number,
             default=0.0,
             metavar="DEGREES",
-            help=f"turns the light: {text}",
+            help=f"rotation of the light: {text}",
         )
     parser.add_argument(
         "--light",
@@ -112,7 +114,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--ambient",
         type=number,
         metavar="A",
-        help="of what --direction does not reach, to its light (default 0.15)",
+        help="ambient light relative to that of --direction (default 0.15)",
     )
     parser.add_argument(
         "--exposure",
@@ -125,7 +127,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--highlights",
         choices=HIGHLIGHTS,
         default="auto",
-        help="what happens to highlights (auto: rendered if a lobe is fitted or given, else scaled "
+        help="treatment of highlights (auto: rendered if a lobe is fitted or given, else scaled "
         "with the shading)",
     )
     add_lobe(parser)
