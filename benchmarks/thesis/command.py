@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from isc_core.cli.interface.options import Commands, add_command, add_speech, count, hints
+from isc_core.cli.interface.options import Commands, add_command, add_output_options, count, hints
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
@@ -85,7 +85,7 @@ def _output() -> argparse.ArgumentParser:
         metavar="DIR",
         help="output folder (default: %(default)s)",
     )
-    add_speech(parser)
+    add_output_options(parser)
     return parser
 
 

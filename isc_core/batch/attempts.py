@@ -1,4 +1,4 @@
-"""Images that hang, or kill their worker.
+"""Images that hang, or crash their worker.
 
 Problem: a worker may die while it decomposes an image (out of memory, a fault in a library); the
 scheduler then gives the image to the next worker, which may die as well. A step may never return,
@@ -23,7 +23,7 @@ from pathlib import Path
 from ..errors import InputError
 from ..progress import Monitor
 
-MOST_LOST = 3
+MAX_CRASHES = 3
 _MARK = "Timeout ("  # how faulthandler opens its report
 
 
@@ -48,9 +48,9 @@ def attempt(path: Path, run: str, timeout: float) -> Iterator[Monitor]:
     Raises
     ------
     InputError
-        If this image has hung, or has cost `MOST_LOST` workers, in this run.
+        If this image has hung, or has cost `MAX_CRASHES` workers, in this run.
     """
-    _refuse_what_kills(path, run, timeout)
+    _reject_crashing(path, run, timeout)
     try:
         with path.open("a", encoding="utf-8") as record:
             record.write(f"{run}\n")
@@ -72,45 +72,45 @@ def grace(timeout: float) -> float:
     return min(max(0.1 * timeout, 1.0), 10.0)
 
 
-def _refuse_what_kills(path: Path, run: str, timeout: float) -> None:
+def _reject_crashing(path: Path, run: str, timeout: float) -> None:
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except FileNotFoundError:
         return
-    if run not in lines:  # of a run that was killed: that may have been anything
+    if run not in lines:  # left by a killed run, whose cause is unknown
         path.unlink(missing_ok=True)
         return
     hung = any(line.startswith(_MARK) for line in lines)
-    if not hung and lines.count(run) < MOST_LOST:
+    if not hung and lines.count(run) < MAX_CRASHES:
         return
     path.unlink(missing_ok=True)
     if hung:
         raise InputError(
-            f"took longer than --timeout {timeout:g} s and did not react{_place(lines)}: its "
-            "worker was ended"
+            f"exceeded --timeout {timeout:g} s and did not respond{_location(lines)}: its "
+            "worker was stopped"
         )
     raise InputError(
-        f"{MOST_LOST} workers were lost while they run_jobs on it: it may need more memory than "
+        f"{MAX_CRASHES} workers crashed while processing it: it may need more memory than "
         "--memory gives"
     )
 
 
-def _place(lines: list[str]) -> str:
-    """The innermost line of the first thread that was in this package's work."""
-    own = [
+def _location(lines: list[str]) -> str:
+    """The innermost frame of the first thread that ran `process`, as text."""
+    frames = [
         number for number, line in enumerate(lines) if "in process" in line and "work.py" in line
     ]
-    if not own:
+    if not frames:
         return ""
     first = max(
         (
             number
-            for number in range(own[0])
+            for number in range(frames[0])
             if lines[number].startswith(("Thread", "Current thread"))
         ),
         default=None,
     )
     if first is None:
         return ""
-    where = lines[first + 1].strip().removeprefix("File ")
-    return f" (in {where.rpartition(' in ')[2]})"
+    frame = lines[first + 1].strip().removeprefix("File ")
+    return f" (in {frame.rpartition(' in ')[2]})"

@@ -1,4 +1,4 @@
-"""Dask's scheduler and workers, started here or found at an address, and the stream of jobs.
+"""Dask's scheduler and workers, local or at an address, and the stream of jobs.
 
 Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling"
 (2015), doi:10.25080/Majora-7b98e3ed-013.
@@ -30,14 +30,14 @@ from ..errors import InputError
 from .item import FAILED, ImageJob, ImageOutcome
 from .work import process
 
-_DEAL_SECONDS = 0.2  # between two looks at whether to stop
-_AHEAD = 3  # jobs at the scheduler for each image that is run_jobs on
-_SUSPICION = 100  # of the scheduler, before it gives a job up: `attempts` does before
-_LOOK_SECONDS = 2.0  # between two looks after the workers
-_LONELY_SECONDS = 900.0  # without any worker, before the run gives up
-_CLUSTER_PATIENCE = 60.0
-_STARTS = 3  # of workers that are lost while they start
-_LOST = "the scheduler is lost: give the same command again; what is finished stays"
+_POLL_SECONDS = 0.2  # interval of checks for cancellation
+_JOBS_PER_IMAGE = 3  # submitted jobs per image in progress
+_ALLOWED_FAILURES = 100  # failures that the scheduler allows per job; `attempts` stops earlier
+_CHECK_SECONDS = 2.0  # interval of checks of the workers
+_IDLE_SECONDS = 900.0  # without any worker, before the run is aborted
+_CLUSTER_TIMEOUT = 60.0
+_MAX_STARTS = 3  # attempts to start local workers
+_LOST = "the connection to the scheduler is lost: run the same command again to resume"
 
 Client = Any  # Dask is optional
 
@@ -119,11 +119,11 @@ def connected(crew: Crew) -> Iterator[Client]:
                 client = stack.enter_context(
                     DaskClient(crew.scheduler, timeout=10, set_as_default=False)
                 )
-                client.wait_for_workers(1, timeout=_CLUSTER_PATIENCE)
+                client.wait_for_workers(1, timeout=_CLUSTER_TIMEOUT)
             except TimeoutError as error:
                 raise InputError(
-                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: "
-                    "start some"
+                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_TIMEOUT:.0f} s: "
+                    "start workers"
                 ) from error
             except (OSError, ValueError) as error:
                 raise InputError(
@@ -137,11 +137,11 @@ def connected(crew: Crew) -> Iterator[Client]:
 
 
 def _configuration(crew: Crew) -> dict[str, object]:
-    """Dask's, for workers of this machine.
+    """Dask configuration for local workers.
 
-    A worker that is full of memory is ended, never paused: paused workers would wait for ever.
-    Libraries get the image's threads. What Dask sets by itself would make the allocator give back
-    every 64 kB at once, which costs small images a third of their time.
+    A worker that exceeds its memory is terminated, never paused: paused workers would wait forever.
+    Libraries get the image's threads. Dask's default environment makes the allocator return every
+    64 kB at once, which costs small images a third of their time.
     """
     memory, threads = "distributed.worker.memory", str(crew.threads)
     names = (
@@ -153,11 +153,11 @@ def _configuration(crew: Crew) -> dict[str, object]:
     )
     return {
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(names, threads),
-        "distributed.scheduler.allowed-failures": _SUSPICION,
+        "distributed.scheduler.allowed-failures": _ALLOWED_FAILURES,
         "distributed.scheduler.worker-saturation": 1.0,
-        # to start again; on a busy machine that takes more than the usual 15 s
+        # time to restart; on a busy machine it exceeds the default of 15 s
         "distributed.deploy.lost-worker-timeout": "5 minutes",
-        # keeps its samples of an hour: half a megabyte an image
+        # the profiler keeps an hour of samples: half a megabyte per image
         "distributed.worker.profile.enabled": False,
         f"{memory}.target": False,
         f"{memory}.spill": False,
@@ -166,15 +166,15 @@ def _configuration(crew: Crew) -> dict[str, object]:
     }
 
 
-def _local_cluster(crew: Crew, starts: int = _STARTS) -> Any:
-    """Workers of this machine; all begin anew, up to so many `starts`, where one is lost before
-    they are ready. Raises `InputError`.
+def _local_cluster(crew: Crew, starts: int = _MAX_STARTS) -> Any:
+    """Start local workers, again up to `starts` times if one is lost before all are ready. Raises
+    `InputError`.
     """
     from dask.distributed import LocalCluster
 
     try:
         with _without_interrupts(), warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Port ")  # another is taken, and announced
+            warnings.filterwarnings("ignore", "Port ")  # another port is used, and announced
             return LocalCluster(
                 n_workers=crew.workers,
                 threads_per_worker=1,
@@ -189,7 +189,7 @@ def _local_cluster(crew: Crew, starts: int = _STARTS) -> Any:
         if starts > 1:
             return _local_cluster(crew, starts - 1)
         raise InputError(
-            f"the workers could not be started ({error}): give the same command again"
+            f"the workers could not be started ({error}): run the same command again"
         ) from error
 
 
@@ -197,9 +197,9 @@ def _local_cluster(crew: Crew, starts: int = _STARTS) -> Any:
 def _without_interrupts() -> Iterator[None]:
     """Ctrl-C reaches every process of a terminal.
 
-    Those started here, and by threads that begin here, leave it to this one.
+    Processes and threads started in this block ignore it and leave it to this process.
     """
-    # a process of multiprocessing's own; the thread that starts it gets its signals back
+    # multiprocessing's own process; starting it unblocks signals in this thread
     resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
@@ -239,26 +239,26 @@ def run_jobs(
     InputError
         If the scheduler, or all workers, are lost.
     """
-    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    completed: queue.SimpleQueue[Any] = queue.SimpleQueue()
     waiting: dict[str, tuple[ImageJob, Any]] = {}
-    workforce, more = _Workforce(client), True
-    while more or waiting:
+    workers, remaining = _WorkerMonitor(client), True
+    while remaining or waiting:
         tick()
-        workforce.look()
-        while more and len(waiting) < workforce.window:
+        workers.check()
+        while remaining and len(waiting) < workers.window:
             if (job := next(jobs, None)) is None:
-                more = False
+                remaining = False
                 break
             key = f"isc-{job.plan.run}-{job.number}"
             future = client.submit(task, job, key=key, pure=False, retries=0)
             waiting[key] = job, future
-            future.add_done_callback(ended.put)
-        for future in _some(ended):
+            future.add_done_callback(completed.put)
+        for future in _completed(completed):
             if future.status in (
                 "pending",
                 "lost",
-            ):  # its worker died before it told; another does it again
-                future.add_done_callback(ended.put)
+            ):  # its worker was lost before reporting; another repeats the job
+                future.add_done_callback(completed.put)
                 continue
             job, _ = waiting.pop(future.key)
             outcome = _outcome(future)
@@ -266,46 +266,44 @@ def run_jobs(
             yield job, outcome
 
 
-class _Workforce:
-    """Looks after the workers: how many jobs they can be given at a time, and whether there are
-    any.
-    """
+class _WorkerMonitor:
+    """Monitors the workers: the number of jobs to submit ahead, and whether any worker is left."""
 
     def __init__(self, client: Client) -> None:
         self._client = client
-        self._wanted = 0 if client.cluster is None else len(client.cluster.workers)
-        self._looked, self._seen = float("-inf"), time.monotonic()
-        self.window = _AHEAD
+        self._expected = 0 if client.cluster is None else len(client.cluster.workers)
+        self._last_check, self._last_worker = float("-inf"), time.monotonic()
+        self.window = _JOBS_PER_IMAGE
 
-    def look(self) -> None:
-        """Every few seconds: has workers of this machine that were given up started again.
+    def check(self) -> None:
+        """Every few seconds, restart local workers that were lost.
 
-        Raises `InputError` where all is lost.
+        Raises `InputError` if the scheduler or all workers are lost.
         """
-        if (now := time.monotonic()) - self._looked < _LOOK_SECONDS:
+        if (now := time.monotonic()) - self._last_check < _CHECK_SECONDS:
             return
-        self._looked = now
+        self._last_check = now
         if self._client.status != "running":
             raise InputError(_LOST)
-        there = len(self._client.scheduler_info(n_workers=-1)["workers"])
-        if self._wanted:
-            self._client.cluster.scale(self._wanted)
-        if there:
-            self._seen = now
-        elif now - self._seen > _LONELY_SECONDS:
+        alive = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        if self._expected:
+            self._client.cluster.scale(self._expected)
+        if alive:
+            self._last_worker = now
+        elif now - self._last_worker > _IDLE_SECONDS:
             raise InputError(
-                f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same "
+                f"no worker for {_IDLE_SECONDS:.0f} s: start workers, and run the same "
                 "command again"
             )
-        self.window = _AHEAD * max(1, there, self._wanted)
+        self.window = _JOBS_PER_IMAGE * max(1, alive, self._expected)
 
 
-def _some(ended: "queue.SimpleQueue[Any]") -> Iterator[Any]:
-    """What has ended; waits a moment where nothing has."""
+def _completed(completed: "queue.SimpleQueue[Any]") -> Iterator[Any]:
+    """Futures that have completed; waits a moment if there are none."""
     try:
-        yield ended.get(timeout=_DEAL_SECONDS)
+        yield completed.get(timeout=_POLL_SECONDS)
         while True:
-            yield ended.get_nowait()
+            yield completed.get_nowait()
     except queue.Empty:
         return
 
@@ -322,9 +320,7 @@ def _outcome(future: Any) -> ImageOutcome:
     if isinstance(error, KilledWorker):
         return ImageOutcome(
             FAILED,
-            "workers were lost while they run_jobs on it: it may need more memory than they have",
+            "workers crashed while processing it: it may need more memory than they have",
         )
     text = re.sub(r"\s+", " ", str(error))
-    return ImageOutcome(
-        FAILED, f"a fault of this program, please report it: {type(error).__name__}: {text}"
-    )
+    return ImageOutcome(FAILED, f"internal error, please report it: {type(error).__name__}: {text}")

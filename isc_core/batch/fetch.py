@@ -87,8 +87,8 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
         return
     system, path = file_system(location)
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder) as place:
-        copy = Path(place) / "file"
+    with tempfile.TemporaryDirectory(dir=folder) as folder_name:
+        copy = Path(folder_name) / "file"
         try:
             with system.open(path, "rb") as source, copy.open("wb") as target:
                 length = 0
@@ -98,8 +98,7 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
                     target.write(block)
         except OSError as error:
             raise InputError(
-                f"{location}: cannot be read: "
-                f"{error.strerror or error or 'there is no such object'}"
+                f"{location}: cannot be read: {error.strerror or error or 'no such object'}"
             ) from error
         yield copy
 

@@ -1,4 +1,4 @@
-"""Fingerprints: whether a result exists already.
+"""Fingerprints: whether a result already exists.
 
 A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
 on: the content of photo and mask, the settings, the transfer curve, the priors, the version. The
@@ -45,13 +45,13 @@ def fingerprint(job: ImageJob, photo_sha256: str, mask_sha256: str) -> str:
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 
-def is_finished(folder: Path, wanted: str, arrays: bool) -> bool:
+def is_finished(folder: Path, expected: str, arrays: bool) -> bool:
     """Return whether `folder` holds the complete result of a fingerprint.
 
     Parameters
     ----------
     folder : Path
-    wanted : str
+    expected : str
         The fingerprint.
     arrays : bool
         Whether `arrays.npz` is required.
@@ -68,5 +68,5 @@ def is_finished(folder: Path, wanted: str, arrays: bool) -> bool:
         description = read_json(folder / "decomposition.json")
     except InputError:
         return False
-    found = description.get("input") if isinstance(description, dict) else None
-    return isinstance(found, dict) and found.get("fingerprint") == wanted
+    recorded = description.get("input") if isinstance(description, dict) else None
+    return isinstance(recorded, dict) and recorded.get("fingerprint") == expected

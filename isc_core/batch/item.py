@@ -11,7 +11,7 @@ from ..photo import TRANSFERS
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
-# What a line of a manifest may change; all else holds for the whole run.
+# Options that a line of a manifest may change; the others apply to the whole run.
 _TYPES: dict[str, type] = {
     "model": str,
     "separator": str,
@@ -22,7 +22,7 @@ _TYPES: dict[str, type] = {
     "seed": int,
     "transfer": str,
 }
-_WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
+_BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 OPTIONS = tuple(_TYPES)
 _EXPECTED = {bool: "true or false", int: "a whole number, 0 or more"}
@@ -180,22 +180,22 @@ def parse_options(given: Mapping[str, object], where: str) -> Options:
     InputError
         If an option or value is invalid.
     """
-    found: dict[str, str | int | bool] = {}
+    parsed: dict[str, str | int | bool] = {}
     for key, value in sorted(given.items()):
         name = key.replace("-", "_")
         if name not in _TYPES:
             raise InputError(f"{where}: unknown option {key!r}: choose {', '.join(OPTIONS)}")
-        found[name] = _read(_TYPES[name], value, f"{where}: {key} cannot be {value!r}")
-    return tuple(found.items())
+        parsed[name] = _read(_TYPES[name], value, f"{where}: {key} cannot be {value!r}")
+    return tuple(parsed.items())
 
 
-def _read(kind: type, value: object, complaint: str) -> str | int | bool:
+def _read(kind: type, value: object, message: str) -> str | int | bool:
     if kind is str and isinstance(value, str):
         return value
     if kind is bool and isinstance(value, bool):
         return value
-    if kind is bool and isinstance(value, str) and value.lower() in _WORDS:
-        return _WORDS[value.lower()]
+    if kind is bool and isinstance(value, str) and value.lower() in _BOOLEANS:
+        return _BOOLEANS[value.lower()]
     if kind is int and isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
     if (
@@ -206,4 +206,4 @@ def _read(kind: type, value: object, complaint: str) -> str | int | bool:
         and len(value) < 19
     ):
         return int(value)
-    raise InputError(f"{complaint}: give {_EXPECTED.get(kind, 'text')}")
+    raise InputError(f"{message}: expected {_EXPECTED.get(kind, 'text')}")

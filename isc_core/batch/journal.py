@@ -1,4 +1,4 @@
-"""The outcomes of a run: a file that grows, and the same in input order at the end.
+"""The outcomes of a run: an append-only file, read in input order at the end.
 
 Every line is written at once, so that a killed run keeps what it knew. Of each image 8 bytes are
 kept in memory: the offset of its line.
@@ -67,14 +67,14 @@ class Journal:
     def __init__(self, folder: RunFolder, count: int) -> None:
         self.counts: Counter[str] = Counter()
         self.total = count
-        self._places = array("q", [-1]) * count
+        self._offsets = array("q", [-1]) * count
         self._files = ExitStack()
         self._all = self._files.enter_context(folder.journal.open("w+b"))
         self._failures = self._files.enter_context(folder.failures.open("wb"))
 
     def add(self, entry: JournalEntry) -> None:
         """Write an image's line; a failure also goes into `failures.jsonl`."""
-        self._places[entry.number] = self._all.tell()
+        self._offsets[entry.number] = self._all.tell()
         self._all.write(_line(entry.row()))
         self._all.flush()
         self.counts[entry.outcome.status] += 1
@@ -90,9 +90,9 @@ class Journal:
 
     def entries(self) -> Iterator[JournalEntry]:
         """Iterate over all entries in input order."""
-        for place in self._places:
-            if place >= 0:
-                self._all.seek(place)
+        for offset in self._offsets:
+            if offset >= 0:
+                self._all.seek(offset)
                 yield JournalEntry.of(json.loads(self._all.readline()))
         self._all.seek(0, 2)
 
@@ -109,5 +109,5 @@ class Journal:
 
 
 def _line(row: Mapping[str, object]) -> bytes:
-    """Pure ASCII, so that names of files which are not UTF-8 survive."""
+    """One line in ASCII, which preserves file names that are not UTF-8."""
     return json.dumps(row).encode("ascii") + b"\n"

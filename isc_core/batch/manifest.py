@@ -24,8 +24,8 @@ from .item import OPTIONS, BatchItem, ImageRecipe, Options, parse_options
 from .names import check_given
 
 SUFFIXES = (".csv", ".jsonl", ".ndjson")
-_LONGEST_LINE = 1 << 20  # letters
-_OWN = ("image", "mask", "name", "options")
+_MAX_LINE = 1 << 20  # characters
+_COLUMNS = ("image", "mask", "name", "options")
 
 
 class Manifest:
@@ -38,12 +38,12 @@ class Manifest:
         self._location, self._recipe = location, recipe
         head, slash, _ = location.rpartition("/")
         self._base = head + slash
-        self._known: dict[str, Options] = {}
-        self._first = ""
+        self._parsed: dict[str, Options] = {}
+        self._state = ""
 
     def __iter__(self) -> Iterator[BatchItem]:
         with _opened(self._location) as (file, state):
-            self._require_unchanged(state)
+            self._check_unchanged(state)
             rows = (
                 _csv_rows(file, self._location)
                 if self._location.lower().endswith(".csv")
@@ -52,12 +52,12 @@ class Manifest:
             for line, row in rows:
                 yield self._item(row, line)
 
-    def _require_unchanged(self, state: str) -> None:
-        if self._first and self._first != state:
+    def _check_unchanged(self, state: str) -> None:
+        if self._state and self._state != state:
             raise InputError(
                 f"{self._location} changed while it was read: run again when it is complete"
             )
-        self._first = state
+        self._state = state
 
     def _item(self, row: dict[str, Any], line: int) -> BatchItem:
         texts = [row.get(key) for key in ("image", "mask", "name")]
@@ -74,42 +74,44 @@ class Manifest:
             else ()
         )
         return BatchItem(
-            self._joined(image),
-            self._joined(mask) if mask else "",
+            self._resolved(image),
+            self._resolved(mask) if mask else "",
             name,
             options,
-            self._joined(image),
+            self._resolved(image),
         )
 
     def _at(self, line: int) -> str:
         return f"{self._location}, line {line}"
 
-    def _joined(self, location: str) -> str:
+    def _resolved(self, location: str) -> str:
         return location if is_url(location) or location.startswith("/") else self._base + location
 
     def _options(self, row: dict[str, Any], line: int) -> Options:
-        """The line's options, checked; lines mostly share a few sets of them."""
+        """The line's options, checked and cached: most lines share a few sets of them."""
         given = {
-            key: value for key, value in row.items() if key not in _OWN and value not in ("", None)
+            key: value
+            for key, value in row.items()
+            if key not in _COLUMNS and value not in ("", None)
         }
-        together = row.get("options") or {}
-        if not given and not together:
+        grouped = row.get("options") or {}
+        if not given and not grouped:
             return ()
-        key = repr((sorted(given.items()), together))
-        if key not in self._known:
-            options = parse_options({**given, **_mapping(together, self._at(line))}, self._at(line))
+        key = repr((sorted(given.items()), grouped))
+        if key not in self._parsed:
+            options = parse_options({**given, **_mapping(grouped, self._at(line))}, self._at(line))
             try:
                 self._recipe.changed(options)
             except InputError as error:
                 raise InputError(f"{self._at(line)}: {error}") from error
-            if len(self._known) > 1000:
-                self._known.clear()
-            self._known[key] = options
-        return self._known[key]
+            if len(self._parsed) > 1000:
+                self._parsed.clear()
+            self._parsed[key] = options
+        return self._parsed[key]
 
 
 def _mapping(options: object, where: str) -> dict[str, object]:
-    """The column `options` holds an object as JSON text, the key of that name the object itself."""
+    """`options` as an object: JSON text in a CSV column, the object itself in JSON lines."""
     if isinstance(options, str):
         try:
             options = json.loads(options)
@@ -122,19 +124,19 @@ def _mapping(options: object, where: str) -> dict[str, object]:
 
 @contextmanager
 def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
-    """The manifest's text, and what tells whether it is still the same.
+    """The manifest's text, and a token that changes with its content.
 
-    Names of files may hold bytes that are not UTF-8.
+    File names may contain bytes that are not UTF-8.
     """
-    how: dict[str, Any] = {"encoding": "utf-8-sig", "errors": "surrogateescape", "newline": ""}
+    mode: dict[str, Any] = {"encoding": "utf-8-sig", "errors": "surrogateescape", "newline": ""}
     try:
         if is_url(location):
             system, path = file_system(location)
-            with system.open(path, "r", **how) as file:
+            with system.open(path, "r", **mode) as file:
                 yield file, str(system.ukey(path))
         else:
             status = Path(location).stat()
-            with Path(location).open(**how) as file:
+            with Path(location).open(**mode) as file:
                 yield file, f"{status.st_size} {status.st_mtime_ns}"
     except OSError as error:
         raise InputError(f"{location}: cannot be read: {error.strerror or error}") from error
@@ -142,11 +144,11 @@ def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
 
 def _lines(file: TextIO, location: str) -> Iterator[str]:
     number = 0
-    while line := file.readline(_LONGEST_LINE):
+    while line := file.readline(_MAX_LINE):
         number += 1
-        if len(line) == _LONGEST_LINE:
+        if len(line) == _MAX_LINE:
             raise InputError(
-                f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a "
+                f"{location}, line {number} is longer than {_MAX_LINE} characters: is this a "
                 "manifest?"
             )
         yield line
@@ -189,14 +191,14 @@ def _check_header(header: Iterable[str], location: str) -> None:
     names = list(header)
     if "image" not in names:
         raise InputError(
-            f"{location}: its first line has no column `image`: begin with image,mask,name or a "
-            "part of it"
+            f"{location}: the first line has no column `image`: start with a header such as "
+            "image,mask,name"
         )
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise InputError(f"{location}: the column {twice[0]!r} stands there twice")
-    if strange := [
-        name for name in names if name not in _OWN and name.replace("-", "_") not in OPTIONS
+    if repeated := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{location}: the column {repeated[0]!r} is repeated")
+    if unknown := [
+        name for name in names if name not in _COLUMNS and name.replace("-", "_") not in OPTIONS
     ]:
         raise InputError(
-            f"{location}: unknown column {strange[0]!r}: choose {', '.join((*_OWN, *OPTIONS))}"
+            f"{location}: unknown column {unknown[0]!r}: choose {', '.join((*_COLUMNS, *OPTIONS))}"
         )

@@ -24,12 +24,12 @@ import numpy as np
 from ..errors import InputError
 from .item import BatchItem
 
-_LONGEST = 120  # bytes; temporary siblings add some, and file systems allow 255
+_MAX_BYTES = 120  # temporary siblings are longer, and file systems allow 255
 _SAFE = re.compile(r"[0-9A-Za-z_][0-9A-Za-z_.-]{0,99}(?<!\.)")
 _UNSAFE_RUN = re.compile(r"[^\w.-]+")
 _HASHED = re.compile(r"-[0-9a-f]{12}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
-# What the run itself writes into the output folder.
+# Files that the run writes into the output folder.
 OWN_FILES = (
     "failures.jsonl",
     "summary.html",
@@ -57,7 +57,7 @@ def safe_name(text: str) -> str:
     name = text
     if not _SAFE.fullmatch(name):
         name = _UNSAFE_RUN.sub("_", unicodedata.normalize("NFC", text)).strip(".-") or "image"
-        while len(name.encode("utf-8")) > _LONGEST:
+        while len(name.encode("utf-8")) > _MAX_BYTES:
             name = name[:-1]
         name = name.rstrip(".-") or "image"
     if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
@@ -90,8 +90,8 @@ def check_given(name: str, where: str) -> str:
         or name.strip(". ") == ""
     ):
         raise InputError(
-            f"{where}: {name!r} cannot name a result: give a name without /, \\ and control "
-            "characters, no path"
+            f"{where}: {name!r} is not a valid result name: use a name without /, \\ and control "
+            "characters"
         )
     if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
         raise InputError(f"{where}: the name {name!r} is reserved: choose another")
@@ -107,7 +107,7 @@ def wanted_name(item: BatchItem) -> str:
 
 
 class Names:
-    """Assigns a name to every item of a stream that was read once before."""
+    """Assigns a name to every item of a stream; the constructor reads it once."""
 
     def __init__(self, items: Iterable[BatchItem]) -> None:
         names, identities = array("Q"), array("Q")
@@ -126,15 +126,15 @@ class Names:
             : self.count
         ]
         self._shared = _repeated(name[new])
-        self._given: set[int] = set()
+        self._used: set[int] = set()
 
     def name(self, item: BatchItem) -> str | None:
         """Return the item's name, or None for a duplicate item in this pass."""
         identity = _identity(item)
         if (number := _hash(identity)) in self._repeated:
-            if number in self._given:
+            if number in self._used:
                 return None
-            self._given.add(number)
+            self._used.add(number)
         name = wanted_name(item)
         if _hash(name.casefold()) in self._shared or _HASHED.fullmatch(name[-13:]):
             return f"{name}-{_digest(identity).hex()[:12]}"
@@ -154,5 +154,5 @@ def _hash(text: str) -> int:
 
 
 def _repeated(values: np.ndarray) -> frozenset[int]:
-    """The numbers that stand more than once in a sorted array."""
+    """The values that occur more than once in a sorted array."""
     return frozenset(np.unique(values[1:][values[1:] == values[:-1]]).tolist())

@@ -23,7 +23,7 @@ from .sources import Inputs
 from .summary import write_summary
 from .work import process
 
-_RECENT = 200  # images whose rate tells how long the rest will take
+_RECENT = 200  # images whose rate gives the estimate of the remaining time
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def run_batch(
     InputError
         If something is wrong with the run as a whole, before work begins.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     monitor = monitor or Monitor()
     require_dask()
@@ -98,25 +98,25 @@ def run_batch(
     recipe.settings.check()
     plan = _plan(batch)
     folder = RunFolder(plan.output)
-    monitor.report("looking at the inputs", 0.0)
+    monitor.report("reading the inputs", 0.0)
     inputs = Inputs(batch.inputs, batch.masks, recipe)
-    if next(iter(inputs), None) is None:  # before a folder is made
+    if next(iter(inputs), None) is None:  # before the folder is created
         raise InputError(f"{', '.join(batch.inputs)}: names no image")
-    with folder.held(plan.run):
-        names = Names(_watched(inputs, monitor))
+    with folder.locked(plan.run):
+        names = Names(_cancellable(inputs, monitor))
         with Journal(folder, names.count) as journal:
             try:
                 monitor.report("starting workers", 0.0)
                 with connected(crew) as client:
                     announce(f"{names.count} images; Dask's dashboard: {dashboard(client)}")
-                    pace = _Pace(journal, monitor)
+                    progress = _Progress(journal, monitor)
                     for job, outcome in run_jobs(
-                        client, _jobs(inputs, names, recipe, plan, journal), pace.tick, task
+                        client, _jobs(inputs, names, recipe, plan, journal), progress.tick, task
                     ):
                         journal.add(
                             JournalEntry(job.number, job.name, job.image, job.mask, outcome)
                         )
-                        pace.count(outcome)
+                        progress.count(outcome)
             finally:
                 write_summary(folder, journal)
         return journal.counts
@@ -137,18 +137,18 @@ def _plan(batch: Batch) -> RunPlan:
     )
 
 
-def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[BatchItem]:
-    """The inputs, of which the first pass of a long list can be cancelled."""
+def _cancellable(inputs: Inputs, monitor: Monitor) -> Iterator[BatchItem]:
+    """The inputs; cancellable, because listing them can be slow."""
     for number, item in enumerate(inputs):
         if number % 10_000 == 0 and monitor.cancelled():
-            raise Cancelled("looking at the inputs")
+            raise Cancelled("reading the inputs")
         yield item
 
 
 def _jobs(
     inputs: Inputs, names: Names, recipe: ImageRecipe, plan: RunPlan, journal: Journal
 ) -> Iterator[ImageJob]:
-    """The tasks, as a stream; an item that stands there again needs none."""
+    """The jobs, as a stream; repeated items are skipped."""
     for number, item in enumerate(inputs):
         name = names.name(item)
         image, mask = _absolute(item.image), _absolute(item.mask)
@@ -159,7 +159,7 @@ def _jobs(
                     "",
                     image,
                     mask,
-                    ImageOutcome(SKIPPED, "stands in the inputs more than once"),
+                    ImageOutcome(SKIPPED, "repeated in the inputs"),
                 )
             )
             continue
@@ -177,8 +177,8 @@ def _absolute(location: str) -> str:
     return location if not location or is_url(location) else os.path.abspath(location)
 
 
-class _Pace:
-    """Tells the monitor how far the run is, how fast it goes and how long the rest will take."""
+class _Progress:
+    """Reports progress, rate and remaining time to the monitor."""
 
     def __init__(self, journal: Journal, monitor: Monitor) -> None:
         self._journal, self._monitor = journal, monitor
@@ -190,18 +190,18 @@ class _Pace:
             self._recent.append(time.monotonic())
 
     def tick(self) -> None:
-        """Reports. Raises `Cancelled`."""
+        """Report; raises `Cancelled`."""
         counts, total = self._journal.counts, self._journal.total
-        reached = sum(counts.values())
+        finished = sum(counts.values())
         self._monitor.report(
-            "images", reached / total, f"done {counts['done']}, {self._told(total - reached)}"
+            "images", finished / total, f"done {counts['done']}, {self._detail(total - finished)}"
         )
 
-    def _told(self, left: int) -> str:
+    def _detail(self, left: int) -> str:
         counts = self._journal.counts
-        told = f"failed {counts['failed']}, skipped {counts['skipped']}, {left} left"
+        text = f"failed {counts['failed']}, skipped {counts['skipped']}, {left} left"
         rate = (len(self._recent) - 1) / max(time.monotonic() - self._recent[0], 1e-6)
         if rate == 0:
-            return told
+            return text
         minutes, seconds = divmod(round(left / rate), 60)
-        return f"{told}, {rate:.2g}/s, {minutes // 60}:{minutes % 60:02d}:{seconds:02d} to go"
+        return f"{text}, {rate:.2g}/s, {minutes // 60}:{minutes % 60:02d}:{seconds:02d} to go"

@@ -1,4 +1,4 @@
-"""The output folder of a batch: its lock, its files, and what killed runs left in it.
+"""The output folder of a batch: its lock, its files, and remains of killed runs.
 
     OUT/NAME/                one result each, complete or absent
     OUT/thumbnails/NAME.jpg
@@ -28,10 +28,14 @@ class RunFolder:
 
     def __init__(self, output: Path) -> None:
         self.output = output
-        own = output / ".isc-batch"
-        self.own, self.attempts, self.fetched = own, own / "attempts", own / "fetched"
-        self.lock, self.owner = own / "lock", own / "owner"
-        self.run, self.journal = own / "run", own / "journal.jsonl"
+        private = output / ".isc-batch"
+        self.private, self.attempts, self.fetched = (
+            private,
+            private / "attempts",
+            private / "fetched",
+        )
+        self.lock, self.owner = private / "lock", private / "owner"
+        self.run, self.journal = private / "run", private / "journal.jsonl"
         self.failures = output / "failures.jsonl"
         self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
 
@@ -40,7 +44,7 @@ class RunFolder:
         return self.thumbnails / f"{name}.jpg"
 
     @contextmanager
-    def held(self, run: str) -> Iterator[None]:
+    def locked(self, run: str) -> Iterator[None]:
         """Create and lock the folder, and clean up after killed runs.
 
         Parameters
@@ -53,7 +57,7 @@ class RunFolder:
         InputError
             If another process holds the lock, or the folder cannot be written.
         """
-        # Of the extra `batch`, as Dask: the other commands start without it.
+        # Imported here: an optional dependency of the extra `batch`, like Dask.
         from filelock import FileLock, Timeout
 
         self._make()
@@ -86,18 +90,18 @@ class RunFolder:
         """Raise `InputError` if this machine does not see the folder of this run."""
         if not self.runs(run):
             raise InputError(
-                f"{self.output} is not the run's folder on {socket.gethostname()}: give one that "
+                f"{self.output} is not the run's folder on {socket.gethostname()}: use one that "
                 "all workers share"
             )
 
     def _make(self) -> None:
         if self.output.exists() and not self.output.is_dir():
-            raise InputError(f"{self.output} is a file: name a folder")
-        if not self.own.is_dir() and (
+            raise InputError(f"{self.output} is a file: choose a folder")
+        if not self.private.is_dir() and (
             foreign := [name for name in OWN_FILES if (self.output / name).exists()]
         ):
             raise InputError(
-                f"{self.output} holds {foreign[0]}, which no batch has written: choose another "
+                f"{self.output} has {foreign[0]}, which was not written by a batch: choose another "
                 "folder"
             )
         try:
@@ -105,14 +109,14 @@ class RunFolder:
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise InputError(
-                f"cannot write {self.output}: {error.strerror}; choose another place"
+                f"cannot write {self.output}: {error.strerror}; choose another folder"
             ) from error
 
     def _tidy(self) -> None:
-        """Removes temporary siblings of results and what was fetched.
+        """Remove temporary siblings of results, and fetched copies.
 
-        No other run writes here, since the lock is held. Workers of a killed one may be at their
-        last image: they hold what they write.
+        No other run writes here while the lock is held. Workers of a killed run may still process
+        their last image; what they write is locked.
         """
         for folder in (self.output, self.thumbnails, self.pages):
             remove_unfinished_in(folder)

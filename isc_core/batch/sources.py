@@ -29,10 +29,10 @@ class Inputs:
     """
 
     def __init__(self, inputs: Sequence[str], masks: str | None, recipe: ImageRecipe) -> None:
-        self._stems = lru_cache(maxsize=64)(_by_stem)
+        self._stem_table = lru_cache(maxsize=64)(_by_stem)
         self._masks = None if masks is None else masks.rstrip("/") or masks
         if self._masks is not None and not _files(self._masks):
-            raise InputError(f"--masks {masks}: there is no such folder, or it is empty")
+            raise InputError(f"--masks {masks}: no such folder, or it is empty")
         self._parts: list[Iterable[BatchItem]] = [self._part(text, recipe) for text in inputs]
 
     def __iter__(self) -> Iterator[BatchItem]:
@@ -42,28 +42,27 @@ class Inputs:
     def _part(self, text: str, recipe: ImageRecipe) -> Iterable[BatchItem]:
         if text.lower().endswith(SUFFIXES):
             return Manifest(text, recipe)
-        found = _listed(text)
-        if not found:
+        photos = _listed(text)
+        if not photos:
             raise InputError(
-                f"{text}: there is no such photo, folder or manifest, or it holds no photo "
-                f"({' '.join(PHOTOS)})"
+                f"{text}: no such photo, folder or manifest, or no photo in it ({' '.join(PHOTOS)})"
             )
-        return [BatchItem(location, self._mask_of(location), label=location) for location in found]
+        return [BatchItem(location, self._mask_of(location), label=location) for location in photos]
 
     def _mask_of(self, location: str) -> str:
         """The mask that belongs to a photo, "" for none.
 
-        Raises `InputError` where a folder of masks has none.
+        Raises `InputError` if a folder of masks has none.
         """
         folder, _, name = location.rpartition("/")
         stem = name.rpartition(".")[0]
-        stems = self._stems(folder if self._masks is None else self._masks)
-        wanted = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
-        for candidate in wanted:
+        stems = self._stem_table(folder if self._masks is None else self._masks)
+        candidates = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
+        for candidate in candidates:
             if candidate in stems:
                 return f"{folder if self._masks is None else self._masks}/{stems[candidate]}"
         if self._masks is not None:
-            raise InputError(f"--masks {self._masks} holds no mask for {name}: name it {stem}.png")
+            raise InputError(f"--masks {self._masks} has no mask for {name}: name it {stem}.png")
         return ""
 
 
@@ -75,7 +74,7 @@ def _is_photo(name: str) -> bool:
 
 
 def _listed(text: str) -> list[str]:
-    """The photos that an input names, sorted."""
+    """The photos of an input, sorted."""
     if is_url(text):
         return _listed_remote(text)
     if Path(text).is_dir():
@@ -95,9 +94,9 @@ def _listed_remote(url: str) -> list[str]:
     try:
         if glob.has_magic(path):
             return sorted(
-                system.unstrip_protocol(found)
-                for found in system.glob(path)
-                if _is_photo(found.rpartition("/")[2])
+                system.unstrip_protocol(photos)
+                for photos in system.glob(path)
+                if _is_photo(photos.rpartition("/")[2])
             )
         if system.isdir(path):
             folder = url.rstrip("/")
@@ -108,7 +107,7 @@ def _listed_remote(url: str) -> list[str]:
 
 
 def _files(folder: str) -> list[str]:
-    """Names of the files in a folder, sorted; none where there is no such folder."""
+    """Names of the files in a folder, sorted; empty if the folder does not exist."""
     if is_url(folder):
         system, path = file_system(folder)
         try:
@@ -127,10 +126,10 @@ def _files(folder: str) -> list[str]:
 
 
 def _by_stem(folder: str) -> dict[str, str]:
-    """The photos and masks of a folder by their names without suffix; of several the first."""
-    found: dict[str, str] = {}
+    """The photos and masks of a folder by their stems; the first one of equal stems."""
+    photos: dict[str, str] = {}
     for name in _files(folder):
         stem, dot, suffix = name.rpartition(".")
         if f"{dot}{suffix}".lower() in PHOTOS:
-            found.setdefault(stem, name)
-    return found
+            photos.setdefault(stem, name)
+    return photos

@@ -1,4 +1,4 @@
-"""The summary of a run: pages to look at, and tables for programs, in input order.
+"""The summary of a run: HTML pages, and tables for programs, in input order.
 
 `summary.html` and `summary-pages/N.html`: a thumbnail of every result, linked to the result, and
 the reasons of failures. `summary.csv`, `summary.jsonl`: the same as tables. File names may be
@@ -44,14 +44,14 @@ def write_summary(folder: RunFolder, journal: Journal) -> None:
         writer = csv.writer(table)
         writer.writerow(_COLUMNS)
 
-        def passed(entries: Iterable[JournalEntry]) -> Iterator[JournalEntry]:
+        def recorded(entries: Iterable[JournalEntry]) -> Iterator[JournalEntry]:
             for entry in entries:
                 row = entry.row()
                 writer.writerow([_cell(row[name]) for name in _COLUMNS])
                 lines.write(json.dumps(row) + "\n")
                 yield entry
 
-        _write_pages(folder, journal, passed(journal.entries()))
+        _write_pages(folder, journal, recorded(journal.entries()))
 
 
 def _cell(value: object) -> object:
@@ -60,7 +60,7 @@ def _cell(value: object) -> object:
 
 def _write_pages(folder: RunFolder, journal: Journal, entries: Iterator[JournalEntry]) -> None:
     count = max(1, -(-sum(journal.counts.values()) // PAGE))
-    # Of the extra `batch`: Dask needs it too, the other commands do not.
+    # Imported here: an optional dependency of the extra `batch`, which Dask needs too.
     import jinja2
 
     loader = jinja2.PackageLoader(__package__, "templates")
@@ -70,8 +70,8 @@ def _write_pages(folder: RunFolder, journal: Journal, entries: Iterator[JournalE
         text = _page(template, journal, list(islice(entries, PAGE)), page, count)
         with new_file(target) as partial:
             partial.write_text(text, encoding="utf-8", errors="backslashreplace")
-    for _ in entries:  # none is left; the tables have seen all of them only now
-        raise AssertionError("the journal holds more images than it counts")
+    for _ in entries:  # exhausts the generator, so that the tables are complete
+        raise AssertionError("the journal has more images than it counts")
 
 
 def _page(

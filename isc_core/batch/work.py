@@ -1,4 +1,4 @@
-"""The task of one image: what a worker does.
+"""The job of one image, as a worker runs it.
 
 A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
 belong to the process.
@@ -28,8 +28,8 @@ from .fingerprint import fingerprint, is_finished
 from .item import DONE, FAILED, SKIPPED, ImageJob, ImageOutcome
 from .run_folder import RunFolder
 
-_LOOK_SECONDS = 2.0
-_one_at_a_time = threading.Lock()
+_CHECK_SECONDS = 2.0
+_process_lock = threading.Lock()
 
 Work = Callable[[ImageJob, Monitor], str]
 
@@ -49,17 +49,16 @@ def process(job: ImageJob, work: "Work | None" = None) -> ImageOutcome:
     -------
     ImageOutcome
     """
-    with _one_at_a_time:
+    with _process_lock:
         start = time.perf_counter()
         _reset_peak()
-        status, reason = _attempted(job, work or decompose_into)
-        gc.collect(
-            1
-        )  # meshes refer to themselves: else they stay for a hundred images, some 3 MB each
+        status, reason = _run(job, work or decompose_into)
+        # Meshes have reference cycles: without this they stay for a hundred images, 3 MB each.
+        gc.collect(1)
         return ImageOutcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
 
 
-def _attempted(job: ImageJob, work: Work) -> tuple[str, str]:
+def _run(job: ImageJob, work: Work) -> tuple[str, str]:
     plan = job.plan
     try:
         if plan.version != __version__:
@@ -70,30 +69,29 @@ def _attempted(job: ImageJob, work: Work) -> tuple[str, str]:
         folder = RunFolder(plan.output)
         folder.require_run(plan.run)
         with attempt(folder.attempts / job.name, plan.run, plan.timeout) as monitor:
-            return work(job, _while_wanted(monitor, folder, plan.run)), ""
+            return work(job, _cancelled_with_run(monitor, folder, plan.run)), ""
     except Cancelled as stopped:
-        return FAILED, f"took longer than --timeout {plan.timeout:g} s, in the stage: {stopped}"
+        return FAILED, f"exceeded --timeout {plan.timeout:g} s, in the stage: {stopped}"
     except InputError as error:
         return FAILED, str(error)
     except MemoryError:
         return (
             FAILED,
-            "there is not enough memory for it: give a smaller image, a smaller --max-size or "
-            "fewer workers",
+            "not enough memory: use a smaller image, a smaller --max-size or fewer workers",
         )
     except OSError as error:
         return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
 
 
-def _while_wanted(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
-    """Also cancel once the run has ended: on a cluster, nothing else stops its workers."""
-    looked, wanted = time.monotonic(), True
+def _cancelled_with_run(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
+    """Cancel also when the run has ended: on a cluster, nothing else stops its workers."""
+    checked, expected = time.monotonic(), True
 
     def cancelled() -> bool:
-        nonlocal looked, wanted
-        if (now := time.monotonic()) - looked > _LOOK_SECONDS:
-            looked, wanted = now, folder.runs(run)
-        return not wanted or monitor.cancelled()
+        nonlocal checked, expected
+        if (now := time.monotonic()) - checked > _CHECK_SECONDS:
+            checked, expected = now, folder.runs(run)
+        return not expected or monitor.cancelled()
 
     return Monitor(cancelled=cancelled)
 
@@ -116,19 +114,19 @@ def decompose_into(job: ImageJob, monitor: Monitor) -> str:
         photo = stack.enter_context(local_copy(job.image, plan.limits, fetched))
         mask = stack.enter_context(local_copy(job.mask, plan.limits, fetched)) if job.mask else None
         sums = sha256(photo), "" if mask is None else sha256(mask)
-        wanted = fingerprint(job, *sums)
-        if is_finished(job.folder, wanted, plan.arrays):
-            _draw_thumbnail(job, anew=False)
+        expected = fingerprint(job, *sums)
+        if is_finished(job.folder, expected, plan.arrays):
+            _draw_thumbnail(job, redraw=False)
             return SKIPPED
         monitor.report("reading", 0.0)
         try:
-            _decompose(job, photo, mask, sums, wanted, monitor)
+            _decompose(job, photo, mask, sums, expected, monitor)
         except InputError as error:
-            # The temporary copy's name says nothing to anybody.
+            # Replace the name of the temporary copy by the location.
             raise InputError(
                 _renamed(str(error), ((photo, job.image), (mask, job.mask)))
             ) from error
-    _draw_thumbnail(job, anew=True)
+    _draw_thumbnail(job, redraw=True)
     return DONE
 
 
@@ -137,7 +135,7 @@ def _decompose(
     path: Path,
     mask: Path | None,
     sums: tuple[str, str],
-    wanted: str,
+    expected: str,
     monitor: Monitor,
 ) -> None:
     plan, recipe = job.plan, job.recipe
@@ -150,7 +148,7 @@ def _decompose(
     result = decompose(
         photo, recipe.settings, prior_set=priors, name=name, monitor=monitor.part(0.0, 0.8)
     )
-    source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": wanted}
+    source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": expected}
     result = replace(result, provenance=replace(result.provenance, input=source))
     save(result, job.folder, arrays=plan.arrays, monitor=monitor.part(0.8, 1.0))
 
@@ -166,30 +164,29 @@ def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:
 def _priors(path: str, expected: str) -> PriorSet:
     if sha256(Path(path)) != expected:
         raise InputError(
-            f"{path} is not the file that the run began with: all workers have to see the same "
-            "priors"
+            f"{path} changed after the run was started: all workers must read the same priors"
         )
     return load_prior_set(Path(path))
 
 
-def _draw_thumbnail(job: ImageJob, *, anew: bool) -> None:
-    """Beside the results: theirs are folders of known content."""
+def _draw_thumbnail(job: ImageJob, *, redraw: bool) -> None:
+    """Draw the thumbnail, in a folder of its own."""
     target = RunFolder(job.plan.output).thumbnail(job.name)
-    if anew or not target.is_file():
+    if redraw or not target.is_file():
         thumbnail(job.folder / "preview.png", target)
 
 
-# --- the peak of memory ---------------------------------------------------------------------------
+# --- peak memory ----------------------------------------------------------------------------------
 
 
 def _reset_peak() -> None:
-    """Linux forgets a process's highest use of memory when asked to; elsewhere nothing happens."""
+    """Reset the peak memory of the process (Linux only; elsewhere without effect)."""
     with contextlib.suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")
 
 
 def _peak_mb() -> float:
-    """The highest use of memory since then, in MB; 0 where the system does not tell."""
+    """Peak memory since the reset, in MB; 0 if the system does not report it."""
     with contextlib.suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from ..errors import Cancelled, InputError, Rejected
-from .interface.json_progress import JsonSpeaker
-from .interface.terminal import Interrupts, TerminalSpeaker, discard_output
+from .interface.json_progress import JsonReporter
+from .interface.terminal import Interrupts, TerminalReporter, discard_output
 
 SUCCESS, BROKEN_PIPE, REJECTED, REFUSED, CANCELLED = 0, 1, 1, 2, 130
 
-_Speaker = TerminalSpeaker | JsonSpeaker
+_Reporter = TerminalReporter | JsonReporter
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,53 +34,52 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         The exit code; a user's mistake never raises.
     """
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    # Looked for here, so that complaints about the other options are told to a program, too.
-    for_program = "--progress=json" in words or ("--progress", "json") in pairwise(words)
-    speaker: _Speaker = JsonSpeaker(sys.stdout) if for_program else TerminalSpeaker()
+    argv = list(sys.argv[1:] if arguments is None else arguments)
+    # Checked before parsing, so that errors in other options are reported as JSON, too.
+    json_progress = "--progress=json" in argv or ("--progress", "json") in pairwise(argv)
+    reporter: _Reporter = JsonReporter(sys.stdout) if json_progress else TerminalReporter()
     try:
-        with speaker:
-            output, lines = _run(words, speaker)
-        speaker.done(output, lines)
+        with reporter:
+            output, lines = _run(argv, reporter)
+        reporter.done(output, lines)
         sys.stdout.flush()
         return SUCCESS
     except InputError as error:
-        return _refused(speaker, str(error))
-    except Rejected as verdict:
-        speaker.rejected(str(verdict).splitlines(), REJECTED)
+        return _report_failure(reporter, str(error))
+    except Rejected as rejection:
+        reporter.rejected(str(rejection).splitlines(), REJECTED)
         return REJECTED
     except (Cancelled, KeyboardInterrupt):
-        speaker.cancelled()
+        reporter.cancelled()
         return CANCELLED
     except BrokenPipeError:
         discard_output()
         return BROKEN_PIPE
     except MemoryError:
-        return _refused(
-            speaker,
-            "there is not enough memory for this: give a smaller image or a smaller --max-size",
+        return _report_failure(
+            reporter,
+            "not enough memory: use a smaller image or a smaller --max-size",
         )
     except OSError as error:
-        where = f"{error.filename}: " if error.filename else ""
-        return _refused(speaker, f"{where}{error.strerror or error}")
+        location = f"{error.filename}: " if error.filename else ""
+        return _report_failure(reporter, f"{location}{error.strerror or error}")
 
 
-def _run(arguments: list[str], speaker: _Speaker) -> tuple[str, list[str]]:
-    """Where the result was written, and the lines to print."""
-    # Numerical libraries take a second to load: inside `main`, so that Ctrl-C is answered during
-    # that second too.
+def _run(arguments: list[str], reporter: _Reporter) -> tuple[str, list[str]]:
+    """The path of the result, and the lines to print."""
+    # Numerical libraries take a second to load: inside `main`, where Ctrl-C works meanwhile.
     from .commands import build_parser
 
     try:
         options = build_parser().parse_args(arguments)
     except SystemExit:  # --help and --version
         return "", []
-    with Interrupts() as interrupts, speaker.progress(options.quiet) as progress:
+    with Interrupts() as interrupts, reporter.progress(options.quiet) as progress:
         lines = options.run(options, interrupts.monitor(progress))
     written = getattr(options, "output", None) or getattr(options, "result", None)
     return "" if written is None else str(written), lines
 
 
-def _refused(speaker: _Speaker, message: str) -> int:
-    speaker.failed(re.sub(r"[\x00-\x1f\x7f]+", " ", message).strip(), REFUSED)
+def _report_failure(reporter: _Reporter, message: str) -> int:
+    reporter.failed(re.sub(r"[\x00-\x1f\x7f]+", " ", message).strip(), REFUSED)
     return REFUSED

@@ -1,1 +1,1 @@
-"""Operations on images and masks that know nothing of scenes."""
+"""Operations on images and masks, independent of scenes."""

@@ -1,4 +1,4 @@
-"""Downscaling by exact area averages, object and background apart.
+"""Downscaling by exact area averages, object and background separately.
 
 Equation: each new pixel is the mean of the old ones, weighted by the overlap of their areas and by
 the mask: the premultiplied images of T. Porter and T. Duff, "Compositing Digital Images" (1984),
@@ -45,8 +45,8 @@ class AreaFilter:
 
 
 def _overlaps(count: int, factor: float) -> Any:
-    """Sparse (new, old) float32: the part of each new pixel that each of the `count` old pixels
-    covers; 0 < factor <= 1.
+    """Sparse (new, old) float32: the share of each new pixel covered by each of the `count` old
+    pixels; 0 < factor <= 1.
     """
     new = max(1, int(np.ceil(count * factor - 1e-6)))
     start, end = np.arange(count) * factor, np.arange(1, count + 1) * factor
@@ -115,7 +115,7 @@ def averaged(
 def resize_apart(
     image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, area: AreaFilter
 ) -> np.ndarray:
-    """Downscale an image, averaging object and background apart.
+    """Downscale an image, averaging object and background separately.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ def is_cut(mask: np.ndarray) -> bool:
 
 
 def _sides(mask: np.ndarray) -> tuple[np.ndarray, ...]:
-    """`mask`, turned so that its upper, lower, left and right side is the first row."""
+    """`mask`, rotated so that its upper, lower, left and right side is the first row."""
     return mask, mask[::-1], mask.T, mask.T[::-1]
 
 

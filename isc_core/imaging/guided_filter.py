@@ -1,4 +1,4 @@
-"""Local affine models of a quantity in the colours of a picture (the guided filter, in colour).
+"""Local affine models of a quantity in the colours of an image (the guided filter, in colour).
 
 Equation, over a window k inside the mask, for the picture I and the quantity e: e ~ A_k^T I + b_k,
 
@@ -43,16 +43,17 @@ def affine_fit(
     offset : (H, W, C) ndarray
     """
     mean_guide, mean_values = window_means(guide, mask), window_means(values, mask)
-    own = (
+    covariance = (
         window_means(guide[..., :, None] * guide[..., None, :], mask)
         - mean_guide[..., :, None] * mean_guide[..., None, :]
     )
-    common = (
+    cross_covariance = (
         window_means(guide[..., :, None] * values[..., None, :], mask)
         - mean_guide[..., :, None] * mean_values[..., None, :]
     )
     slope = np.linalg.solve(
-        own + epsilon * np.eye(3), common + (0 if fallback is None else epsilon * fallback)
+        covariance + epsilon * np.eye(3),
+        cross_covariance + (0 if fallback is None else epsilon * fallback),
     )
     offset = mean_values - np.einsum("hwgc,hwg->hwc", slope, mean_guide)
     return window_means(slope, mask), window_means(offset, mask)

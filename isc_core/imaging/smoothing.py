@@ -1,4 +1,4 @@
-"""Gaussian smoothing of the known pixels alone (normalised convolution).
+"""Gaussian smoothing over the pixels of a mask (normalised convolution).
 
 Equation: sum w G f / sum w G, with w = 1 inside the mask and 0 outside.
 

@@ -178,7 +178,7 @@ class CshSearch:
         Raises
         ------
         Cancelled
-            If the user asked to stop.
+            If the user cancels.
         """
         rng = np.random.default_rng(self.options.seed)
         projected = project(

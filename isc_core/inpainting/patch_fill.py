@@ -85,7 +85,7 @@ def fill_patches(
     InputError
         If nothing is known, a pixel is both, or options are out of range.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options = options or PatchFillOptions()
     if not 1 <= options.iterations <= options.most_iterations:

@@ -37,28 +37,28 @@ try:
 except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
-_LITTER = (
+_FILE_MANAGER_FILES = (
     ".DS_Store",
     "Thumbs.db",
     "desktop.ini",
-)  # what file managers leave in any folder they have shown
+)  # created by file managers
 _TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old|gone)", re.DOTALL)
-_MOST_SIBLINGS = 0x10000
-_LONGEST = (
-    230  # bytes of a name that leave room, of the usual 255, for what a temporary sibling adds
+_MAX_SIBLINGS = 0x10000
+_MAX_NAME_BYTES = (
+    230  # bytes of a name, of the usual 255, with room for the suffix of a temporary sibling
 )
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fs.h
 
 _REASONS = {
-    errno.ENOSPC: "no space is left on the disk; free some or choose another place",
+    errno.ENOSPC: "no space is left on the disk; free some space or choose another place",
     errno.EDQUOT: "the disk quota is used up; free some space or choose another place",
-    errno.EFBIG: "the file grows beyond what is allowed here; choose another place",
-    errno.EACCES: "writing is not allowed there; choose another place",
-    errno.EPERM: "writing is not allowed there; choose another place",
+    errno.EFBIG: "the file exceeds the allowed size; choose another place",
+    errno.EACCES: "permission denied; choose another place",
+    errno.EPERM: "permission denied; choose another place",
     errno.EROFS: "the disk is read-only; choose another place",
     errno.ENOTDIR: "a part of the path is a file, not a folder; choose another place",
     errno.EEXIST: "a part of the path is a file, not a folder; choose another place",
-    errno.ENOENT: "nothing can be created there; choose another place",
+    errno.ENOENT: "the path does not exist; choose another place",
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
 }
 
@@ -84,7 +84,11 @@ def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
     """
     target = _resolved(folder)
     require_replaceable(target, ours)
-    with _explained(target), _made_parents(target), _begun(target, is_folder=True) as partial:
+    with (
+        _explained(target),
+        _made_parents(target),
+        _temporary_sibling(target, is_folder=True) as partial,
+    ):
         yield partial
         require_replaceable(target, ours)
         _flush(partial)
@@ -109,7 +113,11 @@ def new_file(path: Path | str) -> Iterator[Path]:
     """
     target = _resolved(path)
     _require_replaceable_file(target)
-    with _explained(target), _made_parents(target), _begun(target, is_folder=False) as partial:
+    with (
+        _explained(target),
+        _made_parents(target),
+        _temporary_sibling(target, is_folder=False) as partial,
+    ):
         yield partial
         _flush(partial)
         os.replace(partial, target)
@@ -136,16 +144,16 @@ def require_writable(
     """
     target = _resolved(folder)
     require_replaceable(target, ours)
-    for given in inputs:
+    for input_path in inputs:
         if (
-            given is not None
-            and target in (resolved := _resolved(given)).parents
+            input_path is not None
+            and target in (resolved := _resolved(input_path)).parents
             and resolved.exists()
         ):
             raise InputError(
-                f"{given} lies in {folder}, which would be replaced: choose another folder"
+                f"{input_path} lies in {folder}, which would be replaced: choose another folder"
             )
-    _try_beside(target)
+    _try_writing(target)
 
 
 def require_writable_file(path: Path | str) -> None:
@@ -162,7 +170,7 @@ def require_writable_file(path: Path | str) -> None:
     """
     target = _resolved(path)
     _require_replaceable_file(target)
-    _try_beside(target)
+    _try_writing(target)
 
 
 def unfinished(path: Path | str) -> frozenset[Path]:
@@ -196,9 +204,9 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
         Siblings to keep; so are all that a process holds a lock on.
     """
     target = _resolved(path)
-    for left in sorted(unfinished(target) - spared):
-        with contextlib.suppress(OSError), _held(left, wait=False):
-            _tidy(left, target)
+    for leftover in sorted(unfinished(target) - spared):
+        with contextlib.suppress(OSError), _lock(leftover, wait=False):
+            _tidy(leftover, target)
 
 
 def remove_unfinished_in(folder: Path) -> None:
@@ -216,14 +224,14 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
         if not folder.exists():
             return
         if not folder.is_dir():
-            raise InputError(f"{folder} is a file: name a folder")
+            raise InputError(f"{folder} is a file: choose a folder")
         if folder == Path.cwd() or folder.is_mount():
-            raise InputError(f"{folder} itself cannot be replaced: name a folder inside it")
-        known = {name.rpartition("/")[2] for name in ours}
+            raise InputError(f"{folder} itself cannot be replaced: choose a folder inside it")
+        reserved = {name.rpartition("/")[2] for name in ours}
         entries = sorted(
             entry
             for entry in folder.rglob("*")
-            if entry.name not in _LITTER and _origin(entry) not in known
+            if entry.name not in _FILE_MANAGER_FILES and _origin(entry) not in reserved
         )
         found = [
             entry.relative_to(folder).as_posix()
@@ -244,18 +252,18 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
 def _require_replaceable_file(target: Path) -> None:
     with _explained(target):
         if target.is_dir():
-            raise InputError(f"{target} is a folder: name a file")
+            raise InputError(f"{target} is a folder: choose a file")
         if target.exists() and not target.is_file():
-            raise InputError(f"{target} is not a regular file: name another")
+            raise InputError(f"{target} is not a regular file: choose another")
 
 
-def _try_beside(target: Path) -> None:
-    """Where parents lack, in the innermost that is there: to make and remove them could take them
-    away from another process.
+def _try_writing(target: Path) -> None:
+    """Create and remove a temporary sibling, in the innermost existing parent: creating and
+    removing parents could interfere with another process.
     """
     with _explained(target):
-        place = next(parent for parent in target.parents if parent.exists())
-        with _begun(place / target.name, is_folder=True):
+        parent = next(folder for folder in target.parents if folder.exists())
+        with _temporary_sibling(parent / target.name, is_folder=True):
             pass
 
 
@@ -266,7 +274,7 @@ def _resolved(path: Path | str) -> Path:
         OSError,
         RuntimeError,
         ValueError,
-    ) as error:  # a loop of links, an unknown user, a zero byte
+    ) as error:  # a loop of links, an unknown user, a null byte
         raise InputError(f"{str(path)!r} is not a path that can be written: {error}") from error
 
 
@@ -276,67 +284,67 @@ def _resolved(path: Path | str) -> Path:
 def _label(target: Path) -> str:
     """The target's part of a sibling's name; a digest of names that are too long."""
     coded = os.fsencode(target.name)
-    return target.name if len(coded) <= _LONGEST else hashlib.sha256(coded).hexdigest()
+    return target.name if len(coded) <= _MAX_NAME_BYTES else hashlib.sha256(coded).hexdigest()
 
 
 def _origin(entry: Path) -> str | None:
-    """The label of the name that `entry` is a temporary sibling of, if it is one."""
+    """The label of the target of which `entry` is a temporary sibling, if it is one."""
     found = _TEMPORARY.fullmatch(entry.name)
     return None if found is None else found[1]
 
 
 def _sibling(target: Path, number: int, suffix: str) -> Path:
-    """The temporary sibling of that number that is this machine's: another one's locks may not be
-    seen from here.
+    """This machine's temporary sibling of that number: locks of other machines may not be visible
+    here.
     """
     machine = hashlib.sha256(platform.node().encode()).hexdigest()[:4]
     return target.with_name(f".{_label(target)}.{machine}{number:04x}.{suffix}")
 
 
 @contextmanager
-def _begun(target: Path, *, is_folder: bool) -> Iterator[Path]:
-    """A new temporary sibling of `target`, held while the block lasts and removed at its end, if it
-    is still there.
+def _temporary_sibling(target: Path, *, is_folder: bool) -> Iterator[Path]:
+    """A new temporary sibling of `target`, locked during the block and removed at its end if it
+    still exists.
     """
     with contextlib.ExitStack() as stack:
-        for number in range(_MOST_SIBLINGS):
+        for number in range(_MAX_SIBLINGS):
             partial = _sibling(target, number, "partial")
-            for left in (_sibling(target, number, "old"), partial):
-                _sweep(left, target)
+            for leftover in (_sibling(target, number, "old"), partial):
+                _sweep(leftover, target)
             try:
                 partial.mkdir() if is_folder else partial.touch(exist_ok=False)
-                stack.enter_context(_held(partial, wait=True))
+                stack.enter_context(_lock(partial, wait=True))
             except (
                 FileExistsError,
                 _Gone,
-            ):  # another process is at work under that name, or took this one for left behind
+            ):  # another process uses that name, or removed this sibling as a leftover
                 continue
             stack.callback(_remove_same, partial, partial.stat())
             yield partial
             return
     raise OSError(
-        errno.EBUSY, "too many others write there; wait for them, or choose another place"
+        errno.EBUSY, "too many processes write there; wait for them, or choose another place"
     )
 
 
-def _sweep(left: Path, target: Path) -> None:
-    """Tidies up if `left` is of a process that was killed by force while it wrote `target`."""
+def _sweep(leftover: Path, target: Path) -> None:
+    """Clean up if `leftover` belongs to a killed process that wrote `target`."""
     with (
         contextlib.suppress(OSError),
-        _held(left, wait=False) as held,
-    ):  # it is not there, or somebody works on it
-        if held:
-            _tidy(left, target)
+        _lock(leftover, wait=False) as locked,
+    ):  # it does not exist, or is in use
+        if locked:
+            _tidy(leftover, target)
 
 
-def _tidy(left: Path, target: Path) -> None:
-    if left.suffix == ".old" and not target.exists():
-        os.replace(left, target)
+def _tidy(leftover: Path, target: Path) -> None:
+    if leftover.suffix == ".old" and not target.exists():
+        os.replace(leftover, target)
     else:
-        # Renamed first: where there are no locks its writer may live, and give what is half removed
-        # the final name.
+        # Renamed first: without locks its writer may still run, and rename the half-removed folder
+        # to the final name.
         gone = target.with_name(f".{_label(target)}.{secrets.token_hex(4)}.gone")
-        os.replace(left, gone)
+        os.replace(leftover, gone)
         _remove(gone)
 
 
@@ -349,23 +357,23 @@ def _remove(entry: Path) -> None:
 
 
 def _remove_same(entry: Path, made: os.stat_result) -> None:
-    """Removes `entry` unless it was renamed: its name may be another process's by now."""
+    """Remove `entry` unless it was renamed: another process may use its name by now."""
     with contextlib.suppress(OSError):
         if os.path.samestat(made, entry.stat()):
             _remove(entry)
 
 
 class _Gone(OSError):
-    """What was to be held is not there any more."""
+    """The file or folder to lock no longer exists."""
 
 
 @contextmanager
-def _held(entry: Path, *, wait: bool) -> Iterator[bool]:
-    """Holds a lock on a file or folder while the block lasts, which ends with the process in any
-    case; false where there are no locks.
+def _lock(entry: Path, *, wait: bool) -> Iterator[bool]:
+    """Lock a file or folder during the block; the lock ends with the process at the latest. Yields
+    False without support for locks.
 
-    Raises `OSError` if another process has it and it is not to be waited for, and if it is gone
-    once it is held.
+    Raises `OSError` if another process has the lock and `wait` is false, or if the entry no longer
+    exists when locked.
     """
     if fcntl is None:
         yield False
@@ -375,39 +383,39 @@ def _held(entry: Path, *, wait: bool) -> Iterator[bool]:
     except FileNotFoundError as error:
         raise _Gone(errno.ENOENT, "it is gone") from error
     try:
-        held = _locked(descriptor, wait)
+        locked = _acquired(descriptor, wait)
         if not _is_named(descriptor, entry):
             raise _Gone(errno.ENOENT, "it is gone")
-        yield held
+        yield locked
     finally:
         os.close(descriptor)
 
 
 def _is_named(descriptor: int, entry: Path) -> bool:
-    """Whether an open file or folder still has that name: looked up once, for between two looks it
-    may be renamed.
+    """Whether an open file or folder still has that name; a single lookup, because it may be
+    renamed between two.
     """
     with contextlib.suppress(FileNotFoundError):
         return os.path.samestat(os.fstat(descriptor), entry.stat())
     return False
 
 
-def _locked(descriptor: int, wait: bool) -> bool:
+def _acquired(descriptor: int, wait: bool) -> bool:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except BlockingIOError:
         raise
-    except OSError:  # this disk knows no locks
+    except OSError:  # the file system does not support locks
         return False
     return True
 
 
-# --- to the disk, and to the final name -----------------------------------------------------------
+# --- flushing and renaming ------------------------------------------------------------------------
 
 
 def _flush(content: Path) -> None:
-    """Brings a file, or a folder with all that is in it, to the disk, which may find only now that
-    it is full.
+    """Flush a file, or a folder with its content, to the disk, which may report only now that it is
+    full.
     """
     folders = (
         [content, *(entry for entry in content.rglob("*") if entry.is_dir())]
@@ -427,7 +435,7 @@ def _flush(content: Path) -> None:
 
 
 def _flush_names(folder: Path) -> None:
-    """Brings a folder's own entries to the disk, where the system can."""
+    """Flush the entries of a folder to the disk, where the system supports it."""
     with contextlib.suppress(OSError):
         descriptor = os.open(folder, os.O_RDONLY)
         try:
@@ -437,10 +445,10 @@ def _flush_names(folder: Path) -> None:
 
 
 def _put_in_place(partial: Path, target: Path) -> None:
-    """Renames the folder `partial` to `target`, and removes what was there."""
+    """Rename the folder `partial` to `target`, and remove the previous one."""
     while True:
         try:
-            os.replace(partial, target)  # onto nothing, or an empty folder
+            os.replace(partial, target)  # works if it does not exist or is an empty folder
             return
         except OSError as error:
             if (
@@ -449,7 +457,7 @@ def _put_in_place(partial: Path, target: Path) -> None:
                 raise
         with (
             contextlib.suppress(_Gone),
-            _held(target, wait=True),
+            _lock(target, wait=True),
         ):  # gone: another process has just replaced it
             if _exchanged(partial, target):
                 _remove(partial)
@@ -471,10 +479,10 @@ def _exchanged(one: Path, other: Path) -> bool:
 
 
 def _replace_in_two_steps(partial: Path, target: Path) -> None:
-    """What was there is moved aside first and comes back if the second step fails."""
+    """Move the previous folder aside first; restore it if the second step fails."""
     old = next(
         name
-        for number in range(_MOST_SIBLINGS)
+        for number in range(_MAX_SIBLINGS)
         if not (name := _sibling(target, number, "old")).exists()
     )
     os.replace(target, old)
@@ -489,23 +497,21 @@ def _replace_in_two_steps(partial: Path, target: Path) -> None:
 
 @contextmanager
 def _made_parents(target: Path) -> Iterator[None]:
-    """Creates the parent folders that lack; removes them again unless the block ends well."""
+    """Create missing parent folders; remove them again unless the block succeeds."""
     missing = [parent for parent in target.parents if not parent.exists()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield
         missing = []
     finally:
-        for (
-            parent
-        ) in missing:  # the innermost first; one that somebody else has filled meanwhile stays
+        for parent in missing:  # the innermost first; folders that another process has filled stay
             with contextlib.suppress(OSError):
                 parent.rmdir()
 
 
 @contextmanager
 def _explained(target: Path) -> Iterator[None]:
-    """Turns the system's error into one line for people."""
+    """Turn system errors into one-line messages."""
     try:
         yield
     except OSError as error:

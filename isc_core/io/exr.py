@@ -33,17 +33,16 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     OSError
         If the file cannot be written completely.
     """
-    # The writer stores garbage from strided arrays without a word: every channel is made contiguous
-    # here.
+    # The writer silently stores garbage from strided arrays: make every channel contiguous.
     pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    with memory_file() as place:
+    with memory_file() as file_path:
         try:
             with OpenEXR.File(header, pixels) as file:
-                file.write(str(place))
+                file.write(str(file_path))
         except RuntimeError as error:
             raise OSError(errno.EIO, str(error)) from error
-        shutil.copyfile(place, path)
+        shutil.copyfile(file_path, path)
 
 
 def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
@@ -70,8 +69,8 @@ def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
         check_exr(data, path, limits)
         with (
             suppress_native_output(),
-            memory_file(data) as place,
-            OpenEXR.File(str(place), separate_channels=True) as file,
+            memory_file(data) as file_path,
+            OpenEXR.File(str(file_path), separate_channels=True) as file,
         ):
             return {
                 name: np.asarray(channel.pixels, np.float32)

@@ -1,4 +1,4 @@
-"""What an OpenEXR file claims, read before the library sees it.
+"""Checks of the header of an OpenEXR file, before the library reads it.
 
 Problem: the library allocates what a header claims, for every channel, before it checks whether the
 file holds it. `OpenEXR.File(header_only=True)` allocates nothing and survived 9,000 damaged
@@ -25,9 +25,9 @@ from .limits import Limits
 
 MAGIC = b"\x76\x2f\x31\x01"
 _TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
-_BYTES = {0: 4, 1: 2, 2: 4}  # of a value, by its kind: whole number, half, float
-_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # of a block, by compression
-_MOST_CHANNELS, _MOST_PARTS, _MOST_HEADER, _LONGEST, _LARGEST_TILE = 1024, 64, 1 << 20, 255, 1 << 14
+_BYTES = {0: 4, 1: 2, 2: 4}  # per value, by type: unsigned integer, half, float
+_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # scan lines per chunk, by compression
+_MAX_CHANNELS, _MAX_PARTS, _MAX_HEADER, _MAX_NAME, _MAX_TILE = 1024, 64, 1 << 20, 255, 1 << 14
 
 
 @dataclass(frozen=True)
@@ -79,52 +79,52 @@ def check_exr(
         If the file is damaged.
     """
     stored = len(data) if stored is None else stored
-    mark, version = struct.unpack_from("<4sI", data)
-    if mark != MAGIC or version & 0xFF != 2:
+    magic, version = struct.unpack_from("<4sI", data)
+    if magic != MAGIC or version & 0xFF != 2:
         raise ValueError("not an OpenEXR file of version 2")
     if version & _DEEP:
-        raise InputError(f"{path}: a deep image, with many values a pixel: save it as a flat EXR")
+        raise InputError(f"{path}: a deep image, with many values per pixel: save it as a flat EXR")
     parts, unpacked, at = [], 0, 8
     while True:
-        header, at = _attributes(data[:_MOST_HEADER], at)
+        header, at = _attributes(data[:_MAX_HEADER], at)
         if header:
-            part, own, chunks = _part(path, header, bool(version & _TILED), limits)
+            part, size, chunks = _part(path, header, bool(version & _TILED), limits)
             parts.append(part)
-            unpacked += own
+            unpacked += size
             stored -= 8 * chunks
         if not header or not version & _PARTS:
             break
-    if not 0 < len(parts) <= _MOST_PARTS or stored < at:
+    if not 0 < len(parts) <= _MAX_PARTS or stored < at:
         raise ValueError("no parts, or more chunks than the file has room for")
     limits.check_unpacked(path, unpacked, stored)
     return tuple(parts)
 
 
 def _attributes(data: bytes, at: int) -> tuple[dict[bytes, bytes], int]:
-    """Values by name, and where the next header begins."""
-    found: dict[bytes, bytes] = {}
-    while (end := data.index(b"\0", at, at + _LONGEST + 1)) > at:
-        kind = data.index(b"\0", end + 1, end + _LONGEST + 2)
+    """Attributes by name, and the offset of the next header."""
+    attributes: dict[bytes, bytes] = {}
+    while (end := data.index(b"\0", at, at + _MAX_NAME + 1)) > at:
+        kind = data.index(b"\0", end + 1, end + _MAX_NAME + 2)
         (size,) = struct.unpack_from("<i", data, kind + 1)
         start = kind + 5
         if not 0 <= size <= len(data) - start:
             raise ValueError("an attribute is longer than the file")
-        found[data[at:end]] = data[start : start + size]
+        attributes[data[at:end]] = data[start : start + size]
         at = start + size
-    return found, at + 1
+    return attributes, at + 1
 
 
 def _part(
     path: Path, header: dict[bytes, bytes], tiled: bool, limits: Limits
 ) -> tuple[ExrPart, int, int]:
-    """A part, the bytes that it unpacks to, and how many chunks it has.
+    """A part, its unpacked size in bytes, and its number of chunks.
 
-    Raises `KeyError` as a `ValueError` where something is missing.
+    Raises `ValueError` if an attribute is missing.
     """
     if missing := {b"channels", b"compression", b"dataWindow", b"displayWindow"} - header.keys():
         raise ValueError(f"lacks {sorted(missing)[0]!r}")
     if header.get(b"type", b"").startswith(b"deep"):
-        raise InputError(f"{path}: a deep image, with many values a pixel: save it as a flat EXR")
+        raise InputError(f"{path}: a deep image, with many values per pixel: save it as a flat EXR")
     windows = [_window(header[name]) for name in (b"dataWindow", b"displayWindow")]
     for window in windows:
         limits.check_pixels(path, *size_of(window))
@@ -136,7 +136,7 @@ def _part(
     chunks = math.ceil(height / _LINES[compression])
     if tiled or header.get(b"type", b"") == b"tiledimage":
         across, down, _ = struct.unpack("<IIB", header.get(b"tiles", b""))
-        if not (0 < across <= _LARGEST_TILE and 0 < down <= _LARGEST_TILE):
+        if not (0 < across <= _MAX_TILE and 0 < down <= _MAX_TILE):
             raise ValueError("tiles of an impossible size")
         limits.check_unpacked(path, across * down * value, 0)
         chunks = math.ceil(width / across) * math.ceil(height / down)
@@ -151,20 +151,17 @@ def _window(value: bytes) -> tuple[int, int, int, int]:
 
 
 def _channels(path: Path, value: bytes) -> tuple[tuple[str, ...], int]:
-    """Names of the channels, and bytes of all of them a pixel."""
+    """Names of the channels, and bytes per pixel of all of them."""
     names, total, at = [], 0, 0
-    while (end := value.index(b"\0", at, at + _LONGEST + 1)) > at:
+    while (end := value.index(b"\0", at, at + _MAX_NAME + 1)) > at:
         kind, _, across, down = struct.unpack_from("<iB3xii", value, end + 1)
         if (across, down) != (1, 1):
-            raise InputError(
-                f"{path}: a channel is stored more coarsely than the pixels: save it as a plain "
-                "RGB EXR"
-            )
+            raise InputError(f"{path}: a subsampled channel: save it as a plain RGB EXR")
         if kind not in _BYTES:
             raise ValueError("a channel of an unknown kind")
         names.append(value[at:end].decode("utf-8"))
         total += _BYTES[kind]
         at = end + 17
-    if not 0 < len(names) <= _MOST_CHANNELS or len(set(names)) < len(names):
-        raise ValueError("no channels, too many, or twice the same")
+    if not 0 < len(names) <= _MAX_CHANNELS or len(set(names)) < len(names):
+        raise ValueError("no channels, too many, or repeated ones")
     return tuple(names), total

@@ -32,16 +32,16 @@ def read_json(path: Path, remedy: str = "write it again") -> Any:
     try:
         if (size := path.stat().st_size) > MOST_BYTES:
             raise InputError(
-                f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB of JSON are "
-                "read: is it the right file?"
+                f"{path} has {size / 1e6:.0f} MB; the limit for JSON is {MOST_BYTES / 1e6:.0f} MB: "
+                "is it the right file?"
             )
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
     except InputError:
         raise
-    except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested without end
-        raise InputError(f"{path} is damaged or no JSON ({str(error)[:200]}): {remedy}") from error
+    except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested too deeply
+        raise InputError(f"{path} is damaged or not JSON ({str(error)[:200]}): {remedy}") from error
 
 
 def numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
@@ -58,14 +58,13 @@ def numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
         None unless it is finite numbers of this shape.
     """
     try:
-        found = np.array(value)
-        array = found.astype(np.float64)
-    except (TypeError, ValueError, OverflowError):  # JSON has whole numbers of any length
+        raw = np.array(value)
+        array = raw.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):  # JSON integers have any length
         return None
-    # Texts would be read as numbers: "iuf" are numbers, "O" are whole ones that are too long for
-    # these.
+    # Strings would be converted: "iuf" are numbers, "O" are integers too large for these.
     return (
         array
-        if found.dtype.kind in "iufO" and array.shape == shape and np.isfinite(array).all()
+        if raw.dtype.kind in "iufO" and array.shape == shape and np.isfinite(array).all()
         else None
     )

@@ -1,4 +1,4 @@
-"""How much a file may claim, checked before any of its content is unpacked.
+"""Limits on the size of files, checked before any content is unpacked.
 
 Problem: a hundred bytes can claim a picture of a million pixels a side, and a small archive can
 unpack to more than a machine holds. What a file claims stands in its header: width and height, the
@@ -37,20 +37,20 @@ class Limits:
     max_ratio: int = 20
 
     def check_pixels(self, path: Path | str, width: int, height: int) -> None:
-        """Raise `InputError` for a picture with more pixels."""
+        """Raise `InputError` for an image with more pixels."""
         if width * height > self.max_pixels:
-            most = f"{self.max_pixels / 1e6:g} megapixels"
+            limit = f"{self.max_pixels / 1e6:g} megapixels"
             raise InputError(
-                f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or "
-                "raise --max-pixels"
+                f"{path}: {width} x {height} pixels exceed the limit of {limit}: reduce the "
+                "image, or raise --max-pixels"
             )
 
     def check_stored(self, path: Path | str, stored: int) -> None:
-        """Raise `InputError` for a file larger than `max_bytes`; it would be held in memory."""
+        """Raise `InputError` for a file larger than `max_bytes`, which is read into memory."""
         if stored > self.max_bytes:
             raise InputError(
-                f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are "
-                "read: make it smaller first"
+                f"{path} has {stored / 1e9:.1f} GB; the limit is {self.max_bytes / 1e9:.1f} GB: "
+                "reduce it first"
             )
 
     def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
@@ -63,11 +63,11 @@ class Limits:
         unpacked, stored : int
             Bytes of its values, and of the file.
         """
-        most = max(self.max_bytes, self.max_ratio * stored)
-        if unpacked > most:
+        limit = max(self.max_bytes, self.max_ratio * stored)
+        if unpacked > limit:
             raise InputError(
-                f"{path}: unpacks to {unpacked / 1e9:.1f} GB, at most {most / 1e9:.1f} are read: "
-                "store less in it"
+                f"{path}: unpacks to {unpacked / 1e9:.1f} GB; the limit is {limit / 1e9:.1f} GB: "
+                "reduce its content"
             )
 
 

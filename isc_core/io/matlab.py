@@ -27,8 +27,8 @@ _HEADER = 128  # bytes
 _MATRIX, _DEFLATED = 14, 15
 _NUMERIC = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18}  # types of numbers and characters
 _CONTAINERS = {1, 2, 3, 16, 17}  # array classes that hold matrices: cells, structs, objects
-_DEEPEST = 32
-_DAMAGED = (
+_MAX_DEPTH = 32
+_READ_ERRORS = (
     MatReadError,
     ValueError,
     TypeError,
@@ -85,10 +85,10 @@ def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
         value = _field(variables.get(keys[0]), keys[1:])
     except InputError:
         raise
-    except _DAMAGED as error:
+    except _READ_ERRORS as error:
         raise InputError(f"{path} is not a readable MATLAB file: fetch or save it again") from error
     if value is None:
-        raise InputError(f"{path} lacks '{'.'.join(keys)}': is it the file of the data set?")
+        raise InputError(f"{path} has no '{'.'.join(keys)}': is it the file of the data set?")
     return value
 
 
@@ -107,7 +107,7 @@ def _field(value: object, keys: tuple[str, ...]) -> np.ndarray | None:
 
 
 def _check_elements(path: Path, data: bytes, limits: Limits) -> None:
-    """Refuse elements that SciPy must not see: of unknown type, cut short or too large."""
+    """Reject elements that are unsafe for SciPy: of unknown type, truncated or too large."""
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None:
         raise ValueError("no byte order mark")
@@ -127,9 +127,9 @@ def _check_elements(path: Path, data: bytes, limits: Limits) -> None:
 def _check_matrix(kind: int, content: bytes, order: str, depth: int) -> None:
     """Check the elements of a matrix, cell array or struct.
 
-    SciPy dereferences a null pointer where numbers have a type that is none of a number.
+    SciPy dereferences a null pointer if the type of a numeric element is not numeric.
     """
-    if (kind not in _NUMERIC and kind != _MATRIX) or depth > _DEEPEST:
+    if (kind not in _NUMERIC and kind != _MATRIX) or depth > _MAX_DEPTH:
         raise ValueError(f"an element of type {kind} at depth {depth}")
     if kind == _MATRIX and content:
         array_class = struct.unpack_from(f"{order}I", content, 8)[0] & 0xFF
@@ -145,7 +145,7 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)
         start, after = at + 8, at + 8 + size + (-size % 8 if kind != _DEFLATED else 0)
-        if kind >> 16:  # a small element holds its content in the tag
+        if kind >> 16:  # the content of a small element is in the tag
             kind, size, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
         if start + size > min(len(data), after):
             raise ValueError("an element is cut short")

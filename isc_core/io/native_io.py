@@ -1,4 +1,4 @@
-"""Working around what native libraries do: open files by name only, and print to the terminal.
+"""Workarounds for native libraries, which open files by name only and print to the terminal.
 
 Problem: a library that opens a file by itself may read other bytes than those that were checked,
 since files change, and some accept no names but UTF-8: `memory_file` gives checked bytes an ASCII
@@ -46,9 +46,7 @@ def suppress_native_output() -> Iterator[None]:
         contextlib.ExitStack() as stack,
     ):
         warnings.simplefilter("ignore")
-        with contextlib.suppress(
-            OSError
-        ):  # without a descriptor 2 (a program with windows only) there is nothing to silence
+        with contextlib.suppress(OSError):  # programs without a terminal may have no descriptor 2
             saved = os.dup(2)
             stack.callback(os.close, saved)
             stack.callback(os.dup2, saved, 2)

@@ -28,9 +28,8 @@ from .limits import USUAL, Limits
 ARRAY, ARCHIVE = b"\x93NUMPY", b"PK"
 KINDS = "fiub"
 _ENCRYPTED = 0x1
-# What the literal in a header can make the parser raise: a nested or broken one, a kind that is
-# none.
-_PARSING = (
+# Errors of the parser for the literal in a header that is nested, broken or not a dtype.
+_PARSING_ERRORS = (
     TypeError,
     KeyError,
     IndexError,
@@ -41,7 +40,7 @@ _PARSING = (
     MemoryError,
     tokenize.TokenError,
 )
-_UNPACKING = (
+_UNPACKING_ERRORS = (
     ValueError,
     KeyError,
     OSError,
@@ -132,7 +131,7 @@ def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USU
     ):
         what = "objects" if kind.hasobject else str(kind)[:40]
         raise InputError(
-            f"{name} is not a readable array of numbers, it holds {what}: save plain numbers with "
+            f"{name} is not a readable array of numbers but of {what}: save plain numbers with "
             "numpy.save"
         )
     count = math.prod(shape)
@@ -184,9 +183,9 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
             }
     except InputError:
         raise
-    except _UNPACKING as error:
+    except _UNPACKING_ERRORS as error:
         raise InputError(
-            f"{name} is damaged or no archive of NumPy arrays: write it again"
+            f"{name} is damaged or not an archive of NumPy arrays: write it again"
         ) from error
     return {
         key: parse_array(content, f"{name} ({key})"[:400], KINDS + "U", limits).copy()
@@ -217,7 +216,7 @@ def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
     stream = io.BytesIO(data)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of headers that an old version wrote
+            warnings.simplefilter("ignore")  # about headers of old versions
             version = np.lib.format.read_magic(stream)
             if version not in ((1, 0), (2, 0)):
                 raise ValueError("a header of an unknown version")
@@ -227,7 +226,7 @@ def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
                 else np.lib.format.read_array_header_2_0
             )
             shape, by_columns, kind = read(stream)
-    except _PARSING as error:
+    except _PARSING_ERRORS as error:
         raise ValueError("no header of an array") from error
     return shape, by_columns, kind, stream.tell()
 

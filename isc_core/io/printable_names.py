@@ -1,4 +1,4 @@
-"""File names as people and other programs can read them.
+"""File names in printable characters.
 
 Problem: on Linux a file name is any bytes but `/` and zero. Python carries bytes that are not UTF-8
 as lone surrogates, which no text file, terminal or font accepts; and a name may hold line breaks,
@@ -7,8 +7,8 @@ or characters that move the cursor or change the writing direction.
 
 import unicodedata
 
-_UNSEEN = {"Cc", "Cs", "Zl", "Zp"}  # control, lone surrogate, line and paragraph separator
-_TURNING = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
+_INVISIBLE = {"Cc", "Cs", "Zl", "Zp"}  # control, lone surrogate, line and paragraph separator
+_BIDIRECTIONAL = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
 
 
 def readable(text: str) -> str:
@@ -31,8 +31,8 @@ def _readable(character: str) -> str:
     if 0xDC80 <= ord(character) <= 0xDCFF:  # a byte of a name that is not UTF-8
         return f"\\x{ord(character) - 0xDC00:02x}"
     if (
-        unicodedata.category(character) in _UNSEEN
-        or unicodedata.bidirectional(character) in _TURNING
+        unicodedata.category(character) in _INVISIBLE
+        or unicodedata.bidirectional(character) in _BIDIRECTIONAL
     ):
         return character.encode("unicode_escape").decode("ascii")
     return character

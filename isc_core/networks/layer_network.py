@@ -1,7 +1,7 @@
 """Prediction of the diffuse layer of a photo from its appearance.
 
-Problem: a highlight on grey paint has the paint's own colour; what gives it away is its form, how
-it lies on the shape, and the reflectance around it. No local cue is proof; a network trained on
+Problem: a highlight on a grey surface has the surface's colour; what reveals it is its form, its
+position on the shape, and the reflectance around it. No local cue is proof; a network trained on
 many objects weighs them all, near and far.
 
 Equation: y_c(x) = log(I_c / D_c) >= 0 and log b(x), the scale of y's error, from log(I / mean I +
@@ -15,8 +15,8 @@ Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
 Weights, training scenes and loss are our own: `python -m training.networks.layer_network`.
 
-Limits: it was trained on lamps, panels and environment maps with opaque objects of one piece. What
-neither colour nor form shows (a veil over everything) stays.
+Limits: it was trained on point lights, area lights and environment maps with opaque objects of one
+piece. What neither colour nor form shows (a veil over everything) stays.
 """
 
 from dataclasses import dataclass

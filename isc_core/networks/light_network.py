@@ -1,6 +1,6 @@
 """Prediction of a photo's light: the number of its sources, and the direction of the strongest.
 
-Problem: highlights and shadows tell people where the light comes from before they know the shape. A
+Problem: highlights and shadows show people where the light comes from before they know the shape. A
 model that recovers the shape first knows the light only as well as its normals, which are 10 to 20
 degrees off, so a mirrored direction twice that.
 
@@ -19,7 +19,7 @@ Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24
 encoder). Weights, training pictures and loss are our own: `python -m
 training.networks.light_network`.
 
-Limits: measured in docs/methods/light_network.md. It was trained on rendered glossy paint.
+Limits: measured in docs/methods/light_network.md. It was trained on rendered glossy surfaces.
 """
 
 from collections.abc import Mapping

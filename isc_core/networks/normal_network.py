@@ -1,6 +1,6 @@
 """Prediction of an object's normal map, before the light is known.
 
-Problem: shading alone does not tell concave from convex, nor the depth of either; silhouettes,
+Problem: shading alone does not separate concave from convex, nor the depth of either; silhouettes,
 highlights and shadows help people, and so does having seen many objects. SIRFS knows the shading
 and the silhouette only.
 
@@ -19,7 +19,7 @@ network); O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (encoder and decoder). Weights, training pictures and loss are our
 own: `python -m training.networks.normal_network`.
 
-Limits: measured in docs/methods/normal_network.md. It was trained on rendered glossy paint, and
+Limits: measured in docs/methods/normal_network.md. It was trained on rendered glossy surfaces, and
 resolves nothing finer than a thirtieth of the object.
 """
 

@@ -1,8 +1,8 @@
 """Classification of a photo's scene: opaque surface under one light, or a violated assumption.
 
-Problem: a mirror, glass, and paint under several sources also have a shape, a reflectance and a
-light that add up to the photo: wrong ones. Their appearance gives them away: an environment bent
-along the silhouette, highlights of one form beside each other.
+Problem: for a mirror, glass, or a surface under several sources there also are a shape, a
+reflectance and a light that explain the photo, but wrong ones. Their appearance reveals them: an
+environment bent along the silhouette, or repeated highlights of one form.
 
 Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo. Mean,
 deviation and fourth moment of each channel over the object make f (n,), and the probability of each
@@ -18,7 +18,7 @@ doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. L
 Weights, training scenes and loss are our own: `python -m training.networks.scene_classifier`.
 
 Limits: measured in docs/methods/scene_classification.md. A mirror of an environment without detail
-looks like paint, and two sources may look like two bumps.
+looks like an opaque surface, and two sources may look like two bumps.
 """
 
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Segmenting an object inside a box that a person draws around it.
+"""Segmentation of an object inside a box drawn around it.
 
 Problem: a photo whose background is not black has no mask; everything outside the box is
 background, inside it is unknown.
@@ -68,17 +68,17 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
         min(x + w + w // 2, width),
         min(y + h + h // 2, height),
     )
-    part = image[top:bottom, left:right]
+    crop = image[top:bottom, left:right]
     coded = (
-        part
-        if part.dtype == np.uint8
-        else np.rint(255 * np.clip(linear_to_srgb(part), 0, 1)).astype(np.uint8)
+        crop
+        if crop.dtype == np.uint8
+        else np.rint(255 * np.clip(linear_to_srgb(crop), 0, 1)).astype(np.uint8)
     )
     cover = _solve(coded, (x - left, y - top, w, h), iterations)
     mask = np.zeros((height, width), bool)
     inside = cover[y - top : y - top + h, x - left : x - left + w] > 0.5
     mask[y : y + h, x : x + w] = tidy_mask(inside)
-    check_mask(mask, f"--box {x},{y},{w},{h}: what GrabCut finds there")
+    check_mask(mask, f"--box {x},{y},{w},{h}: the mask that GrabCut finds")
     return mask
 
 
@@ -87,12 +87,12 @@ def _check_box(box: Box, width: int, height: int) -> None:
     name = f"--box {x},{y},{w},{h}"
     if w < MIN_SIDE or h < MIN_SIDE:
         raise InputError(
-            f"{name}: the box is x,y,width,height, at least {MIN_SIDE} pixels both ways: draw it "
+            f"{name}: the box x,y,width,height needs sides of at least {MIN_SIDE} pixels: draw it "
             "around the object"
         )
     if x < 0 or y < 0 or x + w > width or y + h > height:
         raise InputError(
-            f"{name}: reaches out of the image of {width} x {height} pixels: keep it inside"
+            f"{name}: extends beyond the image of {width} x {height} pixels: keep it inside"
         )
     if (x, y, w, h) == (0, 0, width, height):
         raise InputError(
@@ -102,8 +102,8 @@ def _check_box(box: Box, width: int, height: int) -> None:
 
 
 def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
-    """(H, W) float32, how much of each pixel is object, of (H, W, 3) uint8 RGB; solved at no more
-    than a megapixel.
+    """Object coverage (H, W) float32 of an (H, W, 3) uint8 RGB image; solved at no more than a
+    megapixel.
     """
     height, width = coded.shape[:2]
     factor = min(1.0, float(np.sqrt(SOLVED_PIXELS / (height * width))))
@@ -121,8 +121,8 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     cv2.grabCut(
         small, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), iterations, cv2.GC_INIT_WITH_MASK
     )
-    found = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
-    return cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR)
+    probability = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
+    return cv2.resize(probability, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
 def write_mask(path: str | Path, mask: np.ndarray) -> None:
@@ -146,7 +146,7 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
 
 def _require_png(path: str | Path) -> None:
     if Path(path).suffix.lower() != ".png":
-        raise InputError(f"{path}: a mask is written as PNG: give a name that ends in .png")
+        raise InputError(f"{path}: a mask is written as PNG: use a name that ends in .png")
 
 
 def cut_out(
@@ -184,13 +184,13 @@ def cut_out(
         and os.path.exists(photo_path)
         and os.path.samefile(photo_path, out_path)
     ):
-        raise InputError(f"{out_path} is the photo itself: name another file for its mask")
+        raise InputError(f"{out_path} is the photo itself: choose another file for its mask")
     require_writable_file(out_path)
     image = read_linear(photo_path, transfer, limits)
     white = float(np.percentile(image, 99.9)) or float(image.max())
     if white == 0:
         raise InputError(
-            f"{photo_path}: the image is black: there is nothing to cut out; use another photo"
+            f"{photo_path}: the image is black: there is nothing to segment; use another photo"
         )
     mask = grabcut(image / white, box)
     write_mask(out_path, mask)

@@ -1,4 +1,4 @@
-"""Finding the object's mask in a photo, and checking that it can be used."""
+"""Finding the object's mask in a photo, and checking it."""
 
 import functools
 from pathlib import Path
@@ -30,13 +30,13 @@ def check_mask(mask: np.ndarray, what: str) -> None:
         raise InputError(f"{what} is empty: mark the object in white on black")
     if count < MIN_MASK_PIXELS:
         raise InputError(
-            f"{what} has only {count} pixels: at least {MIN_MASK_PIXELS} are needed; use a larger "
-            "photo or mask"
+            f"{what} has only {count} pixels: at least {MIN_MASK_PIXELS} are required; use a "
+            "larger photo or mask"
         )
     width, height = mask_box(mask)[2:]
     if min(width, height) < MIN_SIDE:
         raise InputError(
-            f"{what} is only {width} x {height} pixels: at least {MIN_SIDE} are needed both ways; "
+            f"{what} is only {width} x {height} pixels: each side needs at least {MIN_SIDE}; "
             "use a larger photo or mask"
         )
 
@@ -96,7 +96,7 @@ def find_mask(
         If no mask is found.
     """
     if mask_path is not None:
-        return _mask_of_file(mask_path, raster, limits), "file"
+        return _read_mask(mask_path, raster, limits), "file"
     if raster.transparency is not None:
         return raster.transparency >= 0.5, "alpha"
     light = finite_or_zero(largest_channel(linear))
@@ -104,35 +104,35 @@ def find_mask(
         raise InputError(
             f"{path}: the image is black: there is nothing to recover; use another photo"
         )
-    # A float file has no coding white: its brightest percent stands in for it.
+    # A float file has no peak value: use its 99th percentile as white.
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
-    lit = light > white * float(srgb_to_linear(BLACK))
-    if lit[0].any() or lit[-1].any() or lit[:, 0].any() or lit[:, -1].any():
+    bright = light > white * float(srgb_to_linear(BLACK))
+    if bright[0].any() or bright[-1].any() or bright[:, 0].any() or bright[:, -1].any():
         if whole_frame:
-            return np.ones_like(lit), "whole frame"
+            return np.ones_like(bright), "whole frame"
         raise InputError(
-            f"{path}: there is no mask, no transparency and no black border to find the object by: "
+            f"{path}: there is no mask, no transparency and no black border: "
             "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask"
         )
-    if not lit.any():
+    if not bright.any():
         raise InputError(
             f"{path}: the image is almost black: there is nothing to recover; use another photo"
         )
-    return tidy_mask(lit), "black border"
+    return tidy_mask(bright), "black border"
 
 
-def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.ndarray:
+def _read_mask(mask_path: str | Path, photo: Raster, limits: Limits) -> np.ndarray:
     raster = read_raster(mask_path, limits)
     if raster.values.shape[:2] != photo.values.shape[:2]:
         (h, w), (mask_h, mask_w) = photo.values.shape[:2], raster.values.shape[:2]
         raise InputError(
-            f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: give a "
+            f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: use a "
             "mask of the photo's size"
         )
     if raster.transparency is not None:
         return raster.transparency >= 0.5
     values = finite_or_zero(largest_channel(raster.values))
-    # Half of the largest value, not of the coding's maximum: masks of 0 and 1 are common.
+    # Half of the largest value, not of the format's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)
 
 

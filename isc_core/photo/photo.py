@@ -1,4 +1,4 @@
-"""A photo of one object: linear light and a mask, and where they come from."""
+"""A photo of one object: linear light and a mask, and their source."""
 
 from dataclasses import dataclass, replace
 
@@ -114,7 +114,7 @@ class Photo:
         thin = min(mask_box(mask)[2:]) if mask.any() else 0
         if thin < MIN_SIDE:
             raise InputError(
-                f"--max-size {max_size} leaves the object only {thin} pixels thin: use "
+                f"--max-size {max_size} makes the object only {thin} pixels thin: use "
                 f"{_size_needed(self.box)} or more, or 0"
             )
         clipped = mask & (area(self.clipped & self.mask) > 1e-6)

@@ -20,7 +20,7 @@ from .photo import Photo, PhotoSource
 from .transfer import resolve_transfer, to_linear
 
 FLOAT_STEP = 2.0**-14
-_WILD = 1e9  # times the median light of the object: no source is that bright, a broken pixel is
+_DEFECTIVE = 1e9  # times the median light of the object: brighter pixels are defective
 
 
 def read_photo(
@@ -61,11 +61,11 @@ def read_photo(
     """
     raster = read_raster(path, limits)
     used = resolve_transfer(transfer, raster)
-    _refuse_constant(raster.values, f"{path}: every pixel")
+    _check_not_constant(raster.values, f"{path}: every pixel")
     linear = to_linear(raster, used)
     mask, mask_from = find_mask(path, raster, linear, mask_path, whole_frame, limits)
     check_mask(mask, f"{path if mask_path is None else mask_path}: the mask")
-    _refuse_constant(raster.values[mask], f"{path}: every pixel inside the mask")
+    _check_not_constant(raster.values[mask], f"{path}: every pixel inside the mask")
     height, width = mask.shape
     return Photo(
         image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, path)),
@@ -104,15 +104,12 @@ def read_linear(
     """
     raster = read_raster(path, limits)
     if finite and not np.isfinite(raster.values).all():
-        raise InputError(
-            f"{path} holds NaN or infinite values: light that bright has to be clipped, or saved "
-            "as 32-bit floats"
-        )
+        raise InputError(f"{path} has NaN or infinite values: clip it, or save it as 32-bit floats")
     linear = as_rgb(to_linear(raster, resolve_transfer(transfer, raster)))
     return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
 
 
-def _refuse_constant(values: np.ndarray, what: str) -> None:
+def _check_not_constant(values: np.ndarray, what: str) -> None:
     first = values.reshape(-1, values.shape[-1])[0]
     if (values == first).all():
         raise InputError(
@@ -122,20 +119,23 @@ def _refuse_constant(values: np.ndarray, what: str) -> None:
 
 
 def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.ndarray:
-    """The image with zeros for unusable values outside the mask; raises `InputError` for those
+    """The image with zeros for invalid values outside the mask; raises `InputError` for those
     inside.
     """
-    brightest, wild = largest_channel(linear), f"brighter than {_WILD:g} times most of the object"
+    brightest, too_bright = (
+        largest_channel(linear),
+        f"brighter than {_DEFECTIVE:g} times the object's median",
+    )
     for bad, what in (
         (~np.isfinite(linear).all(axis=2), "NaN or infinite"),
         ((linear < 0).any(axis=2), "negative"),
-        (brightest > _WILD * _median_positive(brightest[mask]), wild),
+        (brightest > _DEFECTIVE * _median_positive(brightest[mask]), too_bright),
     ):
         count = int((bad & mask).sum())
         if count:
             raise InputError(
-                f"{path}: {count} pixels inside the mask are {what}: mend them, or leave them out "
-                "of the mask"
+                f"{path}: {count} pixels inside the mask are {what}: repair them, or exclude them "
+                "from the mask"
             )
         if bad.any():
             linear = np.where(bad[..., None], np.float32(0), linear)
@@ -143,7 +143,7 @@ def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.n
 
 
 def _median_positive(light: np.ndarray) -> float:
-    """The median of the values (N,) above 0, infinite where none is."""
+    """The median of the values (N,) above 0, infinite without any."""
     light = light[light > 0]
     return float(np.median(light)) if light.size else np.inf
 

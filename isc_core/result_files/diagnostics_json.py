@@ -1,7 +1,7 @@
 """Reading the diagnostics of a result from decomposition.json.
 
 Schema 2 holds what `Diagnostics.to_json` writes. Schema 1 held sentences: the entries "gloss" and
-"joint", and the list "doubts"; they are recognised by their beginnings. The file may be anybody's:
+"joint", and the list "doubts"; they are recognised by their beginnings. The file is not trusted:
 parts of the wrong type or with unknown values are ignored.
 """
 

@@ -89,7 +89,7 @@ def save(
     InputError
         If the folder cannot be replaced or written, or the mask is too small for a mesh.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     ValueError
         If a map holds NaN or infinite values.
     """

@@ -86,7 +86,7 @@ def separate(
     InputError
         If a name, an option or an array is invalid, or the method cannot handle the photo.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options = method_options(method, variant, changes)
     check_arrays(image, mask, clipped)

@@ -254,7 +254,7 @@ def separate(
         If shapes or options are invalid, the mask is empty, or values inside it are negative or not
         finite.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     check_arrays(image, mask, clipped)

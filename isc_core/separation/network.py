@@ -65,7 +65,7 @@ def separate(
     InputError
         If options or arrays are invalid.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options, monitor = options or NetworkOptions(), monitor or Monitor()
     if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:

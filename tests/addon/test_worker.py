@@ -146,7 +146,7 @@ def test_arrays_are_decomposed_into_a_result_with_arrays(
     worker = start_decompose(job(photo, tmp_path / "new" / "result", mask), real)
     final = ended(worker, until=lambda update: seen.append(update) or update.state != "running")  # type: ignore[func-returns-value]
     assert (final.state, final.fraction) == ("done", 1.0), final
-    assert final.message == f"look at {tmp_path / 'new' / 'result' / 'preview.png'}"
+    assert final.message == f"see {tmp_path / 'new' / 'result' / 'preview.png'}"
     fractions = [update.fraction for update in seen]
     assert fractions == sorted(fractions)
     assert "starting" in {update.stage for update in seen}

@@ -1,4 +1,4 @@
-"""Manifests are read as streams, and their mistakes are told with the line."""
+"""Manifests are read as streams, and errors in them name the line."""
 
 import json
 from pathlib import Path
@@ -54,19 +54,19 @@ def test_names_of_files_may_be_any_bytes(tmp_path: Path) -> None:
         ("a.csv", "", "no column `image`"),
         ("a.csv", "cup.png\n", "no column `image`"),
         ("a.csv", "image,size\nx,1\n", "unknown column 'size'"),
-        ("a.csv", "image,image\nx,1\n", "twice"),
+        ("a.csv", "image,image\nx,1\n", "is repeated"),
         ("a.csv", "image,mask\nx\n", "line 2 has 1 cells, the header 2"),
         ("a.csv", 'image\n"x\n', "is not CSV"),
         ("a.csv", "image,max_size\nx,-3\n", "line 2: max_size cannot be '-3'"),
         ("a.csv", "image,model\nx,nosuch\n", 'line 2: unknown model "nosuch"'),
-        ("a.csv", "image,name\nx,../y\n", "line 2: '../y' cannot name a result"),
+        ("a.csv", "image,name\nx,../y\n", "line 2: '../y' is not a valid result name"),
         ("a.csv", "image\n" + "x" * (1 << 20) + "\n", "line 2 is longer"),
         ("a.jsonl", "{\n", "line 1 is not JSON"),
         ("a.jsonl", '{"image": "x"}\n[1]\n', "line 2 is not an object"),
         ("a.jsonl", "[" * 100_000 + "\n", "line 1 is not JSON"),
         ("a.jsonl", '{"mask": "x"}\n', "line 1 names no image"),
         ("a.jsonl", '{"image": 3}\n', "must be text"),
-        ("a.jsonl", '{"image": "x", "name": "/tmp/y"}\n', "cannot name a result"),
+        ("a.jsonl", '{"image": "x", "name": "/tmp/y"}\n', "is not a valid result name"),
         ("a.jsonl", '{"image": "x", "options": [1]}\n', "options must be an object"),
         ("a.jsonl", '{"image": "x", "options": {"threads": 3}}\n', "unknown option 'threads'"),
         ("a.jsonl", '{"image": "x", "full_size": 3}\n', "true or false"),

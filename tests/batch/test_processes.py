@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
-from isc_core.batch.attempts import MOST_LOST
+from isc_core.batch.attempts import MAX_CRASHES
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED
 from isc_core.batch.run_batch import run_batch
@@ -35,9 +35,9 @@ def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
     }
     assert (
         reasons["hang"]
-        == "took longer than --timeout 4 s and did not react (in obey): its worker was ended"
+        == "exceeded --timeout 4 s and did not respond (in obey): its worker was stopped"
     )
-    assert reasons["kill"].startswith(f"{MOST_LOST} workers were lost while they run_jobs on it")
+    assert reasons["kill"].startswith(f"{MAX_CRASHES} workers crashed while processing it")
     assert (tmp_path / "out" / "kill_once" / "made").exists()
 
 
@@ -114,5 +114,5 @@ def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) ->
         done = run_isc("batch", *words, "-o", tmp_path / "out", before=before)
         assert done.returncode == 2, done.stderr
         assert told in done.stderr
-        lines = [line for line in done.stderr.splitlines() if line != "isc: looking at the inputs"]
+        lines = [line for line in done.stderr.splitlines() if line != "isc: reading the inputs"]
         assert len(lines) == 1, done.stderr

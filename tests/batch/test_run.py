@@ -1,5 +1,5 @@
-"""Runs from end to end, with the workers in this process: what is made, skipped, failed, and what
-stands in the output.
+"""Runs from end to end, with the workers in this process: made, skipped and failed images, and the
+contents of the output folder.
 """
 
 import csv
@@ -128,7 +128,7 @@ def test_nobodys_files_are_replaced(photos: Path, tmp_path: Path) -> None:
     assert (output / "one" / "diary.txt").read_text() == "mine"
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "summary.html").write_text("mine")
-    with pytest.raises(InputError, match="no batch has written"):
+    with pytest.raises(InputError, match="not written by a batch"):
         run_batch(batch(photos, output=tmp_path / "other"))
 
 
@@ -173,10 +173,10 @@ def test_patterns_folders_of_masks_and_what_is_not_there(photos: Path, tmp_path:
         batch(tmp_path / "ph*" / "t?o.png", output=tmp_path / "out", masks=str(masks))
     ) == Counter({DONE: 1})
     assert load(tmp_path / "out" / "two").provenance.input["mask_from"] == "file"
-    with pytest.raises(InputError, match="holds no mask for three.png"):
+    with pytest.raises(InputError, match="has no mask for three.png"):
         run_batch(batch(photos, output=tmp_path / "out", masks=str(masks)))
     for missing in (tmp_path / "nowhere", tmp_path / "*.jpg", masks / "x.png"):
-        with pytest.raises(InputError, match="there is no such photo"):
+        with pytest.raises(InputError, match="no such photo"):
             run_batch(batch(missing, output=tmp_path / "none"))
         assert not (tmp_path / "none").exists()
 
@@ -221,7 +221,7 @@ def test_a_fault_of_the_program_is_told_and_stops_nothing(tmp_path: Path) -> Non
     }
     assert (
         reasons["fault"]
-        == "a fault of this program, please report it: ZeroDivisionError: a fault of two lines"
+        == "internal error, please report it: ZeroDivisionError: a fault of two lines"
     )
     assert "memory" in reasons["full"]
 
@@ -232,7 +232,7 @@ def test_a_step_that_looks_at_the_clock_is_stopped(tmp_path: Path) -> None:
     assert run_batch(plan, task=obedient) == Counter({FAILED: 1})
     assert (
         rows(tmp_path / "out" / "failures.jsonl")[0]["reason"]
-        == "took longer than --timeout 0.2 s, in the stage: polling"
+        == "exceeded --timeout 0.2 s, in the stage: polling"
     )
 
 
@@ -288,7 +288,7 @@ def test_many_images_have_several_pages(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_stream_is_worked_off_in_a_window(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What is at the scheduler stays little, however many lines there are."""
+    """The scheduler holds few tasks at a time, however long the manifest is."""
     (tmp_path / "list.csv").write_text(
         "image\n" + "".join(f"{number}.png\n" for number in range(60))
     )

@@ -275,7 +275,7 @@ def test_damaged_json_is_refused(refused: Callable[..., None], text: str) -> Non
 
 
 def test_numbers_too_large_for_floats_are_refused(refused: Callable[..., None]) -> None:
-    refused(read_light, "a.json", json.dumps([[10**400] * 3] * 9).encode(), "holds no light")
+    refused(read_light, "a.json", json.dumps([[10**400] * 3] * 9).encode(), "is not a light")
 
 
 @pytest.mark.parametrize("name", ["line\nend", "\x1b[2J", "\u202egnp.exe", "\udce9"])

@@ -165,7 +165,7 @@ def test_a_large_image_is_reduced_by_means(tmp_path: Path) -> None:
 
 def test_files_that_are_no_images_are_refused(tmp_path: Path) -> None:
     (tmp_path / "a.png").write_bytes(b"not a picture")
-    with pytest.raises(InputError, match="not an image of a known kind"):
+    with pytest.raises(InputError, match="not an image of a known format"):
         image_albedo(tmp_path / "a.png")
     with pytest.raises(InputError, match="no such file"):
         image_albedo(tmp_path / "b.png")

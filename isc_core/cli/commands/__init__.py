@@ -1,4 +1,4 @@
-"""The sub-commands of `isc`, one a file: each declares its options and does its work.
+"""The sub-commands of `isc`, one per file: each declares its options and runs.
 
 A command's `run(options, monitor)` returns the lines to print; it raises `InputError` and
 `Cancelled`.
@@ -29,7 +29,7 @@ Exit codes: 0 done, 1 done with failures, 2 an input cannot be used, 130 cancell
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """The parser of the whole command; what it parses has `run`, to be called, and `quiet`."""
+    """Build the parser of `isc`; it sets `run`, the function to call, and `quiet`."""
     parser = Parser(
         prog="isc",
         description="Intrinsic scene characteristics from one photo of a glossy object: diffuse "
@@ -42,33 +42,33 @@ def build_parser() -> argparse.ArgumentParser:
     for command in (decompose, batch, separate, edit, arrays, mask, evaluate, fit_priors):
         command.declare(commands)
     for entry in entry_points(group=_GROUP):
-        _declare_other(entry, commands)
+        _declare_plugin(entry, commands)
     return parser
 
 
-def _declare_other(entry: EntryPoint, commands: Commands) -> None:
-    """Adds the command of another package; where that cannot be imported, one that takes any
-    arguments and refuses.
+def _declare_plugin(entry: EntryPoint, commands: Commands) -> None:
+    """Add the command of another package; if that cannot be imported, a command that takes any
+    arguments and fails.
     """
     try:
         module = entry.load()
     except ImportError as error:
         extra = entry.module.partition(".")[0]
         reason = (
-            f"isc {entry.name} cannot start ({error}): install it with "
+            f"isc {entry.name} is not available ({error}): install it with "
             f"`pip install 'isc3d[{extra}]'`"
         )
     else:
         module.declare(commands)
         return
 
-    def refuse(options: argparse.Namespace, monitor: Monitor) -> NoReturn:
+    def fail(options: argparse.Namespace, monitor: Monitor) -> NoReturn:
         del options, monitor
         raise InputError(reason)
 
-    # No argument begins with this character, so that all of them, options too, are simply taken.
+    # No argument begins with this prefix, so the parser accepts all arguments, options included.
     parser = commands.add_parser(
-        entry.name, help="cannot start here: run it to see why", prefix_chars="\0", add_help=False
+        entry.name, help="not available: run it to see why", prefix_chars="\0", add_help=False
     )
     parser.add_argument("anything", nargs="*")
-    parser.set_defaults(run=refuse, quiet=True)
+    parser.set_defaults(run=fail, quiet=True)

@@ -1,4 +1,4 @@
-"""`isc arrays`: a result once more as plain NumPy arrays, for programs that read neither OpenEXR
+"""`isc arrays`: a result as plain NumPy arrays, for programs that read neither OpenEXR
 nor glTF.
 """
 
@@ -22,17 +22,17 @@ def declare(commands: Commands) -> None:
         run,
         "a result as plain NumPy arrays",
         f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, "
-        "for programs that have NumPy alone. "
-        "isc decompose --arrays writes it at once.",
+        "for programs that have only NumPy. "
+        "isc decompose --arrays writes it directly.",
         _EXAMPLES,
     )
     parser.add_argument(
-        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+        "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
     )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; problems are found before the work begins."""
+    """Run the command; inputs are checked before the work begins."""
     monitor.report("reading", 0.0)
     result, path = load(options.result), options.result / ARRAYS
     require_writable_file(path)
@@ -40,4 +40,4 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     with new_file(path) as partial:
         write_arrays(result, partial)
         monitor.report("writing arrays", 1.0)
-    return hints(options, f"{path} is written")
+    return hints(options, f"wrote {path}")

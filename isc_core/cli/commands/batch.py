@@ -43,9 +43,9 @@ def declare(commands: Commands) -> None:
         "batch",
         run,
         "isc decompose for many photos, resumable",
-        "Decomposes many photos, one folder each in DIR. Writes summary.html (look at this first), "
+        "Decomposes many photos, one folder each in DIR. Writes summary.html (start here), "
         "summary.csv, summary.jsonl and "
-        "failures.jsonl beside them.",
+        "failures.jsonl next to them.",
         _EXAMPLES,
     )
     parser.add_argument(
@@ -69,38 +69,38 @@ def declare(commands: Commands) -> None:
     )
     add_transfer(parser)
     add_settings(parser)
-    _add_crew(parser)
+    _add_workers(parser)
     add_limits(parser)
     parser.add_argument(
         "--timeout",
         type=positive,
         default=0.0,
         metavar="SECONDS",
-        help="give up an image that takes longer (default: never)",
+        help="stop images that take longer (default: no limit)",
     )
 
 
-def _add_crew(parser: argparse.ArgumentParser) -> None:
-    usual = Crew()
-    crew = parser.add_argument_group("who works")
+def _add_workers(parser: argparse.ArgumentParser) -> None:
+    defaults = Crew()
+    crew = parser.add_argument_group("workers")
     crew.add_argument(
         "--workers",
         type=count,
-        default=usual.workers,
+        default=defaults.workers,
         metavar="N",
-        help="images at once (default 0: one for each core)",
+        help="images processed at once (default 0: one per core)",
     )
     crew.add_argument(
-        "--memory", default=usual.memory, metavar="SIZE",
-        help="of each worker, such as 4GB; one that needs more is ended (default: a fair share)",
+        "--memory", default=defaults.memory, metavar="SIZE",
+        help="memory of each worker, such as 4GB; one that exceeds it is stopped (default: equal)",
     )  # fmt: skip
     crew.add_argument(
         "--scheduler",
-        default=usual.scheduler,
+        default=defaults.scheduler,
         metavar="ADDRESS",
-        help="work on this Dask cluster instead of this machine",
+        help="use this Dask cluster instead of this machine",
     )
-    add_engine(parser, "threads for each image (0: the cores shared among the workers)")
+    add_engine(parser, "threads per image (0: the cores, shared among the workers)")
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -113,21 +113,18 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )  # fmt: skip
 
     def announce(line: str) -> None:
-        missing = (
-            "" if importlib.util.find_spec("bokeh") else " (its pages need `pip install bokeh`)"
-        )
+        missing = "" if importlib.util.find_spec("bokeh") else " (requires `pip install bokeh`)"
         print(f"isc: {line}{missing}", file=sys.stderr)
 
     counts = run_batch(batch, monitor, (lambda line: None) if options.quiet else announce)
-    look = f"look at {options.output / 'summary.html'}"
+    where = f"see {options.output / 'summary.html'}"
     if counts[FAILED]:
         raise Rejected(
-            f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in "
-            f"failures.jsonl: {look}"
+            f"{counts[FAILED]} of {sum(counts.values())} images failed (reasons in "
+            f"failures.jsonl): {where}"
         )
-    done, there = counts[DONE], counts[SKIPPED]
+    done, skipped = counts[DONE], counts[SKIPPED]
     return hints(
         options,
-        f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there "
-        f"already: {look}",
+        f"{done} image{'s' * (done != 1)} done, {skipped} already finished: {where}",
     )

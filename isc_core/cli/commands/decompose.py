@@ -40,9 +40,9 @@ def declare(commands: Commands) -> None:
         "decompose",
         run,
         "everything: layers, shape, light, shading, reflectance, mesh",
-        "Takes a photo of one glossy object apart: diffuse and specular light, shape, "
+        "Decomposes a photo of one glossy object into diffuse and specular light, shape, "
         "illumination, shading, reflectance. Writes a folder "
-        "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.",
+        "with preview.png (start here), maps.exr, mesh.glb and decomposition.json.",
         _EXAMPLES,
     )
     add_photo(parser)
@@ -55,63 +55,63 @@ def declare(commands: Commands) -> None:
         help="the folder to write; an earlier result is replaced",
     )
     add_settings(parser)
-    _add_evidence(parser)
+    _add_known_inputs(parser)
     add_engine(parser)
 
 
-def _add_evidence(parser: argparse.ArgumentParser) -> None:
-    usual = KnownInputs()
-    known = parser.add_argument_group("what is known already")
-    known.add_argument(
+def _add_known_inputs(parser: argparse.ArgumentParser) -> None:
+    defaults = KnownInputs()
+    group = parser.add_argument_group("known inputs")
+    group.add_argument(
         "--shape",
         type=Path,
         metavar="FILE",
         help="the exact shape, a height map without holes inside the mask",
     )
-    known.add_argument(
+    group.add_argument(
         "--light",
         type=Path,
         metavar="FILE",
         help="the exact light, a decomposition.json or a JSON file with 9 x 3 coefficients",
     )
-    known.add_argument(
+    group.add_argument(
         "--depth", type=Path, metavar="FILE", help="a measured height map, with holes and errors"
     )
-    known.add_argument(
+    group.add_argument(
         "--depth-sigma",
         type=positive,
-        default=usual.depth_sigma,
+        default=defaults.depth_sigma,
         metavar="S",
-        help="its standard error in photo pixels (default %(default)s)",
+        help="its standard deviation in photo pixels (default %(default)s)",
     )
-    known.add_argument(
+    group.add_argument(
         "--depth-weight",
         type=positive,
-        default=usual.depth_weight,
+        default=defaults.depth_weight,
         metavar="W",
-        help="how much it counts (default %(default)s)",
+        help="its weight (default %(default)s)",
     )
-    known.add_argument(
+    group.add_argument(
         "--height-scale",
         type=number,
         metavar="F",
-        help="photo pixels to one unit of --shape and --depth (default 1; 1/64 for 16 bits)",
+        help="photo pixels per unit of --shape and --depth (default 1; 1/64 for 16 bits)",
     )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; problems are found before the work begins."""
+    """Run the command; inputs are checked before the work begins."""
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
     require_writable_result(options.output, inputs=(options.photo, options.mask))
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
-    evidence = _evidence(options, photo)
+    known = _known_inputs(options, photo)
     require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(
         photo,
         settings,
-        known=evidence,
+        known=known,
         prior_set=prior_set,
         name=options.photo.name,
         monitor=monitor.part(0.0, 0.8),
@@ -120,11 +120,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     return hints(
         options,
         *note_lines(result.provenance.diagnostics),
-        f"look at {options.output / 'preview.png'}",
+        f"see {options.output / 'preview.png'}",
     )
 
 
-def _evidence(options: argparse.Namespace, photo: Photo) -> KnownInputs:
+def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:
     size, scale, limits = photo.mask.shape, options.height_scale, limits_of(options)
     return KnownInputs(
         height=None if options.shape is None else read_height(options.shape, size, scale, limits),
@@ -136,7 +136,7 @@ def _evidence(options: argparse.Namespace, photo: Photo) -> KnownInputs:
 
 
 def _pixels(photo: Photo, settings: Settings) -> int:
-    """Of the object in the maps to come."""
+    """Number of the object's pixels in the maps."""
     longest = max(photo.box[2:])
     keep = settings.full_size or settings.max_size == 0 or longest <= settings.max_size
     return round(int(photo.mask.sum()) * (1.0 if keep else (settings.max_size / longest) ** 2))

@@ -1,4 +1,4 @@
-"""`isc evaluate`: how far a model is from the truth, object by object."""
+"""`isc evaluate`: errors of a model against ground truth, object by object."""
 
 import argparse
 import json
@@ -17,7 +17,8 @@ _EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
   isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
   isc evaluate DATA --dataset mit-berkeley --input original --model joint
 
-The package's own priors were fitted on the training objects of this set. For a fair figure leave the object out:
+The priors of the package were fitted to the training objects of this set. For an unbiased figure
+leave the object out:
   isc fit-priors DATA --leave-out apple -o priors.npz
   isc evaluate DATA --dataset mit-berkeley --objects apple --priors priors.npz"""
 
@@ -36,7 +37,9 @@ def declare(commands: Commands) -> None:
         _EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
-    parser.add_argument("--dataset", choices=("mit-berkeley",), required=True, help="its kind")
+    parser.add_argument(
+        "--dataset", choices=("mit-berkeley",), required=True, help="format of the data set"
+    )
     parser.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
     parser.add_argument(
         "--input",
@@ -58,10 +61,10 @@ def declare(commands: Commands) -> None:
         "--separator",
         default=RunnerOptions().separator,
         metavar="NAME",
-        help="of joint, mdr, mbp (default %(default)s)",
+        help="separation method of joint, mdr, mbp (default %(default)s)",
     )
     parser.add_argument(
-        "--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose"
+        "--confidence-weights", action="store_true", help="for joint and mdr: as for isc decompose"
     )
     parser.add_argument(
         "--light-prior",
@@ -77,10 +80,10 @@ def declare(commands: Commands) -> None:
     )
     parser.add_argument(
         "--protocol",
-        choices=tuple(one.value for one in Protocol),
+        choices=tuple(protocol.value for protocol in Protocol),
         default=Protocol.REFERENCE.value,
         help="reference: the published protocol, at the images' own scale on the data set's crop; "
-        "users: what isc decompose does by default (default %(default)s)",
+        "users: the defaults of isc decompose (default %(default)s)",
     )
     parser.add_argument(
         "--priors",

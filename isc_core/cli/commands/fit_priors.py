@@ -22,7 +22,7 @@ def declare(commands: Commands) -> None:
         commands,
         "fit-priors",
         run,
-        "learn the statistics of shapes, paints and lights anew",
+        "fit the priors of shape, reflectance and light",
         "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with "
         "natural_lights.mat) and writes them to a file "
         "for --priors.",
@@ -42,8 +42,7 @@ def declare(commands: Commands) -> None:
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Run the command."""
     ensure_cache_folder()
-    # These declare compiled functions, which needs the folder, and time that the other commands
-    # should not spend.
+    # These modules declare compiled functions, which need the cache folder and slow down start-up.
     from ...prior_fitting.fit import fit_priors
     from ...prior_fitting.statistics import collect_statistics
     from ...prior_fitting.training_objects import read_training_objects
@@ -60,16 +59,16 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def _chosen(
-    root: Path, wanted: tuple[str, ...] | None, left_out: tuple[str, ...] | None
+    root: Path, selected: tuple[str, ...] | None, excluded: tuple[str, ...] | None
 ) -> tuple[str, ...]:
-    known = list_objects(root, "laboratory")
-    for name in (wanted or ()) + (left_out or ()):
-        if name not in known:
-            raise InputError(f"unknown object '{name}': choose from {', '.join(known)}")
+    available = list_objects(root, "laboratory")
+    for name in (selected or ()) + (excluded or ()):
+        if name not in available:
+            raise InputError(f"unknown object '{name}': choose from {', '.join(available)}")
     chosen = (
-        tuple(dict.fromkeys(wanted))
-        if wanted
-        else tuple(name for name in known if name not in (left_out or ()))
+        tuple(dict.fromkeys(selected))
+        if selected
+        else tuple(name for name in available if name not in (excluded or ()))
     )
     if len(chosen) < 2:
         raise InputError("priors need at least two objects: name more, or leave out fewer")

@@ -1,4 +1,4 @@
-"""`isc mask`: the object inside a box, cut out of its background."""
+"""`isc mask`: segmentation of the object inside a box."""
 
 import argparse
 from pathlib import Path
@@ -16,9 +16,9 @@ def declare(commands: Commands) -> None:
         commands,
         "mask",
         run,
-        "cut the object out of a box drawn around it",
-        "Finds the object inside a box and writes its mask, white on black. Look at it before you "
-        "use it: colours alone decide.",
+        "segment the object inside a box",
+        "Finds the object inside a box and writes its mask, white on black. Check it before you "
+        "use it: the segmentation uses colours alone.",
         _EXAMPLES,
     )
     parser.add_argument("photo", metavar="PHOTO", type=Path, help="the photo, as for isc decompose")
@@ -27,7 +27,7 @@ def declare(commands: Commands) -> None:
         type=_box,
         required=True,
         metavar="x,y,w,h",
-        help="left, top, width and height in pixels, some background around the object included",
+        help="left, top, width and height in pixels, with some background around the object",
     )
     add_transfer(parser)
     add_limits(parser)
@@ -39,12 +39,8 @@ def declare(commands: Commands) -> None:
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Run the command."""
     del monitor  # one step of a second or two
-    found = cut_out(
-        options.photo, options.box, options.output, options.transfer, limits_of(options)
-    )
-    return hints(
-        options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it"
-    )
+    mask = cut_out(options.photo, options.box, options.output, options.transfer, limits_of(options))
+    return hints(options, f"{options.output}: {int(mask.sum())} pixels; check it before you use it")
 
 
 def _box(text: str) -> Box:
@@ -52,5 +48,5 @@ def _box(text: str) -> Box:
     try:
         x, y, width, height = (int(part) for part in parts)
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is not four whole numbers x,y,w,h") from error
+        raise argparse.ArgumentTypeError(f"{text!r} is not four integers x,y,w,h") from error
     return x, y, width, height

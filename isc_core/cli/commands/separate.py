@@ -31,8 +31,8 @@ def declare(commands: Commands) -> None:
         run,
         "diffuse and specular light only",
         "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
-        "pictures of both. A photo without mask, "
-        "transparency and black border is taken as a whole.",
+        "images of both. A photo without mask, "
+        "transparency and black border is processed as a whole.",
         _EXAMPLES,
     )
     add_photo(parser)
@@ -41,14 +41,14 @@ def declare(commands: Commands) -> None:
         choices=METHODS,
         default=BEST,
         metavar="NAME",
-        help=f"how: {', '.join(METHODS)} (default {BEST})",
+        help=f"separation method: {', '.join(METHODS)} (default {BEST})",
     )
     parser.add_argument(
         "--variant",
         default=IMPROVED,
         metavar="NAME",
-        help="improved (default), paper (as published) or, for some methods, sihr (as in that "
-        "public toolbox)",
+        help="improved (default), paper (as published) or, for some methods, sihr (as in the "
+        "public toolbox SIHR)",
     )
     parser.add_argument(
         "--set",
@@ -76,10 +76,10 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; problems are found before the work begins."""
+    """Run the command; inputs are checked before the work begins."""
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
-        raise InputError(f"--prior is for the method {BEST} alone")
+        raise InputError(f"--prior needs the method {BEST}")
     require_writable_result(
         options.output, separation=True, inputs=(options.photo, options.mask, options.prior)
     )
@@ -100,17 +100,17 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
     for note in [] if options.quiet else _notes(options, photo, layers):
         print(f"isc: note: {note}", file=sys.stderr)
-    return hints(options, f"look at {options.output / 'preview.png'}")
+    return hints(options, f"see {options.output / 'preview.png'}")
 
 
 def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Iterator[str]:
-    """What a person should know of the result."""
+    """Notes on the result."""
     if photo.original.mask_from == "whole frame":
-        yield "there is no mask, so the whole image was taken; --mask names one"
+        yield "no mask: the whole image was processed; set one with --mask"
     if options.method == "none" or layers.specular[~photo.clipped].any():
         return
     if has_colour(photo.image, photo.mask):
-        yield "no highlight could be proven, so the photo was left as it is"
+        yield "no highlight was detected with confidence, so the photo was left unchanged"
     else:
         yield (
             "the photo has no colour, which distinguishes highlights from reflectance, so it was "
@@ -121,7 +121,7 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
 def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:
     """The stored values of an image, as probabilities (H, W) in [0, 1].
 
-    Raises `InputError` unless it has the photo's size (H, W).
+    Raise `InputError` unless it has the photo's size (H, W).
     """
     prior: np.ndarray = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
     if prior.shape != size:

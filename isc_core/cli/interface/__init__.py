@@ -1,1 +1,1 @@
-"""What every command shares: options, the terminal, and progress as JSON."""
+"""Shared parts of the commands: options, terminal output, and progress as JSON."""

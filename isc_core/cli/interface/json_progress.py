@@ -1,4 +1,4 @@
-"""The protocol of `isc --progress json`: one JSON object a line on standard output.
+"""The protocol of `isc --progress json`: one JSON object per line on standard output.
 
     {"event": "progress", "stage": "shape and light", "fraction": 0.42, "detail": "loss 46.100"}
     {"event": "done", "output": "cup", "lines": ["look at cup/preview.png"]}
@@ -33,11 +33,11 @@ from ...progress import ProgressEvent
 from .terminal import discard_output
 
 _REPEAT_SECONDS = 0.05
-PATIENCE_SECONDS = (1.0, 10.0)  # after asking, after interrupting
+GRACE_SECONDS = (1.0, 10.0)  # seconds to wait after the first and the second interrupt
 _CANCELLED = 130
 
 
-class JsonSpeaker:
+class JsonReporter:
     """Reports to a program.
 
     As a context manager, in the main thread of the process, it lets the program cancel by
@@ -46,10 +46,10 @@ class JsonSpeaker:
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
-        self._stage, self._most, self._told = "", 0.0, float("-inf")
+        self._stage, self._most, self._reported = "", 0.0, float("-inf")
         self._ended = threading.Event()
-        self._turn = threading.Lock()
-        self._before: object = None
+        self._lock = threading.Lock()
+        self._previous_handler: object = None
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
@@ -59,49 +59,46 @@ class JsonSpeaker:
 
     def done(self, output: str, lines: Sequence[str]) -> None:
         """Report the output of a finished command."""
-        self._say("done", output=output, lines=list(lines))
+        self._write("done", output=output, lines=list(lines))
 
     def failed(self, message: str, code: int) -> None:
         """Report the error message and exit code of a failed command."""
-        self._say("failed", message=message, code=code)
+        self._write("failed", message=message, code=code)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
         """Report the violated bounds of a result."""
-        self._say("failed", message="; ".join(lines), code=code)
+        self._write("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:
         """Report that the command was cancelled."""
-        self._say("cancelled")
+        self._write("cancelled")
 
     def _step(self, event: ProgressEvent) -> None:
         now = time.monotonic()
         self._most = max(self._most, min(event.fraction, 1.0))
-        if event.stage != self._stage or now - self._told > _REPEAT_SECONDS:
-            self._stage, self._told = event.stage, now
-            self._say(
+        if event.stage != self._stage or now - self._reported > _REPEAT_SECONDS:
+            self._stage, self._reported = event.stage, now
+            self._write(
                 "progress",
                 stage=event.stage,
                 fraction=round(self._most, 4),
                 detail=event.detail,
             )
 
-    def _say(self, event: str, **content: object) -> None:
+    def _write(self, event: str, **content: object) -> None:
         try:
             self._stream.write(json.dumps({"event": event, **content}) + "\n")
             self._stream.flush()
-        except (
-            OSError
-        ):  # nobody listens any more: the end of standard input says so too, and stops the work
+        except OSError:  # the reader is gone: the end of standard input then cancels the work
             discard_output()
 
-    def __enter__(self) -> "JsonSpeaker":
+    def __enter__(self) -> "JsonReporter":
         if (
             threading.current_thread() is threading.main_thread()
             and signal.getsignal(signal.SIGINT) == signal.SIG_IGN
         ):
-            # A program in the background hands on that Ctrl-C is ignored, but here no terminal
-            # asks.
-            self._before = signal.signal(signal.SIGINT, signal.default_int_handler)
+            # Background programs pass on an ignored SIGINT, but here cancelling relies on it.
+            self._previous_handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         if (descriptor := _standard_input()) is not None:
             threading.Thread(
                 target=self._watch, args=(descriptor,), name="isc-cancel", daemon=True
@@ -115,19 +112,19 @@ class JsonSpeaker:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with self._turn:  # from here on nothing is interrupted, so that the last word is heard
+        with self._lock:  # no interrupts from here on, so that the last event is written
             self._ended.set()
-        if self._before is not None:
+        if self._previous_handler is not None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def _watch(self, descriptor: int) -> None:
         _await_cancel(descriptor)
-        for patience in PATIENCE_SECONDS:
-            with self._turn:
+        for grace in GRACE_SECONDS:
+            with self._lock:
                 if self._ended.is_set():
                     return
                 _thread.interrupt_main()
-            self._ended.wait(patience)
+            self._ended.wait(grace)
         if not self._ended.is_set():
             os._exit(_CANCELLED)
 
@@ -135,13 +132,13 @@ class JsonSpeaker:
 def _standard_input() -> int | None:
     try:
         return sys.stdin.fileno()
-    except (AttributeError, OSError, ValueError):  # there is none, or it is no file
+    except (AttributeError, OSError, ValueError):  # there is none, or it is not a file
         return None
 
 
 def _await_cancel(descriptor: int) -> None:
-    """Returns once the line `cancel` or the end of the file was read, past Python's buffer: its
-    lock would outlive this thread.
+    """Return after the line `cancel` or the end of the file; reads the descriptor directly, because
+    the lock of Python's buffer would outlive this thread.
     """
     text = b""
     while b"cancel" not in (line.strip() for line in text.split(b"\n")[:-1]):

@@ -22,11 +22,11 @@ from ...io.limits import USUAL, Limits
 from ...photo import TRANSFERS
 from ...separation import METHODS
 
-Commands = Any  # what `add_subparsers` returns has no public name
+Commands = Any  # the type that `add_subparsers` returns is private
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
-    """Keeps the examples as they are written, and fills the lines above them."""
+    """Keeps the line breaks of the examples, and wraps other text."""
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         keep = "\n" in text
@@ -74,39 +74,39 @@ def add_command(
         epilog=f"examples:\n{examples}" if examples else None,
     )
     parser.set_defaults(run=run)
-    add_speech(parser)
+    add_output_options(parser)
     return parser
 
 
-def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
+def add_output_options(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
     """Add --quiet and --progress.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
     again : bool
-        For an action of a command that has them, so that they may stand before or after it.
+        For an action of a command that has them, so that they may precede or follow it.
     """
-    told = (
+    default = (
         argparse.SUPPRESS if again else None
-    )  # what stands before the action is not to be undone by a default
+    )  # an option before the action must not be reset by a default after it
     parser.add_argument(
         "--quiet",
         action="store_true",
-        default=told or False,
+        default=default or False,
         help="show no progress and print results only",
     )
     parser.add_argument(
         "--progress",
         choices=("bar", "json"),
-        default=told or "bar",
-        help="json: for programs, one JSON object a line on stdout, cancelled by `cancel` or the "
+        default=default or "bar",
+        help="json: for programs, one JSON object per line on stdout, cancelled by `cancel` or the "
         "end of stdin (default bar)",
     )
 
 
 def hints(options: argparse.Namespace, *lines: str) -> list[str]:
-    """Return lines that only help a person: none with --quiet."""
+    """Return the lines, or none with --quiet."""
     return [] if options.quiet else list(lines)
 
 
@@ -135,7 +135,7 @@ def add_transfer(parser: argparse.ArgumentParser) -> None:
         "--transfer",
         choices=TRANSFERS,
         default="auto",
-        help="how the photo is coded (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
+        help="encoding of the photo (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
     )
 
 
@@ -146,7 +146,7 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
         type=whole,
         default=USUAL.max_pixels,
         metavar="N",
-        help="refuse images with more pixels (width x height) before they are unpacked "
+        help="reject images with more pixels (width x height) before decoding them "
         "(default %(default)s)",
     )
 
@@ -158,34 +158,34 @@ def limits_of(options: argparse.Namespace) -> Limits:
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """Add the options of `Settings` except --engine and --threads; and --priors and --arrays."""
-    usual = Settings()
+    defaults = Settings()
     parser.add_argument(
         "--model",
-        default=usual.model,
+        default=defaults.model,
         metavar="NAME",
-        help=f"{', '.join(MODELS)} (default {usual.model})",
+        help=f"{', '.join(MODELS)} (default {defaults.model})",
     )
     parser.add_argument(
         "--separator",
-        default=usual.separator,
+        default=defaults.separator,
         metavar="NAME",
-        help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
+        help=f"separation method: {', '.join(METHODS)} (default {defaults.separator})",
     )
     parser.add_argument(
         "--illumination",
         choices=ILLUMINATIONS,
-        default=usual.illumination,
-        help="kind of light to expect (default %(default)s)",
+        default=defaults.illumination,
+        help="prior of the illumination (default %(default)s)",
     )
     parser.add_argument(
         "--max-size",
         type=count,
-        default=usual.max_size,
+        default=defaults.max_size,
         metavar="N",
         help="long side of the object in the maps, in pixels (default %(default)s; 0: the photo's)",
     )
     parser.add_argument(
-        "--full-size", action="store_true", help="bring the result back to the photo's resolution"
+        "--full-size", action="store_true", help="upsample the result to the photo's resolution"
     )
     parser.add_argument(
         "--shading-only", action="store_true", help="shape from shading: the object has one colour"
@@ -198,7 +198,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--light-colour",
         choices=LIGHT_COLOURS,
-        default=usual.light_colour,
+        default=defaults.light_colour,
         help="colour of the light: white, or estimated from highlights where they determine it "
         "(default %(default)s)",
     )
@@ -206,7 +206,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         "--light-prior",
         type=current_name("light_prior"),
         choices=LIGHT_PRIORS,
-        default=usual.light_prior,
+        default=defaults.light_prior,
         help="prior of the light: predicted from the photo, or that of the data set "
         "(default %(default)s)",
     )
@@ -214,7 +214,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         "--shape-prior",
         type=current_name("shape_prior"),
         choices=SHAPE_PRIORS,
-        default=usual.shape_prior,
+        default=defaults.shape_prior,
         help="prior of the shape: predicted from the photo, or from its silhouette alone "
         "(default %(default)s)",
     )
@@ -232,14 +232,14 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seed",
         type=count,
-        default=usual.seed,
+        default=defaults.seed,
         metavar="N",
-        help="of random numbers, written into the result (default %(default)s)",
+        help="random seed, recorded in the result (default %(default)s)",
     )
 
 
 def add_engine(
-    parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)"
+    parser: argparse.ArgumentParser, threads: str = "number of threads (0: one per core)"
 ) -> None:
     """Add --engine and --threads."""
     parser.add_argument(
@@ -315,8 +315,8 @@ def positive(text: str) -> float:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Names with commas between them."""
-    found = tuple(name.strip() for name in text.split(",") if name.strip())
-    if not found:
+    """Parse names separated by commas."""
+    parsed = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not parsed:
         raise argparse.ArgumentTypeError("give at least one name")
-    return found
+    return parsed

@@ -20,21 +20,23 @@ _REDRAW_SECONDS = 0.08
 
 
 def discard_output() -> None:
-    """Redirect standard output to nothing, so that buffered output does not fail again at exit."""
+    """Redirect standard output to the null device, so that flushing at exit does not fail."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def printable(text: str, stream: TextIO) -> str:
     """Return `text`, of one or more lines, in characters that `stream` can encode."""
-    coding = getattr(stream, "encoding", None) or "utf-8"
+    encoding = getattr(stream, "encoding", None) or "utf-8"
     return (
-        "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
+        "\n".join(map(readable, text.split("\n")))
+        .encode(encoding, "backslashreplace")
+        .decode(encoding)
     )
 
 
-class TerminalSpeaker:
-    """Reports to a person: results on standard output, all else on standard error."""
+class TerminalReporter:
+    """Reports to a user: results on standard output, everything else on standard error."""
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
@@ -42,7 +44,7 @@ class TerminalSpeaker:
         with ProgressBar(sys.stderr, quiet=quiet) as bar:
             yield bar
 
-    def __enter__(self) -> "TerminalSpeaker":
+    def __enter__(self) -> "TerminalReporter":
         return self
 
     def __exit__(
@@ -91,29 +93,29 @@ class ProgressBar:
     def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
         self._stream = stream
         self._quiet = quiet
-        self._live = stream.isatty()
+        self._terminal = stream.isatty()
         self._stage = ""
-        self._most = 0.0
-        self._drawn = float("-inf")
+        self._fraction = 0.0
+        self._last_draw = float("-inf")
 
     def __call__(self, event: ProgressEvent) -> None:
         """Show an event; the bar never moves backwards."""
         if self._quiet:
             return
         new, self._stage = event.stage != self._stage, event.stage
-        self._most = max(self._most, min(event.fraction, 1.0))
-        if self._live:
+        self._fraction = max(self._fraction, min(event.fraction, 1.0))
+        if self._terminal:
             self._draw(str(event), new)
         elif new:
             print(f"isc: {event.stage}", file=self._stream, flush=True)
 
     def _draw(self, text: str, new: bool) -> None:
         now = time.monotonic()
-        if not new and now - self._drawn < _REDRAW_SECONDS:
+        if not new and now - self._last_draw < _REDRAW_SECONDS:
             return
-        self._drawn = now
-        full = round(_BAR * self._most)
-        line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._most:3.0f} %  {text}"
+        self._last_draw = now
+        full = round(_BAR * self._fraction)
+        line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._fraction:3.0f} %  {text}"
         self._stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
         self._stream.flush()
 
@@ -126,7 +128,7 @@ class ProgressBar:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        if self._drawn > 0:
+        if self._last_draw > 0:
             with contextlib.suppress(OSError):
                 self._stream.write("\r\x1b[K")
                 self._stream.flush()
@@ -141,17 +143,17 @@ class Interrupts:
     """
 
     def __init__(self) -> None:
-        self._asked = False
-        self._before: dict[int, object] = {}
+        self._cancelled = False
+        self._previous: dict[int, object] = {}
 
     def monitor(self, progress: Callable[[ProgressEvent], None]) -> Monitor:
         """Return the monitor to work with."""
-        return Monitor(progress, lambda: self._asked)
+        return Monitor(progress, lambda: self._cancelled)
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
-        if self._asked:
+        if self._cancelled:
             raise KeyboardInterrupt
-        self._asked = True
+        self._cancelled = True
 
     def __enter__(self) -> "Interrupts":
         if threading.current_thread() is threading.main_thread():
@@ -161,7 +163,7 @@ class Interrupts:
 
     def _install(self, number: int, handler: Callable[[int, FrameType | None], object]) -> None:
         if signal.getsignal(number) != signal.SIG_IGN:
-            self._before[number] = signal.signal(number, handler)
+            self._previous[number] = signal.signal(number, handler)
 
     def __exit__(
         self,
@@ -169,6 +171,6 @@ class Interrupts:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        for number, handler in self._before.items():
-            # None: a program around this Python had set it, which cannot be set again from here.
+        for number, handler in self._previous.items():
+            # None: the handler was not installed from Python, and cannot be restored.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)  # type: ignore[arg-type]

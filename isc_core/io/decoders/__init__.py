@@ -1,4 +1,4 @@
-"""Image files to arrays: one format a file, recognised by their first bytes, not by their names."""
+"""Image files to arrays: one format per file, recognised by the first bytes, not by the name."""
 
 import hashlib
 import struct
@@ -76,11 +76,11 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     """
     path = Path(path)
     if path.is_dir():
-        raise InputError(f"{path} is a folder: give an image file")
+        raise InputError(f"{path} is a folder: use an image file")
     if not path.exists():
         raise InputError(f"{path}: there is no such file")
     if not path.is_file():
-        raise InputError(f"{path} is not a regular file: give an image file")
+        raise InputError(f"{path} is not a regular file: use an image file")
     try:
         limits.check_stored(path, path.stat().st_size)
         data = path.read_bytes()
@@ -93,7 +93,7 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     )
     if reader is None:
         raise InputError(
-            f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, "
+            f"{path}: not an image of a known format (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, "
             "NPY): convert it to PNG"
         )
     try:
@@ -103,8 +103,8 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
         raise
     except _DECODING_ERRORS as error:
         raise InputError(
-            f"{path}: the {kind} file is damaged, incomplete or of an unusual kind: save it again "
-            "as a plain PNG"
+            f"{path}: the {kind} file is damaged, incomplete or of an unsupported kind: save it "
+            "again as a plain PNG"
         ) from error
     values = np.ascontiguousarray(raster.values)
     return replace(raster, values=values, sha256=hashlib.sha256(data).hexdigest())

@@ -39,31 +39,31 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     for claimed in check_exr(data, path, limits):
         for window in (claimed.data, claimed.display):
             check_size(path, limits, *size_of(window))
-    with memory_file(data) as place:
-        parts = OpenEXR.File(str(place), separate_channels=True).parts
+    with memory_file(data) as file:
+        parts = OpenEXR.File(str(file), separate_channels=True).parts
     if not parts:
         raise ValueError("the pixels cannot be read")
     layer = "{0}.{1}" if len(parts) > 1 else "{1}"
-    found = {
+    by_name = {
         layer.format(part.name(), name): (channel.pixels, part.header)
         for part in parts
         for name, channel in part.channels.items()
     }
-    names = _exr_channels(list(found), path)
-    if len({found[name][0].shape for name in names}) > 1:
+    names = _exr_channels(list(by_name), path)
+    if len({by_name[name][0].shape for name in names}) > 1:
         raise InputError(f"{path}: its channels differ in size: save it as a plain RGB EXR")
-    planes = [_in_display_window(*found[name]) for name in names]
+    planes = [_in_display_window(*by_name[name]) for name in names]
     if len(planes) == 2:
         planes = [planes[0]] * 3 + planes[1:]
-    depth = 8 * found[names[0]][0].dtype.itemsize
+    depth = 8 * by_name[names[0]][0].dtype.itemsize
     return replace(
         raster_of_codes(np.stack(planes, axis=2), 0, premultiplied=True), bit_depth=depth
     )
 
 
 def _exr_channels(names: list[str], path: Path) -> list[str]:
-    """R, G, B or Y, then A where there is one, of the layer without a name or of the only layer
-    that has them.
+    """R, G, B or Y, then A if there is one, of the unnamed layer or of the only layer that has
+    them.
     """
     layers: dict[str, dict[str, str]] = {}
     for name in names:
@@ -71,23 +71,21 @@ def _exr_channels(names: list[str], path: Path) -> list[str]:
         layers.setdefault(layer, {})[channel.upper()] = name
     if len(names) == 1:
         return names
-    for wanted in ("RGB", "Y"):
+    for required in ("RGB", "Y"):
         fitting = [
             layer
             for layer, channels in layers.items()
-            if set(wanted) <= channels.keys() and "RY" not in channels
+            if set(required) <= channels.keys() and "RY" not in channels
         ]
         chosen = "" if "" in fitting else fitting[0] if len(fitting) == 1 else None
         if chosen is not None:
-            return [layers[chosen][c] for c in wanted + "A" if c in layers[chosen]]
+            return [layers[chosen][c] for c in required + "A" if c in layers[chosen]]
         if fitting:
             raise InputError(
-                f"{path}: which layer is the photo: {', '.join(fitting)}? Save that one as an EXR "
-                "of its own"
+                f"{path}: several layers ({', '.join(fitting)}): save one of them as a separate EXR"
             )
     raise InputError(
-        f"{path}: has no R, G, B and no Y channels but {', '.join(names[:8])}: save it as a plain "
-        "RGB EXR"
+        f"{path}: no channels R, G, B or Y, only {', '.join(names[:8])}: save it as a plain RGB EXR"
     )
 
 

@@ -41,7 +41,7 @@ def read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
         )
     if kind.kind not in "fbu" or kind.itemsize > 8 or (kind.kind == "u" and kind.itemsize > 2):
         raise InputError(
-            f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits "
+            f"{path}: values of type {kind}: use floats of linear light, codes of 8 or 16 bits "
             "(uint8, uint16), or bool"
         )
     check_size(path, limits, shape[1], shape[0])

@@ -1,4 +1,4 @@
-"""Images of 16 bits a channel and floats, decoded by OpenCV."""
+"""Images of 16 bits per channel and floats, decoded by OpenCV."""
 
 import cv2
 import numpy as np

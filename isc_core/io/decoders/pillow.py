@@ -1,4 +1,4 @@
-"""Images of 8 bits a channel, decoded by Pillow, and the EXIF orientation."""
+"""Images of 8 bits per channel, decoded by Pillow, and the EXIF orientation."""
 
 import struct
 from pathlib import Path
@@ -18,9 +18,7 @@ def exif_orientation(image: Image.Image) -> int:
     try:
         return int(image.getexif().get(_ORIENTATION_TAG, 1))
     except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
-        return (
-            1  # metadata that cannot be read says nothing about rotation; the pixels are still good
-        )
+        return 1  # unreadable metadata has no orientation; the pixels are still valid
 
 
 def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool = False) -> Raster:
@@ -47,7 +45,7 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
     check_size(path, limits, *image.size)
     if image.mode in ("CMYK", "LAB", "HSV"):
         raise InputError(
-            f"{path}: its colours are {image.mode}, made for printing or editing: convert it to "
+            f"{path}: {image.mode} colours are not supported: convert it to "
             "RGB, for example as a PNG"
         )
     orientation = 1 if oriented else exif_orientation(image)
@@ -67,6 +65,6 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
     ):
         return raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
     raise InputError(
-        f"{path}: pixels of kind {image.mode} are not read: convert it to an 8- or 16-bit PNG or "
-        "an EXR"
+        f"{path}: pixels of kind {image.mode} are not supported: convert it to an 8- or 16-bit "
+        "PNG or an EXR"
     )

@@ -1,4 +1,4 @@
-"""PNG files of 8 and 16 bits a channel, and writing them."""
+"""PNG files of 8 and 16 bits per channel, and writing them."""
 
 import errno
 import io
@@ -49,7 +49,7 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
 
 
 def _plain_png(data: bytes) -> bytes:
-    """The PNG with nothing but pixels, transparency and EXIF.
+    """The PNG reduced to pixels, transparency and EXIF.
 
     Raises ValueError for a wrong checksum or a missing end.
     """
@@ -98,5 +98,5 @@ def write_png(path: Path, raster: Raster) -> None:
         )
     done, data = cv2.imencode(".png", np.ascontiguousarray(planes))
     if not done:
-        raise OSError(errno.EIO, "the PNG could not be coded")
+        raise OSError(errno.EIO, "the PNG could not be encoded")
     path.write_bytes(data.tobytes())

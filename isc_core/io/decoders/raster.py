@@ -56,13 +56,13 @@ def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
     limits.check_pixels(path, width, height)
     if min(width, height) < MIN_SIDE:
         raise InputError(
-            f"{path}: {width} x {height} pixels; at least {MIN_SIDE} are needed both ways: use a "
+            f"{path}: {width} x {height} pixels; each side needs at least {MIN_SIDE}: use a "
             "larger photo"
         )
     if max(width, height) > MAX_ASPECT * min(width, height):
         raise InputError(
-            f"{path}: {width} x {height} pixels; one side is over {MAX_ASPECT} times the other: "
-            "crop it to the object"
+            f"{path}: {width} x {height} pixels; one side is more than {MAX_ASPECT} times the "
+            "other: crop it to the object"
         )
 
 
@@ -102,7 +102,7 @@ def raster_of_codes(
 
 
 def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Applies an EXIF orientation, 1 to 8 (others count as 1), to (H, W, C) pixels: 5 to 8 swap the
+    """Apply an EXIF orientation, 1 to 8 (others count as 1), to (H, W, C) pixels: 5 to 8 swap the
     axes, the rest are flips.
     """
     if orientation in (5, 6, 7, 8):

@@ -1,4 +1,4 @@
-"""TIFF and BigTIFF files, of 8 and 16 bits and floats; of several pages the first."""
+"""TIFF and BigTIFF files, of 8 and 16 bits and floats; the first of several pages."""
 
 import io
 from pathlib import Path
@@ -31,8 +31,7 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
     )
     if photometric == 5:
         raise InputError(
-            f"{path}: its colours are CMYK, made for printing: convert it to RGB, for example as a "
-            "PNG"
+            f"{path}: CMYK colours are not supported: convert it to RGB, for example as a PNG"
         )
     if bits <= 8:
         return decode_pillow(
@@ -46,8 +45,8 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         or samples != (pixels.shape[2] if pixels.ndim == 3 else 1)
     ):
         raise InputError(
-            f"{path}: a TIFF with {samples} channels of {bits} bits of this kind is not read: save "
-            "it as a 16-bit RGB PNG"
+            f"{path}: a TIFF with {samples} channels of {bits} bits of this kind is not "
+            "supported: save it as a 16-bit RGB PNG"
         )
     if pixels.dtype.kind == "f":
         pixels = pixels.astype(np.float32)

@@ -109,8 +109,8 @@ VARIANTS: dict[str, Kim2013Options] = {
     "paper": Kim2013Options(patch=15, base=0, bright_saturation=0, fade=None),
 }
 
-# Even the brightest highlight has a small weight in the diffuse colour, for a reflectance that is
-# seen nowhere else.
+# Even the brightest highlight has a small weight in the diffuse colour, for a reflectance that
+# occurs nowhere else.
 _LEAST_WEIGHT = 1e-4
 # Between 1 (plain Gauss-Seidel) and 2; the first term makes the system well conditioned, so a small
 # value is best.
@@ -181,7 +181,7 @@ def separate(
         If shapes or options are invalid, the mask is empty, values inside it are negative or not
         finite, or the photo has no colour.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options, monitor = options or Kim2013Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

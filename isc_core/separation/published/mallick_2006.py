@@ -143,7 +143,7 @@ def separate(
         If shapes or options are invalid, the mask is empty, values inside it are negative or not
         finite, or the photo has no colour.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     options, monitor = options or Mallick2006Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

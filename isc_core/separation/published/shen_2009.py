@@ -111,7 +111,7 @@ def separate(
         If shapes or options are invalid, the mask is empty, values inside it are negative or not
         finite, or the photo has no colour.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     del monitor
     options = options or Shen2009Options()
@@ -164,7 +164,7 @@ def _specular_of(
         return _gains(inside, ring)[1] * excess
     inside, ring = _means(image, low, regions, count, usable, options.ring_width)
     levels = ring[:, :3].min(axis=1)
-    inside[:, 3] -= levels  # the excess over the region's own level,which is 0 in its ring
+    inside[:, 3] -= levels  # the excess over the region's own level, which is 0 in its ring
     ring[:, 3] = 0
     nearest = _nearest_regions(regions, above)
     return np.where(

@@ -125,7 +125,7 @@ def separate(
         If shapes or options are invalid, the mask is empty, values inside it are negative or not
         finite, or the photo has no colour.
     Cancelled
-        If the user asked to stop.
+        If the user cancels.
     """
     del monitor
     options = options or Shen2013Options()

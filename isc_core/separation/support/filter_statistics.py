@@ -22,7 +22,7 @@ Citation: H. Akbar 2016; heavy-tailed outputs of derivative filters: B. A. Olsha
 1996, doi:10.1038/381607a0, J. Huang and D. Mumford 1999, doi:10.1109/CVPR.1999.786990; the
 temperature: C. Guo et al. 2017, arXiv:1706.04599.
 
-Limits: round shapes under a near lamp look like broad highlights and vice versa;
+Limits: round shapes under a near light source look like broad highlights and vice versa;
 docs/methods/filter_statistics.md measures the benefit.
 """
 

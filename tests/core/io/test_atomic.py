@@ -219,5 +219,5 @@ def test_a_file_is_replaced_when_complete(tmp_path: Path) -> None:
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="name a file"), new_file(tmp_path):
+    with pytest.raises(InputError, match="choose a file"), new_file(tmp_path):
         pass

@@ -58,8 +58,8 @@ def test_large_boxes_are_solved_smaller() -> None:
 @pytest.mark.parametrize(
     ("box", "words"),
     [
-        ((-1, 5, 50, 50), "reaches out of the image of 160 x 120"),
-        ((120, 5, 50, 50), "reaches out of the image"),
+        ((-1, 5, 50, 50), "extends beyond the image of 160 x 120"),
+        ((120, 5, 50, 50), "extends beyond the image"),
         ((5, 5, 7, 50), "at least 8 pixels"),
         ((5, 5, 50, -3), "at least 8 pixels"),
         ((0, 0, 160, 120), "covers the whole image"),
@@ -78,7 +78,7 @@ def test_a_strip_of_background_too_thin_to_learn_from() -> None:
 
 
 def test_nothing_found() -> None:
-    with pytest.raises(InputError, match="what GrabCut finds there"):
+    with pytest.raises(InputError, match="the mask that GrabCut finds"):
         grabcut(np.full((60, 80, 3), 90, np.uint8), (20, 20, 30, 30))
 
 
@@ -97,7 +97,7 @@ def test_a_mask_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="ends in .png"):
         write_mask(tmp_path / "mask.jpg", truth)
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(InputError, match="name a file"):
+    with pytest.raises(InputError, match="choose a file"):
         write_mask(tmp_path / "folder.png", truth)
     (tmp_path / "folder.png" / "file").write_bytes(b"")
     with pytest.raises(InputError, match="not a folder"):

@@ -564,7 +564,7 @@ def test_bad_masks(tmp_path: Path) -> None:
     refused(photo, "only 3 pixels", mask=mask("three", (H, W), (slice(4, 5), slice(4, 7))))
     refused(photo, "only 40 x 7 pixels", mask=mask("thin", (H, W), (slice(4, 11), slice(4, 44))))
     refused(photo, "no such file", mask=tmp_path / "none.png")
-    refused(photo, "known kind", mask=write(tmp_path / "t.png", b"words"))
+    refused(photo, "known format", mask=write(tmp_path / "t.png", b"words"))
     assert read_photo(photo, mask("all", (H, W), everywhere)).mask.all()
     clear = Image.fromarray(np.dstack([codes(), np.zeros((H, W), np.uint8)]))
     refused(saved(tmp_path / "clear.png", clear), "mask is empty")
@@ -689,7 +689,7 @@ def test_truncated_files_of_every_kind_are_refused(
         assert read_raster(file).values.shape == (H, W, 3)
         for part in (0.02, 0.1, 0.35, 0.6, 0.9, 0.99):
             short = write(tmp_path / f"short{file.suffix}", data[: int(len(data) * part)])
-            with pytest.raises(InputError, match="damaged|known kind") as caught:
+            with pytest.raises(InputError, match="damaged|known format") as caught:
                 read_raster(short)
             assert "\n" not in str(caught.value) and str(short) in str(caught.value)
     assert capfd.readouterr() == ("", "")
@@ -714,7 +714,7 @@ def test_files_that_are_no_images(tmp_path: Path) -> None:
     refused(tmp_path / "none.png", "no such file")
     refused(tmp_path, "is a folder")
     refused(write(tmp_path / "empty.png", b""), "the file is empty")
-    refused(write(tmp_path / "text.png", b"These are words.\n" * 9), "known kind")
+    refused(write(tmp_path / "text.png", b"These are words.\n" * 9), "known format")
     refused(write(tmp_path / "head.png", b"\x89PNG\r\n\x1a\n"), "damaged")
     assert read_raster(
         saved(tmp_path / "is_a_jpeg.png", Image.fromarray(codes()), format="JPEG")

@@ -1,4 +1,4 @@
-"""`isc edit`: another light, gloss or colour for a decomposed photo; one file an action."""
+"""`isc edit`: another light, gloss or colour for a decomposed photo; one file per action."""
 
 import argparse
 from dataclasses import replace
@@ -49,13 +49,13 @@ def declare(commands: Commands) -> None:
         "edit",
         run,
         "another light, gloss or colour for a decomposed photo",
-        "Edits a result of isc decompose. Writes a folder with the picture (edited.png, "
-        "edited.exr), before_after.png (look at this first) and edit.json. With --photo the edit "
+        "Edits a result of isc decompose. Writes a folder with the image (edited.png, "
+        "edited.exr), before_after.png (start here) and edit.json. With --photo the edit "
         "is applied to the photo, at its size and in its encoding.",
         _EXAMPLES,
     )
     parser.add_argument(
-        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+        "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
     )
     actions = parser.add_subparsers(
         title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser
@@ -92,14 +92,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     read = (getattr(options, name, None) for name in ("photo", "mask", "region", "light"))
     require_writable_edit(options.output, read)
     if options.photo is None and (options.mask is not None or options.transfer is not None):
-        raise InputError("--mask and --transfer say how --photo is read: give it too")
+        raise InputError("--mask and --transfer need --photo: give it too")
     monitor.report("reading", 0.0)
     d = load(options.result)
     if not d.mask.any():
         raise InputError(
             f"{options.result} has an empty mask: it is damaged; decompose the photo again"
         )
-    _require_sound(d, options.result)
+    _check_result(d, options.result)
     monitor.report("editing", 0.2)
     done = options.act(d, options)
     original = None if options.photo is None else _original(d, options)
@@ -119,14 +119,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         *hints(
             options,
             *(f"note: {note}" for note in notes),
-            f"look at {options.output / 'before_after.png'}",
+            f"see {options.output / 'before_after.png'}",
         ),
     ]
 
 
-def _require_sound(d: Decomposition, folder: Path) -> None:
-    """Raises `InputError` for a result that no decomposition gives: an edit would divide by its
-    zeros.
+def _check_result(d: Decomposition, folder: Path) -> None:
+    """Raise `InputError` for a result that violates the identities, before an edit divides by
+    zero.
     """
     broken = list(d.identity_errors().broken())
     broken += [
@@ -135,28 +135,25 @@ def _require_sound(d: Decomposition, folder: Path) -> None:
         if getattr(d, name)[d.mask].min() < 0
     ]
     if broken:
-        raise InputError(
-            f"{folder} does not keep to {broken[0]}: it is damaged; decompose the photo again"
-        )
+        raise InputError(f"{folder} violates {broken[0]}: it is damaged; decompose the photo again")
 
 
 def _notes(d: Decomposition, done: ActionResult, original: Original | None) -> list[str]:
-    """What is to be said beside what the edit itself says."""
+    """Notes beyond those of the edit itself."""
     notes = []
     if original is not None and d.provenance.input.get("sha256") != original.photo.original.sha256:
         notes.append(
-            "the photo's file is not the one that was decomposed; the edit is brought into it all "
-            "the same"
+            "the photo's file differs from the one that was decomposed; the edit is applied anyway"
         )
     if done.layers and np.array_equal(done.edit.image, d.image):
-        notes.append("the picture stays as it was: nothing of what was asked for changes it")
+        notes.append("the image is unchanged: none of the options has an effect on it")
     return notes
 
 
 def _changed_options(options: argparse.Namespace) -> str:
-    """What differs from the usual, for the sheet."""
+    """The options that differ from their defaults, for the sheet."""
     skip = (*_NOT_PARAMETERS, "result", "photo", "mask", "transfer")
-    words = []
+    parts = []
     for name, value in vars(options).items():
         if (
             name in skip
@@ -165,26 +162,24 @@ def _changed_options(options: argparse.Namespace) -> str:
             or np.array_equal(value, options.usual.get(name))
         ):
             continue
-        shown = value
+        text = value
         if isinstance(value, np.ndarray):
-            shown = "".join(
+            text = "".join(
                 f"{code:02x}" for code in np.rint(255 * linear_to_srgb(value)).astype(int)
             )
         elif isinstance(value, list):
-            shown = " ".join(f"{n:g}" for n in value)
-        words.append(
-            name.replace("_", "-") if value is True else f"{name.replace('_', '-')} {shown}"
+            text = " ".join(f"{n:g}" for n in value)
+        parts.append(
+            name.replace("_", "-") if value is True else f"{name.replace('_', '-')} {text}"
         )
-    return "   ·   ".join(map(str, words))
+    return "   ·   ".join(map(str, parts))
 
 
 def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     given = d.provenance.input
     transfer = options.transfer or str(given.get("transfer", "auto"))
     if given.get("mask_from") == "file" and options.mask is None:
-        raise InputError(
-            "the result was made with a mask of its own: give the same one with --mask"
-        )
+        raise InputError("the result was made with a separate mask: give the same one with --mask")
     limits = limits_of(options)
     photo = read_photo(options.photo, options.mask, transfer, limits=limits)
     raster = read_raster(options.photo, limits)

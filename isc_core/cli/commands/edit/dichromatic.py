@@ -19,8 +19,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
         if options.remove == layer:
             if LayerEdit(**values) != LayerEdit():
                 raise InputError(
-                    f"--remove {layer} leaves nothing that --{layer}-... could change: give one of "
-                    "them"
+                    f"--remove {layer} and --{layer}-... exclude each other: give one of them"
                 )
             values["gain"] = 0.0
         layers.append(LayerEdit(**values))
@@ -28,22 +27,24 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    usual = LayerEdit()
+    defaults = LayerEdit()
     parser.add_argument(
-        "--remove", choices=("diffuse", "specular"), help="leave the other layer alone"
+        "--remove",
+        choices=("diffuse", "specular"),
+        help="remove this layer, and keep the other unchanged",
     )
     for layer in ("diffuse", "specular"):
         group = parser.add_argument_group(f"the {layer} layer")
         for name, text in (
-            ("gain", "factor of its light, from 0 on"),
+            ("gain", "factor of its light, at least 0"),
             ("gamma", "above 1: more contrast"),
-            ("sharpen", "how much detail is added; -1 takes it away"),
-            ("radius", "what counts as detail, in pixels of the maps"),
+            ("sharpen", "amount of detail added; -1 removes it"),
+            ("radius", "size of detail, in pixels of the maps"),
         ):
             group.add_argument(
                 f"--{layer}-{name}",
                 type=number,
-                default=getattr(usual, name),
+                default=getattr(defaults, name),
                 metavar="N",
                 help=f"{text} (default %(default)s)",
             )

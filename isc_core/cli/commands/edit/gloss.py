@@ -16,19 +16,16 @@ _LOOKS = {
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
-    usual: dict[str, float] = _LOOKS.get(options.look, {})
-    if options.present is not None and options.exponent is None and "sharper" not in usual:
+    preset: dict[str, float] = _LOOKS.get(options.look, {})
+    if options.present is not None and options.exponent is None and "sharper" not in preset:
+        raise InputError("--present needs a new sharpness: give --exponent or --look")
+    if options.exponent is not None and "sharper" in preset:
         raise InputError(
-            "--present says how sharp the gloss is now: say how sharp it shall be, with --exponent "
-            "or --look"
+            f"--exponent and --look {options.look} both set the sharpness: give one of them"
         )
-    if options.exponent is not None and "sharper" in usual:
-        raise InputError(
-            f"--exponent says how sharp, and so does --look {options.look}: give one of them"
-        )
-    sharper = usual.get("sharper", 1.0)
-    metal = options.metal if options.metal is not None else usual.get("metal", 0.0)
-    gain = options.gain if options.gain is not None else usual.get("gain", 1.0)
+    sharper = preset.get("sharper", 1.0)
+    metal = options.metal if options.metal is not None else preset.get("metal", 0.0)
+    gain = options.gain if options.gain is not None else preset.get("gain", 1.0)
     gloss = Gloss(options.exponent, sharper, options.present, gain, metal, options.method)
     return ActionResult(change_gloss(d, gloss), {})
 
@@ -37,13 +34,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--look",
         choices=tuple(_LOOKS),
-        help="a good start: a sharper and stronger lobe, a wider one, or metal",
+        help="preset: a sharper and stronger lobe, a wider one, or metal",
     )
     parser.add_argument(
         "--exponent", type=number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5"
     )
     parser.add_argument(
-        "--present", type=number, metavar="P", help="the present one (default: fitted)"
+        "--present", type=number, metavar="P", help="the current exponent (default: fitted)"
     )
     parser.add_argument(
         "--gain",
@@ -55,13 +52,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--metal",
         type=number,
         metavar="M",
-        help="how much of a metal, 0 to 1 (default 0; 1 for --look metallic)",
+        help="metalness, 0 to 1 (default 0; 1 for --look metallic)",
     )
     parser.add_argument(
         "--method",
         choices=METHODS,
         default=Gloss().method,
-        help="change the present highlights (default), or render new ones on the shape",
+        help="change the existing highlights (default), or render new ones on the shape",
     )
 
 

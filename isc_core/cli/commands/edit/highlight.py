@@ -17,36 +17,36 @@ from ....shading.lights import DirectionalLight, toward
 from ....shading.lobe_rendering import Lobe
 from .action import ActionResult, EditAction
 from .options import add_direction, add_lobe, lobe_of, number, plain
-from .panels import ball_panel
+from .panels import sphere_panel
 
-_USUAL_LEVEL = 0.7
+_DEFAULT_LEVEL = 0.7
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     lobe = lobe_of(options) or known_lobe(d) or Lobe()
     light = _chosen_light(d, options)
-    level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
+    level = options.strength if options.replace or options.strength is not None else _DEFAULT_LEVEL
     edit = add_highlight(d, light, lobe, level=level, replacing=options.replace)
-    ball = ball_panel(
-        render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white ball"
+    sphere = sphere_panel(
+        render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white sphere"
     )
-    return ActionResult(edit, {"direction": plain(light.direction)}, (ball,))
+    return ActionResult(edit, {"direction": plain(light.direction)}, (sphere,))
 
 
 def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalLight:
     color = np.ones(3) if options.color is None else options.color
     if options.direction is not None:
         if options.like is not None:
-            raise InputError("--direction and --like both say where the light is: give one of them")
+            raise InputError("--direction and --like both set the light: give one of them")
         return DirectionalLight(toward(*options.direction), np.pi * color)
-    found = explain_specular(d) if options.like == "specular" else explain_shading(d)
-    if not found.light.irradiance.any():
+    estimate = explain_specular(d) if options.like == "specular" else explain_shading(d)
+    if not estimate.light.irradiance.any():
         raise InputError(
-            f"the {options.like or 'shading'} tells no light here: give --direction X Y Z"
+            f"the {options.like or 'shading'} does not determine a light: give --direction X Y Z"
         )
-    own = found.light.irradiance / found.light.irradiance.max()
+    tint = estimate.light.irradiance / estimate.light.irradiance.max()
     return DirectionalLight(
-        found.light.direction, np.pi * (own if options.color is None else color)
+        estimate.light.direction, np.pi * (tint if options.color is None else color)
     )
 
 
@@ -56,7 +56,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--like",
         choices=("shading", "specular"),
         help="without --direction: the light that best explains the shading (default) or the "
-        "present highlights",
+        "existing highlights",
     )
     add_lobe(parser)
     parser.add_argument(
@@ -64,9 +64,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         type=number,
         metavar="S",
         help="1: as bright as the photo's white (default 0.7; with --replace, the energy of the "
-        "present highlights)",
+        "existing highlights)",
     )
-    parser.add_argument("--replace", action="store_true", help="take the present highlights away")
+    parser.add_argument("--replace", action="store_true", help="remove the existing highlights")
 
 
 ACTION = EditAction("highlight", "a new highlight on the recovered shape", _act, _add_options)

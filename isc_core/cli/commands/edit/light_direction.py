@@ -16,7 +16,7 @@ from ....scene.light_estimate import LightEstimate
 from ....shading.lights import DirectionalLight, toward
 from .action import ActionResult, EditAction
 from .options import plain
-from .panels import ball_panel, directional_ball, empty_panel, recovered_light_panel
+from .panels import directional_sphere, empty_panel, recovered_light_panel, sphere_panel
 
 _OTHER_LIGHTS = (
     ("from the left", (-0.8, 0.2, 0.5)),
@@ -32,11 +32,14 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     shading, specular = explain_shading(d), explain_specular(d)
     edit = relight(d, NewLight(directional=shading.light), Relighting(highlights="keep"))
     panels = [recovered_light_panel(d)]
-    for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
-        remark = _remark(found)
+    for label, estimate in (
+        ("Best for the shading", shading),
+        ("Best for the highlights", specular),
+    ):
+        remark = _remark(estimate)
         panels.append(
-            ball_panel(directional_ball(found.light, found.exponent), label, remark)
-            if found.determined
+            sphere_panel(directional_sphere(estimate.light, estimate.exponent), label, remark)
+            if estimate.determined
             else empty_panel(label, remark)
         )
     light_estimate = predict_light(d.image, d.mask)
@@ -44,8 +47,8 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     for label, direction in _OTHER_LIGHTS:
         _, share = share_explained(d, toward(*direction))
         panels.append(
-            ball_panel(
-                directional_ball(DirectionalLight(toward(*direction))),
+            sphere_panel(
+                directional_sphere(DirectionalLight(toward(*direction))),
                 f"Light {label}",
                 f"explains {100 * share:.0f} %",
             )
@@ -56,59 +59,61 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
         "light_estimate": _predicted_record(light_estimate),
     }
     lines = [
-        f"{label}: {_line(found)}"
-        for label, found in (("shading", shading), ("highlights", specular))
+        f"{label}: {_line(estimate)}"
+        for label, estimate in (("shading", shading), ("highlights", specular))
     ]
     lines.append(f"predicted: {_predicted_line(light_estimate)}")
     return ActionResult(edit, measured, tuple(panels), None, tuple(lines), layers=False)
 
 
-def _remark(found: DirectionEstimate) -> str:
+def _remark(estimate: DirectionEstimate) -> str:
     return (
-        f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°"
-        if found.determined
+        f"explains {100 * estimate.explained:.0f} %, ± {estimate.cone:.0f}°"
+        if estimate.determined
         else "undetermined"
     )
 
 
-def _line(found: DirectionEstimate) -> str:
-    if not found.determined:
-        return f"undetermined: no single light explains it ({100 * found.explained:.0f} % at best)"
-    x, y, z = found.light.direction
-    lobe = "" if found.exponent is None else f", exponent {found.exponent:.0f}"
-    share = f"explains {100 * found.explained:.0f} %"
+def _line(estimate: DirectionEstimate) -> str:
+    if not estimate.determined:
+        return (
+            f"undetermined: no single light explains it ({100 * estimate.explained:.0f} % at best)"
+        )
+    x, y, z = estimate.light.direction
+    lobe = "" if estimate.exponent is None else f", exponent {estimate.exponent:.0f}"
+    share = f"explains {100 * estimate.explained:.0f} %"
     return (
-        f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees "
-        f"on this shape, {share}{lobe}"
+        f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) "
+        f"± {estimate.cone:.1f} degrees on this shape, {share}{lobe}"
     )
 
 
-def _record(found: DirectionEstimate) -> dict[str, object]:
-    light = found.light
+def _record(estimate: DirectionEstimate) -> dict[str, object]:
+    light = estimate.light
     return {
-        "determined": found.determined,
+        "determined": estimate.determined,
         "direction": plain(light.direction),
         "irradiance": plain(light.irradiance),
         "ambient": plain(light.ambient),
-        "explained": found.explained,
-        "cone_degrees": found.cone,
-        "exponent": found.exponent,
+        "explained": estimate.explained,
+        "cone_degrees": estimate.cone,
+        "exponent": estimate.exponent,
     }
 
 
 def _predicted_panel(d: Decomposition, light_estimate: LightEstimate) -> Panel:
-    label, remark = "Predicted", _likeliest(light_estimate)
+    label, remark = "Predicted", _most_likely(light_estimate)
     if not light_estimate.determined:
         return empty_panel(label, remark)
     light, share = share_explained(d, light_estimate.direction)
-    return ball_panel(
-        directional_ball(light),
+    return sphere_panel(
+        directional_sphere(light),
         label,
         f"explains {100 * share:.0f} %, ± {light_estimate.cone:.0f}°, {remark}",
     )
 
 
-def _likeliest(light_estimate: LightEstimate) -> str:
+def _most_likely(light_estimate: LightEstimate) -> str:
     shares = {
         "smooth light": light_estimate.none,
         "one source": light_estimate.one,
@@ -120,10 +125,10 @@ def _likeliest(light_estimate: LightEstimate) -> str:
 
 def _predicted_line(light_estimate: LightEstimate) -> str:
     if not light_estimate.determined:
-        return f"{_likeliest(light_estimate)}, direction undetermined"
+        return f"{_most_likely(light_estimate)}, direction undetermined"
     x, y, z = light_estimate.direction
     return (
-        f"{_likeliest(light_estimate)}, the strongest from {x:.3f} {y:.3f} {z:.3f} "
+        f"{_most_likely(light_estimate)}, the strongest from {x:.3f} {y:.3f} {z:.3f} "
         f"± {light_estimate.cone:.1f} degrees, independent of the shape"
     )
 

@@ -1,4 +1,4 @@
-"""Options that several actions share, and their types."""
+"""Options shared by the actions, and their types."""
 
 import argparse
 from pathlib import Path
@@ -12,24 +12,24 @@ from ....photo import TRANSFERS
 from ....shading.lobe_rendering import DEFAULT_EXPONENT, Lobe
 from ...interface.options import (
     add_limits,
-    add_speech,
+    add_output_options,
 )
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
     """Add the options of every action: the photo, the output and the progress."""
-    picture = parser.add_argument_group("the photo")
-    picture.add_argument(
+    photo = parser.add_argument_group("the photo")
+    photo.add_argument(
         "--photo",
         type=Path,
         metavar="PHOTO",
-        help="the photo that RESULT was made of: the edit is brought back into it",
+        help="the photo of RESULT: the edit is applied to it",
     )
-    picture.add_argument(
-        "--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one"
+    photo.add_argument(
+        "--mask", type=Path, metavar="MASK", help="its mask, if the result was made with one"
     )
-    picture.add_argument(
-        "--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)"
+    photo.add_argument(
+        "--transfer", choices=TRANSFERS, help="its encoding (default: as isc decompose read it)"
     )
     add_limits(parser)
     parser.add_argument(
@@ -40,20 +40,23 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="the folder to write; an earlier edit is replaced",
     )
-    add_speech(parser, again=True)
+    add_output_options(parser, again=True)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
 
 def add_lobe(parser: argparse.ArgumentParser) -> None:
     """Add --exponent and --alpha."""
     parser.add_argument(
-        "--exponent", type=number, metavar="P", help="Blinn-Phong's, 1 to 1e5, larger is sharper"
+        "--exponent",
+        type=number,
+        metavar="P",
+        help="Blinn-Phong exponent, 1 to 1e5, larger is sharper",
     )
     parser.add_argument(
         "--alpha",
         type=number,
         metavar="A",
-        help="of GGX facets instead, 0.01 to 1, smaller is sharper",
+        help="GGX roughness alpha instead, 0.01 to 1, smaller is sharper",
     )
 
 
@@ -70,14 +73,14 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
         "--color",
         type=color,
         metavar="RRGGBB",
-        help="of that light, as in web pages (default ffffff, the photo's own white)",
+        help="colour of that light, sRGB in hexadecimal (default ffffff, the photo's white)",
     )
 
 
 def lobe_of(options: argparse.Namespace) -> Lobe | None:
     """Return the lobe of --exponent or --alpha, or None; raise `InputError` for both."""
     if options.exponent is not None and options.alpha is not None:
-        raise InputError("--exponent and --alpha both say how rough the lobe is: give one of them")
+        raise InputError("--exponent and --alpha both set the lobe's width: give one of them")
     if options.exponent is None and options.alpha is None:
         return None
     return Lobe(DEFAULT_EXPONENT if options.exponent is None else options.exponent, options.alpha)
@@ -103,7 +106,7 @@ def color(text: str) -> np.ndarray:
         codes = np.zeros(0)
     if len(digits) != 6 or len(codes) != 3 or not (digits.isascii() and digits.isalnum()):
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a colour: write red, green and blue as rrggbb, like 2060c0"
+            f"{text!r} is not a colour: expected RRGGBB, such as 2060c0"
         )
     return srgb_to_linear(codes / 255)
 

@@ -1,4 +1,4 @@
-"""Panels of the contact sheet that show a light on a white ball."""
+"""Panels of the contact sheet that show a light on a white sphere."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from ....shading.lights import DirectionalLight
 from ....shading.spherical_harmonics import real_sh
 
 
-def ball_panel(color: np.ndarray, label: str, remark: str) -> Panel:
+def sphere_panel(color: np.ndarray, label: str, remark: str) -> Panel:
     """Return a panel with a picture of a sphere.
 
     Parameters
@@ -35,14 +35,14 @@ def ball_panel(color: np.ndarray, label: str, remark: str) -> Panel:
 
 def recovered_light_panel(d: Decomposition) -> Panel:
     """Return a panel with a white sphere under the recovered light."""
-    return ball_panel(
+    return sphere_panel(
         np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination),
         "Recovered light",
-        "on a white ball",
+        "on a white sphere",
     )
 
 
-def directional_ball(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
+def directional_sphere(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
     """Render a sphere in the directional part of a light alone; an ambient term hides its origin.
 
     Parameters
@@ -59,5 +59,5 @@ def directional_ball(light: DirectionalLight, exponent: float | None = None) -> 
 
 
 def empty_panel(label: str, remark: str) -> Panel:
-    """Return a panel without a picture."""
+    """Return a panel with an empty sphere."""
     return Panel(np.full((320, 320, 3), 0.03), sphere_normals(320)[1], label, remark)

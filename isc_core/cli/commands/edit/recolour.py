@@ -24,7 +24,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
         options.hue, options.saturation, options.value, options.color, options.match_brightness
     )
     if options.cluster is not None and options.region is not None:
-        raise InputError("--cluster and --region both say where: give one of them")
+        raise InputError("--cluster and --region both select pixels: give one of them")
     clusters = find_clusters(d, options.clusters, options.seed)
     region = None
     if options.cluster is not None:
@@ -41,8 +41,8 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
 
 
 def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
-    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha
-    where that is not opaque; else its codes, of which 1 is white where none is larger.
+    """The region (H, W) in [0, 1] at the maps' size, from an image of that size or the photo's: its
+    alpha channel if that is not opaque; else its values, with 1 as white if none is larger.
     """
     raster = read_raster(path, limits)
     region = raster.transparency
@@ -55,7 +55,7 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
     scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
     if not isinstance(scale, int | float) or [*region.shape[::-1]] != size:
         raise InputError(
-            f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: give one of the "
+            f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: use one of the "
             "photo's size"
         )
     rows, columns = (
@@ -66,21 +66,21 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:
-    usual = ColourEdit()
+    defaults = ColourEdit()
     parser.add_argument(
-        "--hue", type=number, default=usual.hue, metavar="DEGREES", help="turns the hue"
+        "--hue", type=number, default=defaults.hue, metavar="DEGREES", help="rotation of the hue"
     )
     parser.add_argument(
         "--saturation",
         type=number,
-        default=usual.saturation,
+        default=defaults.saturation,
         metavar="F",
         help="factor (default %(default)s)",
     )
     parser.add_argument(
         "--value",
         type=number,
-        default=usual.value,
+        default=defaults.value,
         metavar="F",
         help="factor of the brightness (default %(default)s)",
     )
@@ -88,36 +88,36 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--color",
         type=color,
         metavar="RRGGBB",
-        help="the change, as in web pages; its brightness stays the object's",
+        help="the new colour, sRGB in hexadecimal; brightness stays the object's",
     )
     parser.add_argument(
-        "--match-brightness", action="store_true", help="takes the brightness of --color too"
+        "--match-brightness", action="store_true", help="use the brightness of --color too"
     )
     parser.add_argument(
         "--region",
         type=Path,
         metavar="FILE",
-        help="where: an image, white on black, of the photo's size",
+        help="the pixels to change: an image, white on black, of the photo's size",
     )
     parser.add_argument(
         "--cluster",
         type=count,
         metavar="N",
-        help="where: the cluster N of the object's paints, see clusters.png",
+        help="the pixels to change: cluster N of the object's reflectance, see clusters.png",
     )
     parser.add_argument(
         "--clusters",
         type=count,
         default=4,
         metavar="K",
-        help="how many there are at most (default %(default)s)",
+        help="largest number of clusters (default %(default)s)",
     )
     parser.add_argument(
         "--seed",
         type=count,
         default=0,
         metavar="N",
-        help="of the clusters' random numbers (default %(default)s)",
+        help="random seed of the clustering (default %(default)s)",
     )
 
 
