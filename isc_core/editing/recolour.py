@@ -56,7 +56,7 @@ class ColourEdit:
             if np.shape(self.target) != (3,):
                 raise InputError("a target colour needs three numbers")
         if self.target_luminance and (self.target is None or not np.any(self.target)):
-            raise InputError("target_luminance needs a target colour that is not black")
+            raise InputError("matching the brightness needs a target colour that is not black")
 
     @property
     def changes(self) -> bool:

@@ -55,7 +55,7 @@ def read_height(
         )
     height = np.where(np.isfinite(height), height, np.nan) * (unit if scale is None else scale)
     if not np.isfinite(height).any():
-        raise InputError(f"{path}: the height map has no finite value")
+        raise InputError(f"{path}: the height map has no finite value, only holes")
     return height
 
 

@@ -195,7 +195,7 @@ def test_a_folder_below_a_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]
 def test_a_file_instead_of_a_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     photo = ball_photo(tmp_path)
     before = photo.read_bytes()
-    assert "name a folder" in refused(capfd, "decompose", photo, "-o", photo)
+    assert "choose a folder" in refused(capfd, "decompose", photo, "-o", photo)
     assert photo.read_bytes() == before
 
 
@@ -316,7 +316,7 @@ OPTIONS = [
     (
         ("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"),
         (),
-        "--prior is for the method isc alone",
+        "--prior needs the method isc",
     ),
     (MASK, ("--box", "1,2,3"), "x,y,w,h"),
     (MASK, ("--box", "a,b,c,d"), "x,y,w,h"),
