@@ -24,7 +24,7 @@ from ..scene.diagnostics import (
     WarningKind,
 )
 
-_Member = TypeVar("_Word", bound=StrEnum)
+_Member = TypeVar("_Member", bound=StrEnum)
 
 # Prefixes and substrings of the sentences of schema 1.
 _OLD_JOINT = (

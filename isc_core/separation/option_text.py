@@ -98,6 +98,6 @@ def _type_name(kind: object) -> str:
         return "one of " + ", ".join(map(str, typing.get_args(kind)))
     if typing.get_origin(kind) is tuple:
         return f"{len(typing.get_args(kind))} comma-separated numbers"
-    return (
-        "none" if kind is types.NoneType else _TYPE_NAMES.get(kind, "a value that can be set here")
-    )  # type: ignore[call-overload]
+    if kind is types.NoneType:
+        return "none"
+    return _TYPE_NAMES.get(kind, "a value that can be set here")  # type: ignore[call-overload]

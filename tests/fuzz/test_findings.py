@@ -118,7 +118,7 @@ def test_deep_exr_and_strange_channels_are_refused(refused: Callable[..., None])
         read_channels,
         "a.exr",
         data[:sampling] + struct.pack("<ii", 0, 0) + data[sampling + 8 :],
-        "coarsely",
+        "subsampled",
     )
     refused(
         read_channels, "a.exr", data[: at + 2] + struct.pack("<i", 7) + data[at + 6 :], "readable"
