@@ -178,7 +178,7 @@ def test_archives_that_unpack_to_much_are_refused(refused: Callable[..., None]) 
     bomb = archive(a=array(np.zeros(1 << 20)))
     assert len(bomb) < 1 << 14
     refused(lambda path: read_arrays(path, few), "a.npz", bomb, "unpacks to")
-    refused(read_arrays, "a.npz", archive(zipfile.ZIP_LZMA, a=array(np.zeros(9))), "no archive")
+    refused(read_arrays, "a.npz", archive(zipfile.ZIP_LZMA, a=array(np.zeros(9))), "not an archive")
     refused(
         lambda path: read_matrix(path, "depth", limits=few),
         "a.mat",

@@ -298,5 +298,5 @@ def test_the_command_refuses_in_one_line(
 def test_a_ramp_is_written_as_two_numbers() -> None:
     assert parse_changes("isc", words=["smooth=0.5, 0.4"]) == {"smooth": (0.5, 0.4)}
     for text in ("smooth=0.5", "smooth=0.5,0.4,0.3", "smooth=a,b", "smooth=0.5,"):
-        with pytest.raises(InputError, match="2 numbers with commas"):
+        with pytest.raises(InputError, match="2 comma-separated numbers"):
             parse_changes("isc", words=[text])
