@@ -23,7 +23,7 @@ def truth() -> SeparationTruth:
 
 
 def answer_with(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
-    """Makes every method take off this share of the true highlights, and trust what it left alone."""
+    """Make every method remove this share of the true highlights, with full confidence."""
 
     def separate(
         method: str, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray, *, variant: str
