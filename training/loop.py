@@ -43,7 +43,19 @@ class Trainable(Protocol):
         """Return the parameters that start from a fitted encoder."""
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of a batch and its named terms."""
+        """Return the loss of a batch and its named terms.
+
+        Parameters
+        ----------
+        batch : tuple of tensor
+            As `DrawBatch` returns it.
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            Parts of the loss; may be empty.
+        """
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
@@ -155,7 +167,16 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
 
 
 def run_options(arguments: argparse.Namespace) -> RunOptions:
-    """Collect the options added by `add_run_arguments`."""
+    """Collect the options added by `add_run_arguments`.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+
+    Returns
+    -------
+    RunOptions
+    """
     return RunOptions(
         arguments.output,
         arguments.steps,

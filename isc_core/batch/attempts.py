@@ -68,7 +68,18 @@ def attempt(path: Path, run: str, timeout: float) -> Iterator[Monitor]:
 
 
 def grace(timeout: float) -> float:
-    """Return the seconds that a worker gets beyond the limit: one interval of clock checks."""
+    """Return the time that a worker gets beyond the limit: one interval of clock checks.
+
+    Parameters
+    ----------
+    timeout : float
+        Time limit per image, in seconds.
+
+    Returns
+    -------
+    float
+        Seconds.
+    """
     return min(max(0.1 * timeout, 1.0), 10.0)
 
 

@@ -209,7 +209,17 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def dashboard(client: Client) -> str:
-    """Return the address of Dask's dashboard, or ""."""
+    """Return the address of Dask's dashboard.
+
+    Parameters
+    ----------
+    client : dask.distributed.Client
+
+    Returns
+    -------
+    str
+        "" without a dashboard.
+    """
     return str(client.dashboard_link or "")
 
 

@@ -21,7 +21,17 @@ _BLOCK = 1 << 20
 
 
 def is_url(location: str) -> bool:
-    """Return whether a location is a URL for fsspec, such as s3://bucket/cup.png."""
+    """Return whether a location is a URL for fsspec, such as s3://bucket/cup.png.
+
+    Parameters
+    ----------
+    location : str
+        Path or URL.
+
+    Returns
+    -------
+    bool
+    """
     return "://" in location
 
 
@@ -122,7 +132,22 @@ def _check_length(location: str, length: int, limits: Limits) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Return the SHA-256 of a file in hexadecimal; raise `InputError` if it cannot be read."""
+    """Return the SHA-256 of a file.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+        Hexadecimal.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

@@ -44,7 +44,22 @@ class ImageRecipe:
     transfer: str = "auto"
 
     def changed(self, options: Options) -> "ImageRecipe":
-        """Return the recipe with a manifest line's options; raise `InputError` for bad values."""
+        """Return the recipe with a manifest line's options.
+
+        Parameters
+        ----------
+        options : tuple of (str, value)
+            Names of settings or "transfer", and their values.
+
+        Returns
+        -------
+        ImageRecipe
+
+        Raises
+        ------
+        InputError
+            If a value is not valid.
+        """
         given = dict(options)
         transfer = str(given.pop("transfer", self.transfer))
         if transfer not in TRANSFERS:

@@ -49,7 +49,17 @@ class JournalEntry:
 
     @staticmethod
     def of(row: dict[str, object]) -> "JournalEntry":
-        """Return the entry of a row; the inverse of `row`."""
+        """Return the entry of a row; the inverse of `row`.
+
+        Parameters
+        ----------
+        row : dict of str to object
+            As `row` returns it.
+
+        Returns
+        -------
+        JournalEntry
+        """
         outcome = ImageOutcome(
             str(row["status"]),
             str(row["reason"]),
@@ -73,7 +83,12 @@ class Journal:
         self._failures = self._files.enter_context(folder.failures.open("wb"))
 
     def add(self, entry: JournalEntry) -> None:
-        """Write an image's line; a failure also goes into `failures.jsonl`."""
+        """Write an image's line; a failure also goes into `failures.jsonl`.
+
+        Parameters
+        ----------
+        entry : JournalEntry
+        """
         self._offsets[entry.number] = self._all.tell()
         self._all.write(_line(entry.row()))
         self._all.flush()

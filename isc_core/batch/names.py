@@ -99,7 +99,17 @@ def check_given(name: str, where: str) -> str:
 
 
 def wanted_name(item: BatchItem) -> str:
-    """Return the name of an item's result if no other item wants it."""
+    """Return the name of an item's result if no other item wants it.
+
+    Parameters
+    ----------
+    item : BatchItem
+
+    Returns
+    -------
+    str
+        A safe file name.
+    """
     if item.name:
         return safe_name(item.name)
     file = item.image.rstrip("/").rpartition("/")[2]
@@ -129,7 +139,18 @@ class Names:
         self._used: set[int] = set()
 
     def name(self, item: BatchItem) -> str | None:
-        """Return the item's name, or None for a duplicate item in this pass."""
+        """Return an item's name.
+
+        Parameters
+        ----------
+        item : BatchItem
+            One of the stream that the constructor read.
+
+        Returns
+        -------
+        str or None
+            None for a duplicate item in this pass.
+        """
         identity = _identity(item)
         if (number := _hash(identity)) in self._repeated:
             if number in self._used:

@@ -40,7 +40,17 @@ class RunFolder:
         self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
 
     def thumbnail(self, name: str) -> Path:
-        """Return the path of a result's thumbnail."""
+        """Return the path of a result's thumbnail.
+
+        Parameters
+        ----------
+        name : str
+            Name of the result.
+
+        Returns
+        -------
+        Path
+        """
         return self.thumbnails / f"{name}.jpg"
 
     @contextmanager
@@ -51,6 +61,11 @@ class RunFolder:
         ----------
         run : str
             Identifier of the run.
+
+        Returns
+        -------
+        context manager
+            It holds the lock.
 
         Raises
         ------
@@ -80,14 +95,35 @@ class RunFolder:
                 self.owner.unlink(missing_ok=True)
 
     def runs(self, run: str) -> bool:
-        """Return whether this run holds the folder now, as seen from this machine."""
+        """Return whether this run holds the folder now, as seen from this machine.
+
+        Parameters
+        ----------
+        run : str
+            Identifier of the run.
+
+        Returns
+        -------
+        bool
+        """
         try:
             return self.run.read_text() == run
         except OSError:
             return False
 
     def require_run(self, run: str) -> None:
-        """Raise `InputError` if this machine does not see the folder of this run."""
+        """Check that this machine sees the folder of this run.
+
+        Parameters
+        ----------
+        run : str
+            Identifier of the run.
+
+        Raises
+        ------
+        InputError
+            If it does not.
+        """
         if not self.runs(run):
             raise InputError(
                 f"{self.output} is not the run's folder on {socket.gethostname()}: use one that "

@@ -42,6 +42,10 @@ class Clock:
         ----------
         name : str
             Key in `seconds`.
+
+        Returns
+        -------
+        context manager
         """
         start = time.perf_counter()
         yield

@@ -26,7 +26,18 @@ _LAB = np.array(
 
 
 def to_oklab(linear: np.ndarray) -> np.ndarray:
-    """Convert linear Rec.709 (..., 3) to Oklab (L, a, b) (..., 3)."""
+    """Convert linear Rec.709 to Oklab.
+
+    Parameters
+    ----------
+    linear : (..., 3) ndarray
+        Linear Rec.709.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        L, a, b.
+    """
     return np.cbrt(np.asarray(linear, float) @ _MIX.T) @ _LAB.T
 
 

@@ -87,7 +87,17 @@ class NewLight:
             check_range("the environment's radiance", self.environment, 0, np.inf)
 
     def shading(self, normals: np.ndarray) -> np.ndarray:
-        """Return the shading (N, 3) of white diffuse surfaces with unit normals (N, 3)."""
+        """Return the shading of white diffuse surfaces.
+
+        Parameters
+        ----------
+        normals : (N, 3) ndarray
+            Unit normals. Camera frame: x right, y up, z toward the viewer.
+
+        Returns
+        -------
+        (N, 3) ndarray
+        """
         if self.coefficients is not None:
             return sh_shading(normals, self.coefficients)
         if self.directional is not None:
@@ -97,7 +107,18 @@ class NewLight:
         )
 
     def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
-        """Return the radiance (N, 3) of a lobe of strength 1 on unit normals (N, 3)."""
+        """Return the radiance of a lobe of strength 1.
+
+        Parameters
+        ----------
+        lobe : Lobe
+        normals : (N, 3) ndarray
+            Unit normals. Camera frame: x right, y up, z toward the viewer.
+
+        Returns
+        -------
+        (N, 3) ndarray
+        """
         if self.directional is not None:
             ambient = np.broadcast_to(self.directional.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
             direct = lobe_under(lobe, normals, self.directional)

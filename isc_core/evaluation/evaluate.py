@@ -132,7 +132,17 @@ class EvaluationReport:
         return tuple(dict.fromkeys(result.illumination for result in self.results))
 
     def under(self, illumination: str) -> tuple[ObjectResult, ...]:
-        """Return the results under one illumination."""
+        """Return the results under one illumination.
+
+        Parameters
+        ----------
+        illumination : str
+            One of `illuminations`.
+
+        Returns
+        -------
+        tuple of ObjectResult
+        """
         return tuple(result for result in self.results if result.illumination == illumination)
 
     def mean(self, illumination: str) -> Scores:
@@ -152,7 +162,17 @@ class EvaluationReport:
         return Scores(**{name: geometric_mean(row[name] for row in rows) for name in rows[0]})
 
     def mean_seconds(self, illumination: str) -> float:
-        """Return the geometric mean of the seconds per object."""
+        """Return the geometric mean of the seconds per object.
+
+        Parameters
+        ----------
+        illumination : str
+            One of `illuminations`.
+
+        Returns
+        -------
+        float
+        """
         return geometric_mean(result.seconds for result in self.under(illumination))
 
     def to_json(self) -> dict[str, Any]:

@@ -137,7 +137,18 @@ class Sparsification:
         return float(((self.left[1:] + self.left[:-1]) / 2 * np.diff(self.dropped)).sum())
 
     def removed(self, share: float) -> float:
-        """Return the share of the error, in [0, 1], in the given share of dropped pixels."""
+        """Return the share of the error in the given share of dropped pixels.
+
+        Parameters
+        ----------
+        share : float
+            Share of the pixels, in [0, 1].
+
+        Returns
+        -------
+        float
+            Share of the total error, in [0, 1].
+        """
         return 1 - float(np.interp(share, self.dropped, self.left))
 
 

@@ -165,12 +165,33 @@ def height_error(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 
 def angular_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Return the mean angle, radians, between unit vectors (..., 3)."""
+    """Return the mean angle between unit vectors.
+
+    Parameters
+    ----------
+    truth, estimate : (..., 3) ndarray
+        Unit vectors.
+
+    Returns
+    -------
+    float
+        Radians.
+    """
     return float(np.arccos(np.clip((truth * estimate).sum(axis=-1), -1, 1)).mean())
 
 
 def scaled_mse(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Return the mean square difference after the scale of `estimate` that minimises it."""
+    """Return the mean square difference after the scale of `estimate` that minimises it.
+
+    Parameters
+    ----------
+    truth, estimate : ndarray
+        Of the same shape.
+
+    Returns
+    -------
+    float
+    """
     scale = (truth * estimate).sum() / max(_TINY, float((estimate * estimate).sum()))
     return float(np.square(scale * estimate - truth).mean())
 

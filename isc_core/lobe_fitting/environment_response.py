@@ -46,7 +46,17 @@ class SplitEnvironment:
 
 
 def split_environment(radiance: np.ndarray) -> SplitEnvironment:
-    """Split an environment map (rows, 2 rows, 3) into bright pixels and a smooth rest."""
+    """Split an environment map into bright pixels and a smooth rest.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        Environment map, linear radiance.
+
+    Returns
+    -------
+    SplitEnvironment
+    """
     rows = len(radiance)
     mean = radiance.mean(axis=2).ravel()
     level = np.sort(mean)[-min(_MOST_BRIGHT, mean.size)]

@@ -105,7 +105,18 @@ class Problem:
     alpha: bool = True
 
     def basis(self, normal: np.ndarray) -> np.ndarray:
-        """Return the basis (B, N) of the base on unit normals (N, 3)."""
+        """Return the basis of the base.
+
+        Parameters
+        ----------
+        normal : (N, 3) ndarray
+            Unit normals.
+
+        Returns
+        -------
+        (B, N) ndarray
+            -1 for a separator's level (B = 1), `mirrored_basis` otherwise.
+        """
         return -np.ones((1, len(normal))) if self.thresholded else mirrored_basis(normal)
 
 
@@ -177,7 +188,23 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
 def contributions(
     model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.ndarray
 ) -> np.ndarray:
-    """Return each light's part (K, N) of the specular light on normals (N, 3) at places (N, 3)."""
+    """Return each light's part of the specular light.
+
+    Parameters
+    ----------
+    model : {"ggx", "blinn_phong"}
+        The lobe.
+    lamps : Lamps
+    normal : (N, 3) ndarray
+        Unit normals.
+    place : (N, 3) ndarray
+        In radii of the object from its middle.
+
+    Returns
+    -------
+    (K, N) ndarray
+        Without the base.
+    """
     parts = []
     for direction, near, log_amplitude in zip(
         lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
@@ -190,7 +217,23 @@ def contributions(
 
 
 def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """Return the mean specular light (N,) of the channels on normals (N, 3) at places (N, 3)."""
+    """Return the mean specular light of the channels.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its model and base; its pixels are not used.
+    lamps : Lamps
+    normal : (N, 3) ndarray
+        Unit normals.
+    place : (N, 3) ndarray
+        In radii of the object from its middle.
+
+    Returns
+    -------
+    (N,) ndarray
+        Not negative.
+    """
     total = contributions(problem.model, lamps, normal, place).sum(
         axis=0
     ) + lamps.base @ problem.basis(normal)

@@ -57,7 +57,21 @@ def covariance(
 
 
 def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> float:
-    """Return one parameter's variance, as if all errors were independent."""
+    """Return one parameter's variance, as if all errors were independent.
+
+    Parameters
+    ----------
+    jacobian : (N, P) ndarray
+        Of the residual, in sigmas.
+    weight : (N,) ndarray
+        Weights of the residuals.
+    column : int
+        The parameter's column of `jacobian`.
+
+    Returns
+    -------
+    float
+    """
     return float(_inverse(product(jacobian, weight, jacobian))[column, column])
 
 

@@ -183,7 +183,19 @@ def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
 
 
 def fit_whitening(objects: Sequence[ObjectStatistics], floor: float = 0.01) -> np.ndarray:
-    """Return the (3, 3) whitening of log reflectance; every object counts alike."""
+    """Return the whitening of log reflectance; every object counts alike.
+
+    Parameters
+    ----------
+    objects : sequence of ObjectStatistics
+    floor : float
+        Added to the second moments of log reflectance along the principal axes.
+
+    Returns
+    -------
+    (3, 3) ndarray
+        Symmetric.
+    """
     return parsimony_whitening(np.mean([o.second_moment() for o in objects], axis=0), floor)
 
 
@@ -207,7 +219,19 @@ def color_histogram(
 
 
 def grey_histogram(objects: Sequence[ObjectStatistics], nodes: int = GREY_NODES) -> np.ndarray:
-    """Return the histogram (nodes,) of grey log reflectance, sum 1; every object counts alike."""
+    """Return the histogram of grey log reflectance; every object counts alike.
+
+    Parameters
+    ----------
+    objects : sequence of ObjectStatistics
+    nodes : int
+        Number of nodes.
+
+    Returns
+    -------
+    (nodes,) ndarray
+        Sum 1.
+    """
     return _histogram([o.grey_log_reflectance for o in objects], nodes)
 
 

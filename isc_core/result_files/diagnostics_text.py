@@ -107,12 +107,30 @@ def note_lines(diagnostics: Diagnostics) -> list[str]:
 
 
 def joint_text(outcome: JointOutcome) -> str:
-    """Return the sentence for an outcome of the model joint."""
+    """Return the sentence for an outcome of the model joint.
+
+    Parameters
+    ----------
+    outcome : JointOutcome
+
+    Returns
+    -------
+    str
+    """
     return _JOINT[outcome]
 
 
 def outcome_text(outcome: LobeFitOutcome) -> str:
-    """Return the sentence for an outcome of a lobe fit."""
+    """Return the sentence for an outcome of a lobe fit.
+
+    Parameters
+    ----------
+    outcome : LobeFitOutcome
+
+    Returns
+    -------
+    str
+    """
     return _LOBE[outcome]
 
 
@@ -141,7 +159,17 @@ def lobe_text(lobe: LobeDiagnostics) -> str:
 
 
 def light_colour_advice(light: LightColourDiagnostics | None) -> str:
-    """Write what to do about the light's colour; "" for nothing."""
+    """Write what to do about the light's colour.
+
+    Parameters
+    ----------
+    light : LightColourDiagnostics or None
+
+    Returns
+    -------
+    str
+        "" for nothing.
+    """
     if light is None:
         return ""
     if light.too_strong:
@@ -150,6 +178,15 @@ def light_colour_advice(light: LightColourDiagnostics | None) -> str:
 
 
 def warning_text(warning: AssumptionWarning) -> str:
-    """Return the sentence for a violated assumption."""
+    """Return the sentence for a violated assumption.
+
+    Parameters
+    ----------
+    warning : AssumptionWarning
+
+    Returns
+    -------
+    str
+    """
     share = "much " if warning.value is None else f"{100 * warning.value:.0f} % "
     return _WARNINGS[warning.kind].format(share=share)

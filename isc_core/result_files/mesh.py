@@ -125,7 +125,20 @@ class MeshResult:
         return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
-        """Return the light (9, 3), `recovered` / k: with the texture it gives the diffuse image."""
+        """Return the light that gives the diffuse image with the mesh's texture.
+
+        It is `recovered` / k, k the reflectance scale.
+
+        Parameters
+        ----------
+        recovered : (9, 3) ndarray
+            SH coefficients of log shading.
+
+        Returns
+        -------
+        (9, 3) ndarray
+            SH coefficients of log shading.
+        """
         light = np.array(recovered, np.float64)
         light[0] -= log(self.reflectance_scale) * sqrt(4 * pi)
         return light

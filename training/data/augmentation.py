@@ -13,17 +13,50 @@ INSIDE = 0.98  # coverage from which a resized pixel counts as inside the mask
 
 
 def random_tint(rng: np.random.Generator, strength: float) -> torch.Tensor:
-    """Draw a colour factor (3, 1, 1); `strength` is the deviation of its logarithm."""
+    """Draw a colour factor.
+
+    Parameters
+    ----------
+    rng : np.random.Generator
+    strength : float
+        Standard deviation of the factor's logarithm.
+
+    Returns
+    -------
+    (3, 1, 1) tensor
+    """
     return colour_factor(np.exp(rng.normal(0, strength, 3)))
 
 
 def colour_factor(values: np.ndarray) -> torch.Tensor:
-    """Convert a colour (3,) to a factor (3, 1, 1) of image tensors."""
+    """Convert a colour to a factor of image tensors.
+
+    Parameters
+    ----------
+    values : (3,) ndarray
+        Linear.
+
+    Returns
+    -------
+    (3, 1, 1) tensor
+        float32.
+    """
     return torch.tensor(values, dtype=torch.float32)[:, None, None]
 
 
 def rescaled(layers: torch.Tensor, factor: float) -> torch.Tensor:
-    """Resize layers (C, H, W) by a factor, bilinearly, with antialiasing when smaller."""
+    """Resize layers bilinearly, with antialiasing when smaller.
+
+    Parameters
+    ----------
+    layers : (C, H, W) tensor
+    factor : float
+        Of both sides.
+
+    Returns
+    -------
+    (C, H', W') tensor
+    """
     return functional.interpolate(
         layers[None],
         scale_factor=factor,
@@ -62,7 +95,18 @@ def placed_in_square(layers: torch.Tensor, side: int, rng: np.random.Generator) 
 
 
 def less_saturated(image: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
-    """Mix an image (3, H, W) with its grey version in a random proportion."""
+    """Mix an image with its grey version in a random proportion.
+
+    Parameters
+    ----------
+    image : (3, H, W) tensor
+    rng : np.random.Generator
+        Draws the proportion.
+
+    Returns
+    -------
+    (3, H, W) tensor
+    """
     kept = float(rng.uniform(0, 1))
     return image * kept + (1 - kept) * image.mean(0, keepdim=True)
 

@@ -67,7 +67,17 @@ class LabelledObject:
 
 
 def rendered_objects(folder: Path) -> Iterator[LabelledObject]:
-    """Read the scenes written by `training.data.rendered_scenes`."""
+    """Read the scenes written by `training.data.rendered_scenes`.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the scenes.
+
+    Returns
+    -------
+    iterator of LabelledObject
+    """
     for scene in scenes_in(folder):
         label = _LABELS.get(scene.kind, ORDINARY)
         if scene.kind is SceneKind.ENVIRONMENT and scene.environment in _SEVERAL_SMALL_LIGHTS:
@@ -82,7 +92,17 @@ def rendered_objects(folder: Path) -> Iterator[LabelledObject]:
 
 
 def synthetic_objects(run: Path) -> Iterator[LabelledObject]:
-    """Read the training scenes of a run of `isc synth`."""
+    """Read the training scenes of a run of `isc synth`.
+
+    Parameters
+    ----------
+    run : Path
+        Output folder of the run.
+
+    Returns
+    -------
+    iterator of LabelledObject
+    """
     for path in sorted((run / "train").rglob("maps.exr")):
         record = json.loads((path.parent / "scene.json").read_text(encoding="utf-8"))
         second = _second_light(record["light"].get("sources", []))

@@ -57,6 +57,15 @@ def rendered_objects(folder: Path) -> Iterator[LayeredObject]:
     """Read the training scenes of a run of `isc synth`, ordered by name.
 
     Held-out objects, materials and lights are left out.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder of the run.
+
+    Returns
+    -------
+    iterator of LayeredObject
     """
     for path in sorted((folder / "train").rglob("maps.exr")):
         channels = read_channels(path)

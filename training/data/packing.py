@@ -62,5 +62,16 @@ def pack_object(
 
 
 def as_half(layers: np.ndarray) -> np.ndarray:
-    """Convert non-negative values to float16, clipped to its range."""
+    """Convert non-negative values to float16, clipped to its range.
+
+    Parameters
+    ----------
+    layers : ndarray
+        Not negative.
+
+    Returns
+    -------
+    ndarray of float16
+        Of the same shape.
+    """
     return np.asarray(np.clip(layers, 0, _LARGEST_HALF), np.float16)

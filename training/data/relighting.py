@@ -81,7 +81,16 @@ class RelightableObject:
 
     @classmethod
     def of(cls, traced: TracedObject) -> "RelightableObject":
-        """Collect the pixels of a traced object."""
+        """Collect the pixels of a traced object.
+
+        Parameters
+        ----------
+        traced : TracedObject
+
+        Returns
+        -------
+        RelightableObject
+        """
         normals = traced.normals[traced.mask].astype(np.float32)
         return cls(
             normals.astype(np.float16),

@@ -167,7 +167,16 @@ class RenderedScene:
 
 
 def scenes_in(folder: Path) -> Iterator[RenderedScene]:
-    """Read the scenes of a folder, ordered by file name."""
+    """Read the scenes of a folder, ordered by file name.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    iterator of RenderedScene
+    """
     for path in sorted(folder.glob("*_*.npz")):
         with np.load(path, allow_pickle=False) as data:
             yield RenderedScene(

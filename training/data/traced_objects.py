@@ -73,7 +73,18 @@ class TracedObject:
 
 
 def make_object(number: int) -> dict[str, np.ndarray]:
-    """Make the arrays of an object's file; the same for the same number."""
+    """Make the arrays of an object's file; the same for the same number.
+
+    Parameters
+    ----------
+    number : int
+        Number of the object, the random seed.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Content of the file.
+    """
     rng = np.random.default_rng([17, number])
     family = str(rng.choice(SHAPES))
     return traced(make_shape(family, rng), family, rng)
@@ -83,6 +94,16 @@ def make_group(number: int) -> dict[str, np.ndarray]:
     """Make the arrays of a group's file; the same for the same number.
 
     One group in four is a single body.
+
+    Parameters
+    ----------
+    number : int
+        Number of the group, the random seed.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Content of the file.
     """
     rng = np.random.default_rng([18, number])
     fused = rng.random() < _FUSED
@@ -193,7 +214,16 @@ def _stratified_cosines(rng: np.random.Generator) -> np.ndarray:
 
 
 def objects_in(folder: Path) -> Iterator[TracedObject]:
-    """Read the objects of a folder, ordered by name."""
+    """Read the objects of a folder, ordered by name.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    iterator of TracedObject
+    """
     for path in sorted(folder.glob("*.npz")):
         with np.load(path, allow_pickle=False) as data:
             yield TracedObject(

@@ -69,7 +69,19 @@ class LayerNetworkModule(nn.Module):  # type: ignore[misc]
         self.out.weight.data *= 0.1
 
     def forward(self, layer: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Return y (B, 3, H, W) and log b (B, 1, H, W) of inputs (B, 4, H, W)."""
+        """Predict y = log(image / diffuse) and the log of its Laplace scale b.
+
+        Parameters
+        ----------
+        layer : (B, 4, H, W) tensor
+            Output of `network_input`.
+
+        Returns
+        -------
+        y : (B, 3, H, W) tensor
+            Not negative.
+        log_b : (B, 1, H, W) tensor
+        """
         layer, kept = functional.pixel_unshuffle(layer, 2), []
         for level, block in enumerate(self.down):
             layer = block(layer if level == 0 else functional.avg_pool2d(layer, 2))
@@ -85,7 +97,19 @@ class LayerNetworkModule(nn.Module):  # type: ignore[misc]
         return []
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of images and diffuse layers (B, 3, H, W) and masks (B, 1, H, W)."""
+        """Return the loss of a batch.
+
+        Parameters
+        ----------
+        batch : tuple of tensor
+            Images and diffuse layers (B, 3, H, W), masks (B, 1, H, W).
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            Empty.
+        """
         image, diffuse, mask = batch
         with torch.autocast("cpu", torch.bfloat16):
             found, log_scale = self(network_input(image, mask))

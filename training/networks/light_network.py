@@ -122,7 +122,19 @@ class LightNetworkModule(nn.Module):  # type: ignore[misc]
         return list(self.convolutions.parameters())
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of a batch of `LightBatches`, and its terms."""
+        """Return the loss of a batch and its terms.
+
+        Parameters
+        ----------
+        batch : tuple of tensor
+            As `LightBatches` returns it.
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            "count", "direction", "normals" and "light", each ().
+        """
         inputs, count, places, normals, light = batch
         count_odds, place_odds, predicted, shape = self(inputs)
         counts = functional.cross_entropy(count_odds, count)

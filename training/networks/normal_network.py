@@ -70,7 +70,18 @@ class NormalNetworkModule(nn.Module):  # type: ignore[misc]
         self.to(memory_format=torch.channels_last)
 
     def forward(self, layer: torch.Tensor) -> torch.Tensor:
-        """Return mean normals and log deviation (B, 4, side / CELL, side / CELL)."""
+        """Predict the cells' mean normals and their log deviation.
+
+        Parameters
+        ----------
+        layer : (B, 4, side, side) tensor
+            Inputs.
+
+        Returns
+        -------
+        (B, 4, side / CELL, side / CELL) tensor
+            Channels 0-2: mean normals; 3: log deviation.
+        """
         layer, kept = layer.contiguous(memory_format=torch.channels_last), []
         layer = functional.pixel_unshuffle(layer, 2)
         with torch.autocast("cpu", torch.bfloat16, enabled=self.training):
@@ -89,7 +100,19 @@ class NormalNetworkModule(nn.Module):  # type: ignore[misc]
         return list(self.down.parameters())
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of a batch of `NormalBatches`, and its terms."""
+        """Return the loss of a batch and its terms.
+
+        Parameters
+        ----------
+        batch : tuple of tensor
+            As `NormalBatches` returns it.
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            "normals" and "likelihood", each ().
+        """
         inputs, normals, cover = batch
         found = self(inputs)
         error = (found[:, :3] - normals) ** 2

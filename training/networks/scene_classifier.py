@@ -69,7 +69,18 @@ class SceneClassifierModule(nn.Module):  # type: ignore[misc]
         nn.init.zeros_(self.head.bias)
 
     def forward(self, layer: torch.Tensor) -> torch.Tensor:
-        """Return the log odds (B, 4) of inputs (B, 4, side, side)."""
+        """Return the log odds of the scene kinds.
+
+        Parameters
+        ----------
+        layer : (B, 4, side, side) tensor
+            Inputs.
+
+        Returns
+        -------
+        (B, 4) tensor
+            In the order of `KINDS`.
+        """
         cover, features = functional.avg_pool2d(layer[:, 3:], 2), []
         layer = functional.pixel_unshuffle(layer, 2)
         for level in range(len(self.convolutions) // 2):
@@ -90,7 +101,19 @@ class SceneClassifierModule(nn.Module):  # type: ignore[misc]
         return list(self.convolutions.parameters())
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of inputs (B, 4, side, side) and allowed labels (B, 4)."""
+        """Return the loss of a batch.
+
+        Parameters
+        ----------
+        batch : tuple of tensor
+            Inputs (B, 4, side, side) and allowed labels (B, 4), 1 or 0.
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            Empty.
+        """
         inputs, allowed = batch
         log_share = functional.log_softmax(self(inputs), 1)
         right = torch.logsumexp(log_share + torch.log(allowed + 1e-9), 1)

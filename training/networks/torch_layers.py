@@ -33,12 +33,27 @@ class ConvBlock(nn.Module):  # type: ignore[misc]
         self.c2 = nn.Conv2d(outputs, outputs, 3, padding=1)
 
     def forward(self, layer: torch.Tensor) -> torch.Tensor:
-        """Map (B, inputs, H, W) to (B, outputs, H, W)."""
+        """Apply two convolutions, each followed by ReLU.
+
+        Parameters
+        ----------
+        layer : (B, inputs, H, W) tensor
+
+        Returns
+        -------
+        (B, outputs, H, W) tensor
+        """
         return functional.relu(self.c2(functional.relu(self.c1(layer))))
 
 
 def initialise(modules: Iterable[nn.Module]) -> None:
-    """Set the convolutions' weights as K. He et al. do, and their biases to 0."""
+    """Set the convolutions' weights as K. He et al. do, and their biases to 0.
+
+    Parameters
+    ----------
+    modules : iterable of nn.Module
+        Those that are not convolutions stay as they are.
+    """
     for module in modules:
         if isinstance(module, nn.Conv2d):
             nn.init.kaiming_normal_(module.weight, nonlinearity="relu")

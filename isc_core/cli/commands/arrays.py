@@ -15,7 +15,13 @@ _EXAMPLES = """  isc arrays cup"""
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "arrays",
@@ -32,7 +38,18 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; inputs are checked before the work begins."""
+    """Run the command; inputs are checked before the work begins.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+    """
     monitor.report("reading", 0.0)
     result, path = load(options.result), options.result / ARRAYS
     require_writable_file(path)

@@ -37,7 +37,13 @@ resume: finished images are skipped. Exit code 1: some images failed, see failur
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "batch",
@@ -104,7 +110,23 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; raise `Rejected` if images failed."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    Rejected
+        If images failed.
+    """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     batch = Batch(
         options.inputs, options.output, options.masks, ImageRecipe(settings, options.transfer),

@@ -34,7 +34,13 @@ for distances from the camera whose unit is 0.2 pixels."""
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "decompose",
@@ -100,7 +106,18 @@ def _add_known_inputs(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; inputs are checked before the work begins."""
+    """Run the command; inputs are checked before the work begins.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+    """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
     require_writable_result(options.output, inputs=(options.photo, options.mask))

@@ -26,7 +26,13 @@ _PRIOR = "as for isc decompose (default for --protocol reference: {}, which meas
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "evaluate",
@@ -98,7 +104,18 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+    """
     if options.json is not None:
         require_writable_file(options.json)
     original = options.input == "original"

@@ -17,7 +17,13 @@ _EXAMPLES = """  isc fit-priors DATA -o priors.npz
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "fit-priors",
@@ -40,7 +46,18 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+    """
     ensure_cache_folder()
     # These modules declare compiled functions, which need the cache folder and slow down start-up.
     from ...prior_fitting.fit import fit_priors

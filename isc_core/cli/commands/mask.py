@@ -11,7 +11,13 @@ _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "mask",
@@ -37,7 +43,18 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+    """
     del monitor  # one step of a second or two
     mask = cut_out(options.photo, options.box, options.output, options.transfer, limits_of(options))
     return hints(options, f"{options.output}: {int(mask.sum())} pixels; check it before you use it")

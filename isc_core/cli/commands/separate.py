@@ -24,7 +24,13 @@ _EXAMPLES = """  isc separate cup.png -o cup-layers
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "separate",
@@ -76,7 +82,23 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command; inputs are checked before the work begins."""
+    """Run the command; inputs are checked before the work begins.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If --prior is given for a method other than `BEST`.
+    """
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior needs the method {BEST}")

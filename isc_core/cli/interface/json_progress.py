@@ -53,20 +53,55 @@ class JsonReporter:
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
-        """Provide the receiver of progress events; it reports even with --quiet."""
+        """Provide the receiver of progress events.
+
+        Parameters
+        ----------
+        quiet : bool
+            Without effect: progress is reported even with --quiet.
+
+        Returns
+        -------
+        context manager of callable
+            The receiver.
+        """
         del quiet
         yield self._step
 
     def done(self, output: str, lines: Sequence[str]) -> None:
-        """Report the output of a finished command."""
+        """Report the output of a finished command.
+
+        Parameters
+        ----------
+        output : str
+            Path of the output.
+        lines : sequence of str
+            Lines of the command.
+        """
         self._write("done", output=output, lines=list(lines))
 
     def failed(self, message: str, code: int) -> None:
-        """Report the error message and exit code of a failed command."""
+        """Report the error message and exit code of a failed command.
+
+        Parameters
+        ----------
+        message : str
+            Error message.
+        code : int
+            Exit code.
+        """
         self._write("failed", message=message, code=code)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
-        """Report the violated bounds of a result."""
+        """Report the violated bounds of a result.
+
+        Parameters
+        ----------
+        lines : sequence of str
+            One for each bound.
+        code : int
+            Exit code.
+        """
         self._write("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:

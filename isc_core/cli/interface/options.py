@@ -45,7 +45,18 @@ class Parser(argparse.ArgumentParser):
         super().__init__(allow_abbrev=False, formatter_class=_Help, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Raise `InputError`."""
+        """Raise the error of a command line as `InputError`.
+
+        Parameters
+        ----------
+        message : str
+            What is wrong.
+
+        Raises
+        ------
+        InputError
+            Always.
+        """
         raise InputError(f"{message} (see `{self.prog} --help`)")
 
 
@@ -106,12 +117,28 @@ def add_output_options(parser: argparse.ArgumentParser, *, again: bool = False) 
 
 
 def hints(options: argparse.Namespace, *lines: str) -> list[str]:
-    """Return the lines, or none with --quiet."""
+    """Return the lines, or none with --quiet.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    *lines : str
+
+    Returns
+    -------
+    list of str
+    """
     return [] if options.quiet else list(lines)
 
 
 def add_photo(parser: argparse.ArgumentParser) -> None:
-    """Add PHOTO, --mask and --transfer."""
+    """Add PHOTO, --mask, --transfer and --max-pixels.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     parser.add_argument(
         "photo",
         metavar="PHOTO",
@@ -130,7 +157,13 @@ def add_photo(parser: argparse.ArgumentParser) -> None:
 
 
 def add_transfer(parser: argparse.ArgumentParser) -> None:
-    """Add --transfer."""
+    """Add --transfer.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     parser.add_argument(
         "--transfer",
         choices=TRANSFERS,
@@ -140,7 +173,13 @@ def add_transfer(parser: argparse.ArgumentParser) -> None:
 
 
 def add_limits(parser: argparse.ArgumentParser) -> None:
-    """Add --max-pixels."""
+    """Add --max-pixels.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     parser.add_argument(
         "--max-pixels",
         type=whole,
@@ -152,12 +191,27 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_of(options: argparse.Namespace) -> Limits:
-    """Return the limits of files that a command reads."""
+    """Return the limits of files that a command reads.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+
+    Returns
+    -------
+    Limits
+    """
     return Limits(max_pixels=options.max_pixels)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `Settings` except --engine and --threads; and --priors and --arrays."""
+    """Add the options of `Settings` except --engine and --threads; and --priors and --arrays.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     defaults = Settings()
     parser.add_argument(
         "--model",
@@ -241,7 +295,15 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_engine(
     parser: argparse.ArgumentParser, threads: str = "number of threads (0: one per core)"
 ) -> None:
-    """Add --engine and --threads."""
+    """Add --engine and --threads.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    threads : str
+        Help text of --threads.
+    """
     parser.add_argument(
         "--engine",
         choices=("auto", "numba", "numpy"),
@@ -277,7 +339,22 @@ def current_name(setting: str) -> Callable[[str], str]:
 
 
 def count(text: str) -> int:
-    """Parse a whole number, 0 or more."""
+    """Parse a whole number, 0 or more.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
     try:
         value = int(text)
     except ValueError:
@@ -288,7 +365,22 @@ def count(text: str) -> int:
 
 
 def whole(text: str) -> int:
-    """Parse a whole number, 1 or more."""
+    """Parse a whole number, 1 or more.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
     value = count(text)
     if value == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 1 or more")
@@ -296,7 +388,22 @@ def whole(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """Parse a finite number other than 0."""
+    """Parse a finite number other than 0.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
     try:
         value = float(text)
     except ValueError:
@@ -307,7 +414,22 @@ def number(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """Parse a finite number greater than 0."""
+    """Parse a finite number greater than 0.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
     value = number(text)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not above 0")
@@ -315,7 +437,22 @@ def positive(text: str) -> float:
 
 
 def names(text: str) -> tuple[str, ...]:
-    """Parse names separated by commas."""
+    """Parse names separated by commas.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If there is no name.
+    """
     parsed = tuple(name.strip() for name in text.split(",") if name.strip())
     if not parsed:
         raise argparse.ArgumentTypeError("give at least one name")

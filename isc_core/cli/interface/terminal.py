@@ -26,7 +26,18 @@ def discard_output() -> None:
 
 
 def printable(text: str, stream: TextIO) -> str:
-    """Return `text`, of one or more lines, in characters that `stream` can encode."""
+    """Return a text in characters that a stream can encode.
+
+    Parameters
+    ----------
+    text : str
+        One or more lines.
+    stream : TextIO
+
+    Returns
+    -------
+    str
+    """
     encoding = getattr(stream, "encoding", None) or "utf-8"
     return (
         "\n".join(map(readable, text.split("\n")))
@@ -40,7 +51,18 @@ class TerminalReporter:
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
-        """Provide the receiver of progress events for the duration of the work."""
+        """Provide the receiver of progress events for the duration of the work.
+
+        Parameters
+        ----------
+        quiet : bool
+            Show no progress.
+
+        Returns
+        -------
+        context manager of callable
+            The receiver.
+        """
         with ProgressBar(sys.stderr, quiet=quiet) as bar:
             yield bar
 
@@ -56,18 +78,41 @@ class TerminalReporter:
         pass
 
     def done(self, output: str, lines: Sequence[str]) -> None:
-        """Print the lines of a finished command."""
+        """Print the lines of a finished command.
+
+        Parameters
+        ----------
+        output : str
+            Path of the output; not printed.
+        lines : sequence of str
+        """
         del output
         for line in lines:
             print(printable(line, sys.stdout))
 
     def failed(self, message: str, code: int) -> None:
-        """Print the error message of a failed command."""
+        """Print the error message of a failed command.
+
+        Parameters
+        ----------
+        message : str
+            Error message.
+        code : int
+            Exit code; not printed.
+        """
         del code
         print(f"isc: error: {message}", file=sys.stderr)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
-        """Print the violated bounds of a result, one line each."""
+        """Print the violated bounds of a result.
+
+        Parameters
+        ----------
+        lines : sequence of str
+            One for each bound.
+        code : int
+            Exit code; not printed.
+        """
         del code
         for line in lines:
             print(f"isc: rejected: {line}", file=sys.stderr)
@@ -147,7 +192,18 @@ class Interrupts:
         self._previous: dict[int, object] = {}
 
     def monitor(self, progress: Callable[[ProgressEvent], None]) -> Monitor:
-        """Return the monitor to work with."""
+        """Return the monitor to work with.
+
+        Parameters
+        ----------
+        progress : callable
+            Receives `ProgressEvent`.
+
+        Returns
+        -------
+        Monitor
+            Cancelled by the first Ctrl-C.
+        """
         return Monitor(progress, lambda: self._cancelled)
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:

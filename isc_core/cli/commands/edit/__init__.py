@@ -43,7 +43,13 @@ ACTIONS: tuple[EditAction, ...] = (
 
 
 def declare(commands: Commands) -> None:
-    """Add the command to the parser."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "edit",

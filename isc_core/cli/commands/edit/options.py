@@ -17,7 +17,13 @@ from ...interface.options import (
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the options of every action: the photo, the output and the progress."""
+    """Add the options of every action: the photo, the output and the progress.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     photo = parser.add_argument_group("the photo")
     photo.add_argument(
         "--photo",
@@ -45,7 +51,13 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def add_lobe(parser: argparse.ArgumentParser) -> None:
-    """Add --exponent and --alpha."""
+    """Add --exponent and --alpha.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     parser.add_argument(
         "--exponent",
         type=number,
@@ -61,7 +73,13 @@ def add_lobe(parser: argparse.ArgumentParser) -> None:
 
 
 def add_direction(parser: argparse.ArgumentParser) -> None:
-    """Add --direction and --color."""
+    """Add --direction and --color.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
     parser.add_argument(
         "--direction",
         type=number,
@@ -78,7 +96,22 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
 
 
 def lobe_of(options: argparse.Namespace) -> Lobe | None:
-    """Return the lobe of --exponent or --alpha, or None; raise `InputError` for both."""
+    """Return the lobe of --exponent or --alpha.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+
+    Returns
+    -------
+    Lobe or None
+        None if neither is given.
+
+    Raises
+    ------
+    InputError
+        If both are given.
+    """
     if options.exponent is not None and options.alpha is not None:
         raise InputError("--exponent and --alpha both set the lobe's width: give one of them")
     if options.exponent is None and options.alpha is None:
@@ -87,7 +120,22 @@ def lobe_of(options: argparse.Namespace) -> Lobe | None:
 
 
 def number(text: str) -> float:
-    """Parse a finite number."""
+    """Parse a finite number.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
     try:
         value = float(text)
     except ValueError:
@@ -98,7 +146,23 @@ def number(text: str) -> float:
 
 
 def color(text: str) -> np.ndarray:
-    """Parse a colour rrggbb to linear light (3,)."""
+    """Parse a colour RRGGBB, sRGB in hexadecimal.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear light.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not a colour.
+    """
     digits = text.removeprefix("#")
     try:
         codes = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
@@ -112,7 +176,17 @@ def color(text: str) -> np.ndarray:
 
 
 def plain(value: object) -> object:
-    """Convert a value to JSON-ready types."""
+    """Convert a value to JSON-ready types.
+
+    Parameters
+    ----------
+    value : object
+        Arrays become lists, paths strings.
+
+    Returns
+    -------
+    object
+    """
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     return readable(str(value)) if isinstance(value, Path) else value

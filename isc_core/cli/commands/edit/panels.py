@@ -34,7 +34,16 @@ def sphere_panel(color: np.ndarray, label: str, remark: str) -> Panel:
 
 
 def recovered_light_panel(d: Decomposition) -> Panel:
-    """Return a panel with a white sphere under the recovered light."""
+    """Return a panel with a white sphere under the recovered light.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    Panel
+    """
     return sphere_panel(
         np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination),
         "Recovered light",
@@ -59,5 +68,14 @@ def directional_sphere(light: DirectionalLight, exponent: float | None = None) -
 
 
 def empty_panel(label: str, remark: str) -> Panel:
-    """Return a panel with an empty sphere."""
+    """Return a panel with an empty sphere.
+
+    Parameters
+    ----------
+    label, remark : str
+
+    Returns
+    -------
+    Panel
+    """
     return Panel(np.full((320, 320, 3), 0.03), sphere_normals(320)[1], label, remark)
