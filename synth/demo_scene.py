@@ -31,7 +31,17 @@ _LAYERS = ("image", "diffuse", "specular", "reflectance", "shading")
 
 
 def demo_scene(size: int = SIZE) -> Scene:
-    """Return the gourd, tipped toward the viewer, in a picture of `size` x `size` pixels.
+    """Return the gourd, tipped toward the viewer, in a square picture.
+
+    Parameters
+    ----------
+    size : int, optional
+        Side of the picture in pixels.
+
+    Returns
+    -------
+    Scene
+        The gourd with its material, lights and camera.
 
     Raises
     ------
@@ -133,6 +143,11 @@ def write_truth(path: Path, truth: GroundTruth) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Command-line arguments; those of the process by default.
 
     Returns
     -------

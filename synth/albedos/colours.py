@@ -56,22 +56,66 @@ def pigment(rng: np.random.Generator, hue: float | None = None) -> np.ndarray:
 
 
 def pale(rng: np.random.Generator) -> np.ndarray:
-    """Draw a pastel colour."""
+    """Draw a pastel colour.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
+    """
     return colour(rng.uniform(), rng.uniform(0.06, 0.4), rng.uniform(0.5, 0.85))
 
 
 def dark(rng: np.random.Generator) -> np.ndarray:
-    """Draw a colour near black: ink, dark glaze."""
+    """Draw a colour near black: ink, dark glaze.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
+    """
     return colour(rng.uniform(), rng.uniform(0.1, 0.8), rng.uniform(0.03, 0.12))
 
 
 def paper(rng: np.random.Generator) -> np.ndarray:
-    """Draw a white to cream colour."""
+    """Draw a white to cream colour.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
+    """
     return rng.uniform(0.6, 0.85) * np.array([1, rng.uniform(0.93, 1), rng.uniform(0.78, 1)])
 
 
 def ink(rng: np.random.Generator) -> np.ndarray:
-    """Draw black, or a saturated colour dark enough to be read on paper."""
+    """Draw black, or a saturated colour dark enough to be read on paper.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
+    """
     if rng.random() < 0.4:
         return np.full(3, rng.uniform(0.02, 0.05))
     hue = rng.uniform()

@@ -20,7 +20,18 @@ ASPECT = 1.6
 
 
 def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return u and v in (0, 1) of the texel centres, (size, size) each."""
+    """Return the texture coordinates of the texel centres.
+
+    Parameters
+    ----------
+    size : int
+        Texels a side.
+
+    Returns
+    -------
+    u, v : (size, size) ndarray
+        In (0, 1); u increases along the columns, v along the rows.
+    """
     steps = (np.arange(size) + 0.5) / size
     u, v = np.meshgrid(steps, steps)
     return u, v

@@ -90,7 +90,13 @@ class Plate:
         )
 
     def area(self, points: np.ndarray) -> None:
-        """Fill the polygon `points` (N, 2), x and y."""
+        """Fill a polygon.
+
+        Parameters
+        ----------
+        points : (N, 2) ndarray
+            Corners, x and y.
+        """
         cv2.fillPoly(self._canvas, [self._placed(points)], 255, cv2.LINE_AA, _SHIFT)
 
     def box(self, left: float, top: float, width: float, height: float, line: float = 0.0) -> None:
@@ -134,7 +140,24 @@ class Plate:
         cv2.putText(self._canvas, words, place, face, scale, 255, stroke, cv2.LINE_AA)
 
     def text_width(self, words: str, height: float, face: int, weight: float = 0.1) -> float:
-        """Return the width of `text` with the same parameters, in heights of the texture."""
+        """Return the width of `text` with the same parameters.
+
+        Parameters
+        ----------
+        words : str
+            The words.
+        height : float
+            Height of capital letters.
+        face : int
+            One of `FACES`.
+        weight : float, optional
+            Width of the strokes relative to `height`.
+
+        Returns
+        -------
+        float
+            Width in heights of the texture.
+        """
         scale, stroke = self._letters(height, face, weight)
         return cv2.getTextSize(words, face, scale, stroke)[0][0] / self._scale
 
@@ -187,7 +210,18 @@ class Plate:
 
 
 def word(rng: np.random.Generator) -> str:
-    """Make up a word of one to three syllables."""
+    """Make up a word of one to three syllables.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    str
+        Lower-case letters.
+    """
     count = int(rng.integers(1, 4))
     return "".join(
         str(rng.choice(part)) for _ in range(count) for part in (_ONSETS, _VOWELS, _CODAS)

@@ -93,6 +93,11 @@ def make_material(
 def gloss_class(material: Material) -> str:
     """Classify a material by the median of its exponent.
 
+    Parameters
+    ----------
+    material : Material
+        The material.
+
     Returns
     -------
     str

@@ -69,8 +69,17 @@ class FamilyMember:
         return f"{self.family}{self.number:02d}"
 
     def generator(self, aspect: str) -> np.random.Generator:
-        """Return the random numbers of one aspect ("shape", "albedo", "gloss", "light") of this
-        member.
+        """Return the random numbers of one aspect of this member.
+
+        Parameters
+        ----------
+        aspect : str
+            "shape", "albedo", "gloss" or "light".
+
+        Returns
+        -------
+        numpy.random.Generator
+            Depends on the aspect, the family and the number only.
         """
         words = (crc32(text.encode()) for text in (aspect, self.family))
         return np.random.default_rng(np.random.SeedSequence([*words, self.number]))
@@ -194,7 +203,18 @@ class Recipe:
         return f"{self.shape.name}_{self.material.name}_{self.light.name}_{self.seed:05d}"
 
     def stream(self, number: int) -> np.random.SeedSequence:
-        """Return the scene's random numbers of one purpose."""
+        """Return the scene's random numbers of one purpose.
+
+        Parameters
+        ----------
+        number : int
+            Number of the purpose, the spawn key.
+
+        Returns
+        -------
+        numpy.random.SeedSequence
+            Depends on the scene's seed and `number` only.
+        """
         return np.random.SeedSequence(self.seed, spawn_key=(number,))
 
     def render_options(self) -> RenderOptions:
@@ -304,7 +324,18 @@ def _mesh(recipe: Recipe) -> Mesh:
 
 
 def centred(mesh: Mesh) -> Mesh:
-    """Return a mesh with the middle of its silhouette on the camera's axis."""
+    """Return a mesh with the middle of its silhouette on the camera's axis.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+
+    Returns
+    -------
+    Mesh
+        Shifted in x and y by the middle of its bounding box.
+    """
     low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
     return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
 

@@ -80,7 +80,18 @@ class GroundTruth:
     environment: np.ndarray
 
     def brightened(self, gain: float) -> "GroundTruth":
-        """Return the same scene with all its lights `gain` (> 0) times as bright."""
+        """Return the same scene with all its lights brightened by a factor.
+
+        Parameters
+        ----------
+        gain : float
+            Factor of all lights, > 0.
+
+        Returns
+        -------
+        GroundTruth
+            Variances are multiplied by the square of `gain`; reflectance and shape are unchanged.
+        """
         maps = ("image", "diffuse", "specular", "residual", "shading", "environment")
         changes = {name: getattr(self, name) * np.float32(gain) for name in maps}
         squares = {

@@ -34,7 +34,13 @@ A scene depends on its seed only: --seed 200 --count 100 renders the scenes that
 
 
 def declare(commands: Commands) -> None:
-    """Add the command, and its subcommands, to the parser."""
+    """Add the command, and its subcommands, to the parser.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    """
     parser = add_command(
         commands,
         "synth",

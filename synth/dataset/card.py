@@ -52,7 +52,18 @@ def card(settings: DatasetSettings, splits: Mapping[str, int]) -> str:
 
 
 def command(settings: DatasetSettings) -> str:
-    """Return the command that renders the same scenes; files are given by name only."""
+    """Return the command that renders the same scenes.
+
+    Parameters
+    ----------
+    settings : DatasetSettings
+        Settings of the data set.
+
+    Returns
+    -------
+    str
+        A shell command; files are given by name only, and the output folder is "DIR".
+    """
     choices, picture, sensor = settings.choices, settings.picture, settings.picture.sensor
     options: dict[str, object] = {
         "--count": settings.count,

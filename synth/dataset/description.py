@@ -112,7 +112,18 @@ def describe(
 
 
 def describe_picture(picture: PictureSettings) -> dict[str, Any]:
-    """Return the settings of a picture that affect the files, as JSON values."""
+    """Return the settings of a picture that affect the files.
+
+    Parameters
+    ----------
+    picture : PictureSettings
+        How scenes are photographed.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
     return {
         "size": picture.size,
         "samples": picture.samples,
@@ -125,7 +136,18 @@ def describe_picture(picture: PictureSettings) -> dict[str, Any]:
 
 
 def specular_share(truth: GroundTruth) -> float:
-    """Return the specular share of all light inside the mask, [0, 1]."""
+    """Return the specular share of all light inside the mask.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene's maps.
+
+    Returns
+    -------
+    float
+        In [0, 1].
+    """
     specular, diffuse = (
         float(layer[truth.mask].sum(dtype=np.float64)) for layer in (truth.specular, truth.diffuse)
     )

@@ -190,9 +190,24 @@ def is_finished(folder: Path, scene: PlannedScene) -> bool:
 
 
 def describe_run(run: DatasetSettings) -> dict[str, Any]:
-    """Return what defines the scenes of a run except for their number, as JSON values.
+    """Return what defines the scenes of a run except for their number.
 
     Two runs are the same if this is equal.
+
+    Parameters
+    ----------
+    run : DatasetSettings
+        Settings of the data set.
+
+    Returns
+    -------
+    dict
+        JSON values; a user's files by name and checksum.
+
+    Raises
+    ------
+    InputError
+        If one of these files cannot be read.
     """
     choices, sources = run.choices, run.sources
     return {

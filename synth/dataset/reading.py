@@ -141,7 +141,18 @@ def read_facts(folder: Path | str) -> SceneFacts:
 
 
 def current_gloss_class(name: str) -> str:
-    """Return the current name of a gloss class; schema 1 called "diffuse" "matt"."""
+    """Return the current name of a gloss class; schema 1 called "diffuse" "matt".
+
+    Parameters
+    ----------
+    name : str
+        Name in a `scene.json` of any schema.
+
+    Returns
+    -------
+    str
+        As in `gloss_class`.
+    """
     return _OLD_GLOSS_CLASSES.get(name, name)
 
 
@@ -221,10 +232,20 @@ def read_description(folder: Path) -> dict[str, Any]:
 def read_object(path: Path) -> dict[str, Any]:
     """Read a file that contains one JSON object.
 
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict
+        The JSON object.
+
     Raises
     ------
     InputError
-        If it contains anything else.
+        If the file cannot be read, or contains anything else.
     """
     content = read_json(path)
     if not isinstance(content, dict):

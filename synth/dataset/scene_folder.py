@@ -77,7 +77,20 @@ def write_scene(folder: Path, split: str, recipe: Recipe, scene: Scene, truth: G
 
 
 def map_channels(truth: GroundTruth) -> dict[str, np.ndarray]:
-    """Return the channels of `maps.exr`. Ground truth is certain: confidence is the mask."""
+    """Return the channels of `maps.exr`.
+
+    Ground truth is certain: confidence is the mask.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene's maps.
+
+    Returns
+    -------
+    dict of str to (H, W) ndarray
+        By channel name: "diffuse.R".
+    """
     mask = truth.mask.astype(np.float32)
     channels: dict[str, np.ndarray] = {}
     for name, letters in LAYERS.items():
@@ -108,7 +121,18 @@ def planes(values: np.ndarray, letters: str, prefix: str = "") -> dict[str, np.n
 
 
 def checksum(path: Path) -> str:
-    """Return the SHA-256 of a file in hexadecimal digits."""
+    """Return the SHA-256 of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+        Hexadecimal digits.
+    """
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

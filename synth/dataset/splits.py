@@ -130,7 +130,18 @@ class Pools:
     pattern: tuple[str, ...]
 
     def split_of(self, seed: int) -> str:
-        """Return the split of a seed's scene."""
+        """Return the split of a seed's scene.
+
+        Parameters
+        ----------
+        seed : int
+            The scene's seed, >= 0.
+
+        Returns
+        -------
+        str
+            One of `pattern`.
+        """
         return self.pattern[seed % len(self.pattern)]
 
     def recipe(self, seed: int, picture: PictureSettings, sources: Sources) -> Recipe:

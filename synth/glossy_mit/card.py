@@ -64,7 +64,18 @@ def index(settings: GlossySettings, roots: tuple[str, ...]) -> str:
 
 
 def command(settings: GlossySettings) -> str:
-    """Return the command that makes the same files; folders are given by name only."""
+    """Return the command that makes the same files.
+
+    Parameters
+    ----------
+    settings : GlossySettings
+        Settings of the set.
+
+    Returns
+    -------
+    str
+        A shell command; folders are given by name only: "ROOT" and "DIR".
+    """
     words = [
         "isc",
         "synth",

@@ -99,15 +99,48 @@ class Exposed:
         return light
 
     def strength(self, level: float) -> float:
-        """Return the strength at which the specular layer has `level` per cent of all light."""
+        """Return the strength at which the specular layer has a given share of all light.
+
+        Parameters
+        ----------
+        level : float
+            The share in per cent.
+
+        Returns
+        -------
+        float
+            Factor of the layer; 0 if that is black.
+        """
         return strength_for(level, self.diffuse, self.gain * self.layers.gloss)
 
     def specular(self, level: float) -> np.ndarray:
-        """Return the specular layer (N, 3), unclipped."""
+        """Return the specular layer, unclipped.
+
+        Parameters
+        ----------
+        level : float
+            Its share of all light in per cent.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            Scaled by `gain`, as `diffuse` is.
+        """
         return self.strength(level) * self.gain * self.layers.gloss
 
     def specular_codes(self, level: float) -> np.ndarray:
-        """Return its codes (N, 3), as far as the clipped original contains them."""
+        """Return the codes of the specular layer, as far as the clipped original contains them.
+
+        Parameters
+        ----------
+        level : float
+            Its share of all light in per cent.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            16-bit codes, linear.
+        """
         return np.minimum(_codes(self.specular(level)), _WHITE - self.diffuse_codes)
 
     @cached_property

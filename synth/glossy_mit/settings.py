@@ -63,11 +63,35 @@ class GlossySettings:
 
 
 def root_names(settings: GlossySettings) -> tuple[str, ...]:
-    """Return the folders of the data sets, relative to the output."""
+    """Return the folders of the data sets, relative to the output.
+
+    Parameters
+    ----------
+    settings : GlossySettings
+        Settings of the set.
+
+    Returns
+    -------
+    tuple of str
+        One per level and light, then those of the physical variant.
+    """
     names = tuple(root_name(level, light) for level in settings.levels for light in LIGHTS)
     return names + (tuple(f"physical/{name}" for name in names) if settings.physical else ())
 
 
 def root_name(level: float, light: str) -> str:
-    """Return the folder of one level (per cent) and light."""
+    """Return the folder of one level and light.
+
+    Parameters
+    ----------
+    level : float
+        Specular share of the light in per cent.
+    light : str
+        One of `LIGHTS`.
+
+    Returns
+    -------
+    str
+        For example "level-10_natural-area".
+    """
     return f"level-{level:g}_{light}"

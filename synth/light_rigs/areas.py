@@ -19,6 +19,16 @@ def area_lights(rng: np.random.Generator) -> tuple[Light, ...]:
     """Draw one or two panels and weak ambient light.
 
     Their sides subtend 10 to 40 degrees at the object; windows are upright.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    tuple of Light
+        The panels, then the ambient light.
     """
     panels = []
     for place, strength in places(rng):

@@ -24,8 +24,19 @@ _COLOUR = 0.04  # standard deviation of the part that differs between channels
 
 
 def harmonic_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """Draw one environment of degree 2, 3 or 4, mirrored so that most light comes from front and
-    above.
+    """Draw one environment of degree 2, 3 or 4.
+
+    It is mirrored so that most light comes from front and above.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    tuple of Light
+        One environment.
     """
     degree, contrast = int(rng.integers(2, 5)), rng.uniform(0.7, 1.7)
     towards, solid = directions(_ROWS), solid_angles(_ROWS)[..., None]
@@ -68,7 +79,18 @@ def smooth_pattern(
 
 
 def turned_to_front(radiance: np.ndarray) -> np.ndarray:
-    """Mirror an environment (rows, 2 rows, ...) in z: its front becomes its back."""
+    """Mirror an environment in z: its front becomes its back.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, ...) ndarray
+        Laid out as in `isc_core.shading.environment_map`.
+
+    Returns
+    -------
+    (rows, 2 rows, ...) ndarray
+        The mirrored environment.
+    """
     rows = len(radiance)
     return radiance[:, (rows - 1 - np.arange(2 * rows)) % (2 * rows)]
 

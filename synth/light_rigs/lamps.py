@@ -15,7 +15,18 @@ _NEAR, _FAR = 2.5, 6.0
 
 
 def directional_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """Draw one or two directional lights, and ambient light in three of four draws."""
+    """Draw one or two directional lights, and ambient light in three of four draws.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    tuple of Light
+        The directional lights, then the ambient light.
+    """
     lights = tuple(
         DirectionalLight(place, np.pi * strength * white(rng)) for place, strength in places(rng)
     )
@@ -26,6 +37,16 @@ def point_lights(rng: np.random.Generator) -> tuple[Light, ...]:
     """Draw one or two point lights, 2.5 to 6 object units from the origin.
 
     Ambient light is added in three of four draws.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    tuple of Light
+        The point lights, then the ambient light.
     """
     lights = []
     for place, strength in places(rng):

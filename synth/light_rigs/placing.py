@@ -37,7 +37,18 @@ def toward(tilt: float, turn: float) -> np.ndarray:
 
 
 def white(rng: np.random.Generator) -> np.ndarray:
-    """Draw a colour (3,) within a few per cent of white, of mean 1."""
+    """Draw a colour within a few per cent of white.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709, of mean 1.
+    """
     colour = 1 + rng.uniform(-_TINT, _TINT, 3)
     return colour / colour.mean()
 

@@ -107,15 +107,50 @@ class SpecularLobe(Protocol):
     """
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return f_r, see `Lobes.values`."""
+        """Evaluate the lobe; see `Lobes.values`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            f_r in 1/sr.
+        """
         ...
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample`, see `Lobes.density`."""
+        """Return the density of `sample`; see `Lobes.density`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         ...
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """Sample a direction to the light by two uniform random numbers, see `Lobes.sample`."""
+        """Sample a direction to the light; see `Lobes.sample`.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        place : Dr.Jit point
+            Two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         ...
 
 
@@ -126,17 +161,52 @@ class BlinnPhongLobe:
     exponent: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Evaluate the lobe; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            f_r in 1/sr.
+        """
         return (self.exponent + 8) / (8 * math.pi) * self._lobe(view, light)
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Return the density of `sample`; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         dr = load_drjit()
         across = dr.maximum(dr.dot(view, dr.normalize(view + light)), 1e-6)
         return (self.exponent + 1) / (2 * math.pi) * self._lobe(view, light) / (4 * across)
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Sample a direction to the light; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        place : Dr.Jit point
+            Two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         # 1 - cos^2 from the logarithm is accurate for narrow lobes.
         square = 1 - dr.exp(2 / (self.exponent + 1) * dr.log(dr.maximum(1 - place.x, 1e-30)))
@@ -169,7 +239,18 @@ class GgxLobe:
     f0: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Evaluate the lobe; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            f_r in 1/sr.
+        """
         dr = load_drjit()
         half = dr.normalize(view + light)
         facets = self._facets()
@@ -185,13 +266,37 @@ class GgxLobe:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Return the density of `sample`; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         dr = load_drjit()
         half = dr.normalize(view + light)
         return self._facets().pdf(view, half) / (4 * dr.maximum(dr.dot(view, half), 1e-6))
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """See `SpecularLobe`."""
+        """Sample a direction to the light; see `SpecularLobe`.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        place : Dr.Jit point
+            Two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         half, _ = self._facets().sample(view, place)
         return load_mitsuba().reflect(view, half)
 
@@ -219,7 +324,18 @@ class MaterialLobes:
     gloss: SpecularLobe | None = None
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """See `Lobes`."""
+        """Evaluate both lobes; see `Lobes`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        diffuse, specular : Dr.Jit array
+            f_r cos_light of each lobe; 0 below the horizon.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         lit = (view.z > 1e-9) & (light.z > 1e-9)
         diffuse = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
@@ -230,7 +346,18 @@ class MaterialLobes:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `Lobes`."""
+        """Return the density of `sample`; see `Lobes`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         dr = load_drjit()
         diffuse = dr.maximum(light.z, 0) / math.pi
         if self.gloss is None:
@@ -240,7 +367,20 @@ class MaterialLobes:
         )
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """See `Lobes`."""
+        """Sample a direction to the light; see `Lobes`.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        choice, place : Dr.Jit array and point
+            One and two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         diffuse = mi.warp.square_to_cosine_hemisphere(place)
         if self.gloss is None:
@@ -265,7 +405,18 @@ class PlasticLobes:
     drawn: MaterialLobes
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """See `Lobes`."""
+        """Evaluate both lobes; see `Lobes`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        diffuse, specular : Dr.Jit array
+            f_r cos_light of each lobe; 0 below the horizon.
+        """
         mi = load_mitsuba()
         parts = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
         contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
@@ -275,19 +426,53 @@ class PlasticLobes:
         return diffuse, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """See `Lobes`."""
+        """Return the density of `sample`; see `Lobes`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         return self.drawn.density(view, light)
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """See `Lobes`."""
+        """Sample a direction to the light; see `Lobes`.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        choice, place : Dr.Jit array and point
+            One and two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         return self.drawn.sample(view, choice, place)
 
 
 def rows_of(colour: Lanes) -> np.ndarray:
-    """Convert a colour or vector with one entry per lane to an array (N, 3).
+    """Convert a colour or vector with one entry per lane to an array.
 
     Component by component: Dr.Jit converts a whole one by a kernel that is compiled anew for every
     number of lanes.
+
+    Parameters
+    ----------
+    colour : Dr.Jit colour or vector
+        N lanes.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        One row per lane.
     """
     load_drjit().eval(colour)
     return np.stack([np.array(part, float) for part in colour], axis=1)

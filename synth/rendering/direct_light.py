@@ -213,7 +213,18 @@ class Unshadowed:
     diffuse: np.ndarray
 
     def at(self, chosen: slice) -> "Unshadowed":
-        """Return the values of some of the points."""
+        """Return the values of some of the points.
+
+        Parameters
+        ----------
+        chosen : slice
+            The points.
+
+        Returns
+        -------
+        Unshadowed
+            One entry per chosen point.
+        """
         return Unshadowed(self.reflected[chosen], self.diffuse[chosen])
 
 

@@ -81,7 +81,18 @@ class Sampler(Protocol):
 
 
 def sampler_of(light: Light) -> Sampler | None:
-    """Return the sampler of a light; None for a black light or one without extent."""
+    """Return the sampler of a light.
+
+    Parameters
+    ----------
+    light : Light
+        The light.
+
+    Returns
+    -------
+    Sampler or None
+        None for a black light or one without extent.
+    """
     if isinstance(light, PanelLight) and np.any(light.radiance):
         return PanelSampler(light)
     if isinstance(light, EnvironmentLight) and np.any(light.radiance):
@@ -96,14 +107,40 @@ class PanelSampler:
         self._panel = panel
 
     def draw(self, rng: np.random.Generator, positions: np.ndarray, count: int) -> np.ndarray:
-        """See `Sampler`."""
+        """Draw directions toward the panel; see `Sampler`.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers.
+        positions : (P, 3) ndarray
+            Where they start.
+        count : int
+            Directions per position.
+
+        Returns
+        -------
+        (P, count, 3) ndarray
+            Unit directions.
+        """
         panel = self._panel
         across, along = rng.uniform(-1, 1, (2, len(positions), count, 1))
         toward = (panel.centre + across * panel.right + along * panel.up) - positions[:, None]
         return toward / np.sqrt(np.einsum("...i,...i->...", toward, toward))[..., None]
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """See `Sampler`."""
+        """Return what rays hit of the panel; see `Sampler`.
+
+        Parameters
+        ----------
+        positions, directions : (M, 3) ndarray
+            Origins and unit directions.
+
+        Returns
+        -------
+        Seen
+            One entry per ray.
+        """
         panel = self._panel
         slope = -(directions @ panel.normal)
         facing = slope > 1e-9
@@ -129,7 +166,22 @@ class EnvironmentSampler:
         self._cumulated = np.cumsum(power.ravel() / power.sum())
 
     def draw(self, rng: np.random.Generator, positions: np.ndarray, count: int) -> np.ndarray:
-        """See `Sampler`."""
+        """Draw directions toward the environment; see `Sampler`.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers.
+        positions : (P, 3) ndarray
+            Where they start; only their number matters.
+        count : int
+            Directions per position.
+
+        Returns
+        -------
+        (P, count, 3) ndarray
+            Unit directions.
+        """
         chosen, height, across = rng.random((3, len(positions), count))
         pixel = np.searchsorted(self._cumulated, chosen * self._cumulated[-1], side="right")
         row, column = np.divmod(np.minimum(pixel, len(self._cumulated) - 1), 2 * self._rows)
@@ -140,7 +192,18 @@ class EnvironmentSampler:
         return np.stack([level * np.sin(turn), up, -level * np.cos(turn)], -1)
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """See `Sampler`."""
+        """Return what rays hit of the environment; see `Sampler`.
+
+        Parameters
+        ----------
+        positions, directions : (M, 3) ndarray
+            Origins, which do not matter, and unit directions.
+
+        Returns
+        -------
+        Seen
+            One entry per ray.
+        """
         del positions
         scale = self._rows / np.pi
         row = (np.arccos(np.clip(directions[:, 1], -1, 1)) * scale).astype(int)

@@ -42,7 +42,18 @@ class Points:
     lobes: Lobes
 
     def values(self, direction: Lanes) -> tuple[Lanes, Lanes]:
-        """Return f_r cos of the diffuse and the specular lobe for light from a direction."""
+        """Evaluate both lobes for light from a direction.
+
+        Parameters
+        ----------
+        direction : Dr.Jit vector
+            Unit direction to the light, camera frame.
+
+        Returns
+        -------
+        diffuse, specular : Dr.Jit array
+            f_r cos_light of each lobe; 0 below the horizon.
+        """
         return self.lobes.values(self.view, self.frame.to_local(direction))
 
 

@@ -100,7 +100,18 @@ class Environment:
         dr.make_opaque(self.rows)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """See `WideLight`."""
+        """Return what arrives along a direction; see `WideLight`.
+
+        Parameters
+        ----------
+        position, direction : Dr.Jit point and vector
+            Where the light arrives, which does not matter, and the unit direction toward it.
+
+        Returns
+        -------
+        radiance, distance, density : Dr.Jit colour and arrays
+            Radiance, distance (`FAR`), and density of `sample` per steradian.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         del position
         rows = mi.Float(self.rows)
@@ -112,7 +123,20 @@ class Environment:
         return radiance, mi.Float(FAR), dr.gather(mi.Float, self.density, pixel)
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """See `WideLight`."""
+        """Sample a direction toward the light; see `WideLight`.
+
+        Parameters
+        ----------
+        position : Dr.Jit point
+            Where the light arrives, which does not matter.
+        place, inside : Dr.Jit points
+            Two uniform random numbers each: for the pixel, and for the place within it.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         del position
         row = _first_above(self.below, mi.UInt32(0), self.rows, place.x)
@@ -127,7 +151,18 @@ class Environment:
         return mi.Vector3f(across * sine, up, -across * cosine)
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """See `WideLight`."""
+        """Return the shading without shadows, in closed form; see `WideLight`.
+
+        Parameters
+        ----------
+        position, normal : (N, 3) ndarray
+            Points, which do not matter, and unit normals.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            Of a white diffuse surface.
+        """
         del position
         return unoccluded_shading(self._radiance, normal)
 
@@ -149,7 +184,19 @@ class Panel:
         dr.make_opaque(self.centre, self.right, self.up, self.normal, self.radiance, self.area)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """See `WideLight`."""
+        """Return what arrives along a direction; see `WideLight`.
+
+        Parameters
+        ----------
+        position, direction : Dr.Jit point and vector
+            Where the light arrives, and the unit direction toward it.
+
+        Returns
+        -------
+        radiance, distance, density : Dr.Jit colour and arrays
+            Radiance, distance of the panel's plane, and density of `sample` per steradian; radiance
+            and density are 0 where the direction misses the panel or meets its back.
+        """
         dr = load_drjit()
         toward, facing = self.centre - position, -dr.dot(direction, self.normal)
         distance = -dr.dot(toward, self.normal) / dr.select(facing > 1e-9, facing, 1)
@@ -161,7 +208,20 @@ class Panel:
         return dr.select(inside, self.radiance, 0), distance, density
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """See `WideLight`."""
+        """Sample a direction toward the light; see `WideLight`.
+
+        Parameters
+        ----------
+        position : Dr.Jit point
+            Where the light arrives.
+        place, inside : Dr.Jit points
+            Two uniform random numbers each; `inside` is not used.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction.
+        """
         dr = load_drjit()
         del inside
         return dr.normalize(
@@ -169,7 +229,18 @@ class Panel:
         )
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """See `WideLight`."""
+        """Return the shading without shadows, in closed form; see `WideLight`.
+
+        Parameters
+        ----------
+        position, normal : (N, 3) ndarray
+            Points and unit normals.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            Of a white diffuse surface.
+        """
         return unoccluded_panel(self._light, position, normal)
 
 
@@ -191,8 +262,18 @@ class Beam:
         dr.make_opaque(self.place, self.strength)
 
     def arriving(self, position: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return the direction toward the light, its distance, and the irradiance (colour) across
-        its beam.
+        """Return what arrives at a point.
+
+        Parameters
+        ----------
+        position : Dr.Jit point
+            Where the light arrives.
+
+        Returns
+        -------
+        direction, distance, irradiance : Dr.Jit vector, array and colour
+            Unit direction toward the light, its distance (`FAR` for a directional light), and the
+            irradiance across its beam.
         """
         dr, mi = load_drjit(), load_mitsuba()
         if not self.near:
@@ -204,7 +285,23 @@ class Beam:
 
 
 def kernel_light(light: Light) -> Any:
-    """Return the `WideLight` or `Beam` of a light; None for a black environment."""
+    """Convert a light to Mitsuba's arrays.
+
+    Parameters
+    ----------
+    light : Light
+        The light.
+
+    Returns
+    -------
+    WideLight, Beam or None
+        None for a black environment.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
+    """
     if isinstance(light, EnvironmentLight):
         return Environment(light) if np.any(light.radiance) else None
     return Panel(light) if isinstance(light, PanelLight) else Beam(light)

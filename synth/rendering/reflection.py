@@ -54,7 +54,18 @@ class Points:
         return self.position + LIFT * self.normal
 
     def at(self, chosen: np.ndarray | slice) -> "Points":
-        """Return the points that an index selects, repeated as often as it does."""
+        """Return the points that an index selects, repeated as often as it does.
+
+        Parameters
+        ----------
+        chosen : ndarray of int or bool, or slice
+            The index.
+
+        Returns
+        -------
+        Points
+            One entry per selected point.
+        """
         parts = (self.position, self.normal, self.view, self.strength, self.gloss)
         return Points(*(part[chosen] for part in parts))
 

@@ -123,7 +123,18 @@ class Material:
         return ((self.ior - 1) / (self.ior + 1)) ** 2
 
     def at(self, uv: np.ndarray) -> SurfaceReflectance:
-        """Return the material at texture coordinates (N, 2)."""
+        """Return the material at texture coordinates.
+
+        Parameters
+        ----------
+        uv : (N, 2) ndarray
+            Coordinates; u wraps around, v is clamped.
+
+        Returns
+        -------
+        SurfaceReflectance
+            One entry per coordinate pair.
+        """
         albedo = texture_at(np.asarray(self.albedo, float), uv)
         if self.is_diffuse:
             return SurfaceReflectance(albedo, np.zeros(len(uv)), np.zeros(len(uv)))

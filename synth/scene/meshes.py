@@ -30,14 +30,34 @@ class Mesh:
     faces: np.ndarray
 
     def turned(self, degrees_x: float) -> "Mesh":
-        """Return the mesh rotated about the x axis; a positive angle tips its top toward the viewer
-        (+z).
+        """Return the mesh rotated about the x axis.
+
+        Parameters
+        ----------
+        degrees_x : float
+            Angle in degrees; a positive one tips the top toward the viewer (+z).
+
+        Returns
+        -------
+        Mesh
+            The rotated mesh.
         """
         c, s = np.cos(np.radians(degrees_x)), np.sin(np.radians(degrees_x))
         return self.rotated(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]))
 
     def rotated(self, rotation: np.ndarray) -> "Mesh":
-        """Return the mesh rotated by a matrix (3, 3)."""
+        """Return the mesh rotated by a matrix.
+
+        Parameters
+        ----------
+        rotation : (3, 3) ndarray
+            Rotation matrix, applied to column vectors.
+
+        Returns
+        -------
+        Mesh
+            The rotated mesh.
+        """
         return Mesh(self.vertices @ rotation.T, self.normals @ rotation.T, self.uv, self.faces)
 
     def fitted(self) -> "Mesh":

@@ -170,10 +170,25 @@ def _parts(values: np.ndarray) -> list[object]:
 
 
 def lanes(values: np.ndarray) -> Any:
-    """Convert numbers (N,) to a Dr.Jit array, in an LLVM variant.
+    """Convert numbers to a Dr.Jit array, in an LLVM variant.
 
     Dr.Jit reads the numbers in place, and its kernels depend on whether their address is a multiple
     of the vector length: here it always is, so that no kernel is compiled twice.
+
+    Parameters
+    ----------
+    values : (N,) ndarray
+        The numbers.
+
+    Returns
+    -------
+    Dr.Jit array
+        N lanes, float32.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     room = np.empty(values.size + _VECTOR // 4, np.float32)
     start = -room.ctypes.data % _VECTOR // 4

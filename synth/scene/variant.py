@@ -17,7 +17,18 @@ _MISSING = "rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'
 
 
 def llvm_is_usable(major: int) -> bool:
-    """Return whether a libLLVM of this major version (-1: none) compiles Dr.Jit's kernels."""
+    """Return whether a version of libLLVM compiles Dr.Jit's kernels.
+
+    Parameters
+    ----------
+    major : int
+        Major version; -1 means none.
+
+    Returns
+    -------
+    bool
+        True from `OLDEST_LLVM` on.
+    """
     return major >= OLDEST_LLVM
 
 

@@ -70,7 +70,18 @@ class Blobs:
 
 
 def blobby(rng: np.random.Generator) -> Mesh:
-    """Make a random blobby object: two to seven blobs, round or elongated, posed."""
+    """Make a random blobby object: two to seven blobs, round or elongated, posed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        Centred; the larger extent in the picture is 2 object units.
+    """
     count = int(rng.integers(2, 8))
     towards = rng.normal(size=(4 * count, 3)) * (1, 1, 0.7)
     towards = _spread(towards / np.linalg.norm(towards, axis=1, keepdims=True), count)

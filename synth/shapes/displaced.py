@@ -21,7 +21,18 @@ STYLES = ("gentle", "lumpy", "dented", "crumpled", "wrinkled", "ribbed")
 
 
 def displaced(rng: np.random.Generator) -> Mesh:
-    """Make a displaced sphere of a random style, posed."""
+    """Make a displaced sphere of a random style, posed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        Centred; the larger extent in the picture is 2 object units.
+    """
     directions, faces = sphere_grid()
     height = displacement(directions, rng, str(rng.choice(STYLES)))
     vertices = directions * np.exp(height)[:, None] * (1, rng.uniform(0.75, 1.1), 1)

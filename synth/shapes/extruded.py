@@ -140,7 +140,18 @@ class Extrusion:
 
 
 def extruded(rng: np.random.Generator) -> Mesh:
-    """Make a random extrusion, posed."""
+    """Make a random extrusion, posed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        Centred; the larger extent in the picture is 2 object units.
+    """
     kind = str(rng.choice(KINDS, p=_OFTEN))
     polygon = random_polygon(kind, rng)
     depth = rng.uniform(0.35, 0.9)

@@ -185,7 +185,23 @@ def place_height(height: np.ndarray) -> HeightField:
 
 
 def mesh_of_height(height: np.ndarray) -> Mesh:
-    """Return only the mesh of `place_height`."""
+    """Return only the mesh of `place_height`.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer, NaN outside.
+
+    Returns
+    -------
+    Mesh
+        In object units.
+
+    Raises
+    ------
+    InputError
+        As `check_height`.
+    """
     return place_height(height).mesh
 
 

@@ -178,7 +178,18 @@ _ABOVE = {
 
 
 def lathe(rng: np.random.Generator) -> Mesh:
-    """Make a random form, posed."""
+    """Make a random form, posed.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        One of `FORMS`, centred; the larger extent in the picture is 2 object units.
+    """
     return lathe_form(str(rng.choice(FORMS)), rng)
 
 

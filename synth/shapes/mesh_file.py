@@ -129,7 +129,23 @@ class _Beside:
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """Return only the mesh of `read_mesh_file`."""
+    """Return only the mesh of `read_mesh_file`.
+
+    Parameters
+    ----------
+    path : Path or str
+        A file of one of `KINDS`.
+
+    Returns
+    -------
+    Mesh
+        The mesh.
+
+    Raises
+    ------
+    InputError
+        As `read_mesh_file`.
+    """
     return read_mesh_file(path).mesh
 
 

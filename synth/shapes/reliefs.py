@@ -23,7 +23,18 @@ STYLES = ("paper", "cloth", "relief", "quilt")
 
 
 def relief(rng: np.random.Generator) -> Mesh:
-    """Make a relief of a random style, posed nearly upright before the viewer."""
+    """Make a relief of a random style, posed nearly upright before the viewer.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        Centred; the larger extent in the picture is 2 object units.
+    """
     x, y = np.meshgrid(
         np.linspace(-1, 1, _CELLS + 1), np.linspace(1, -1, _CELLS + 1) * rng.uniform(0.65, 1)
     )

@@ -63,8 +63,19 @@ class Superquadric:
 
 
 def superquadric(rng: np.random.Generator) -> Mesh:
-    """Make a random superquadric, posed: sphere, ellipsoid, box, cylinder, cushion or anything
-    between.
+    """Make a random superquadric, posed.
+
+    Kinds are sphere, ellipsoid, box, cylinder, cushion or anything between.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        Centred; the larger extent in the picture is 2 object units.
     """
     kind = rng.choice(
         ["sphere", "ellipsoid", "box", "cylinder", "cushion", "any"],

@@ -253,7 +253,23 @@ def read_recipe(folder: Path) -> Recipe:
 
 
 def needs_files(folder: Path) -> bool:
-    """Return whether a scene was made with a user's files."""
+    """Return whether a scene was made with a user's files.
+
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+
+    Returns
+    -------
+    bool
+        True for a mesh, height map, albedo image or environment from a file.
+
+    Raises
+    ------
+    InputError
+        As `read_description`.
+    """
     content = read_description(folder)
     families = [content.get(what, {}).get("family") for what in ("object", "albedo", "light")]
     return any(family in ("mesh", "height", "image", "natural", "hdr") for family in families)

@@ -124,10 +124,32 @@ def mean_interval(
 
 
 def logarithms(errors: np.ndarray) -> np.ndarray:
-    """Return natural logarithms of errors >= 0; an error of 0 counts as 1e-30."""
+    """Return natural logarithms of errors; an error of 0 counts as 1e-30.
+
+    Parameters
+    ----------
+    errors : ndarray
+        Errors >= 0.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape.
+    """
     return np.log(np.maximum(errors, _SMALLEST))
 
 
 def exponentials(logs: np.ndarray | float) -> np.ndarray:
-    """Invert `logarithms`; the floor becomes 0 again."""
+    """Invert `logarithms`; the floor becomes 0 again.
+
+    Parameters
+    ----------
+    logs : ndarray or float
+        Natural logarithms.
+
+    Returns
+    -------
+    ndarray
+        Errors >= 0, of the same shape.
+    """
     return np.where(logs <= np.log(_SMALLEST) + 1e-9, 0.0, np.exp(logs))

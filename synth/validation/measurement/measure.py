@@ -102,7 +102,18 @@ class SceneResult:
     refused: str = ""
 
     def scores(self, stage: str) -> Any | None:
-        """Return a stage's scores, None if it was not run."""
+        """Return a stage's scores.
+
+        Parameters
+        ----------
+        stage : str
+            Name of the stage.
+
+        Returns
+        -------
+        object or None
+            Of the stage's own type; None if it was not run.
+        """
         return next((result.scores for result in self.stages if result.stage == stage), None)
 
 

@@ -75,7 +75,18 @@ class ChainScores:
     light_fit_residual: float
 
     def under(self, truths: tuple[Truth, ...]) -> Scores:
-        """Return the errors under ground truths, given in the order of `TRUTHS`."""
+        """Return the errors under ground truths.
+
+        Parameters
+        ----------
+        truths : tuple of str
+            The substituted ground truths, in the order of `TRUTHS`.
+
+        Returns
+        -------
+        Scores
+            The chain's errors.
+        """
         return self.swapped[COMBINATIONS.index(truths)]
 
 

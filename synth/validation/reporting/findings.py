@@ -17,7 +17,18 @@ _FEWEST = 5  # scenes of a slice that is compared with others
 
 
 def verdict_line(outcome: ValidationOutcome) -> str:
-    """Return "Accepted" or "Rejected", with the number of bounds and checks."""
+    """Return the verdict with the number of bounds and checks.
+
+    Parameters
+    ----------
+    outcome : ValidationOutcome
+        The validation.
+
+    Returns
+    -------
+    str
+        A sentence that begins with "Accepted" or "Rejected".
+    """
     broken = sum(verdict.broken for verdict in outcome.verdicts)
     failed = sum(not check.passed for check in outcome.checks)
     if outcome.failures:
@@ -62,12 +73,34 @@ def findings(outcome: ValidationOutcome) -> tuple[str, ...]:
 
 
 def stage_title(stage: str) -> str:
-    """Return the name of a stage or of the chain as headings show it."""
+    """Return the name of a stage or of the chain as headings show it.
+
+    Parameters
+    ----------
+    stage : str
+        Name of a stage, or `CHAIN`.
+
+    Returns
+    -------
+    str
+        The heading.
+    """
     return CHAIN_TITLE if stage == CHAIN else stage
 
 
 def figures_by_stage(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
-    """Group figures by stage, in their order."""
+    """Group figures by stage.
+
+    Parameters
+    ----------
+    figures : sequence of Figure
+        The figures.
+
+    Returns
+    -------
+    dict of str to list of Figure
+        By stage; stages and figures keep their order.
+    """
     stages = dict.fromkeys(f.stage for f in figures)
     return {stage: [f for f in figures if f.stage == stage] for stage in stages}
 

@@ -29,6 +29,11 @@ _EVIDENCE = re.compile(r"evidence/[^/\\.][^/\\]*/[a-z_]+\.exr")
 def require_writable_report(folder: Path) -> None:
     """Check that a report can be written to a folder.
 
+    Parameters
+    ----------
+    folder : Path
+        The folder of the report; it need not exist.
+
     Raises
     ------
     InputError

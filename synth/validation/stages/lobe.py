@@ -148,7 +148,18 @@ def show_lobe(truth: GroundTruth, answer: FittedLobe) -> tuple[StagePicture, ...
 
 
 def lobe_maps(answer: FittedLobe) -> dict[str, np.ndarray]:
-    """Return the channels of the specular layer and of the fit."""
+    """Return the channels of the specular layer and of the fit.
+
+    Parameters
+    ----------
+    answer : FittedLobe
+        The stage's result.
+
+    Returns
+    -------
+    dict of str to (H, W) ndarray
+        By channel name: "specular.R", "lobe.R".
+    """
     layers = {"specular": answer.specular, "lobe": answer.fit.predicted}
     return {
         f"{name}.{letter}": values[..., k]

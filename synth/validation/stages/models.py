@@ -211,7 +211,18 @@ def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[StageP
 
 
 def models_maps(answers: Variants[Estimate]) -> Mapping[str, np.ndarray]:
-    """Return the channels of all maps: "joint.reflectance.R"."""
+    """Return the channels of all maps.
+
+    Parameters
+    ----------
+    answers : Variants of Estimate
+        The results of all variants.
+
+    Returns
+    -------
+    mapping of str to (H, W) ndarray
+        By channel name: "joint.reflectance.R".
+    """
     return {
         f"{name}.{channel}": values
         for name, own in answers.items()
@@ -246,7 +257,18 @@ def models_stage(models: tuple[str, ...]) -> AnyStage:
 
 
 def metric_name(variant: str, error: str) -> str:
-    """Return the metric of one error of one variant: "joint.average"."""
+    """Return the metric of one error of one variant.
+
+    Parameters
+    ----------
+    variant, error : str
+        Names of the variant and of the error.
+
+    Returns
+    -------
+    str
+        For example "joint.average".
+    """
     return f"{variant}.{error}"
 
 

@@ -125,8 +125,17 @@ def relief(height: np.ndarray, mask: np.ndarray, span: float) -> np.ndarray:
 
 
 def png_data(colors: np.ndarray) -> str:
-    """Encode colours (H, W, 3) in [0, 1] as a `data:` URL of a PNG, at most `LARGEST` pixels a
-    side.
+    """Encode colours as a `data:` URL of a PNG, at most `LARGEST` pixels a side.
+
+    Parameters
+    ----------
+    colors : (H, W, 3) ndarray
+        In [0, 1]; values outside are clipped.
+
+    Returns
+    -------
+    str
+        The URL.
     """
     picture = Image.fromarray(np.rint(255 * np.clip(colors, 0, 1)).astype(np.uint8))
     if max(picture.size) > LARGEST:

@@ -168,7 +168,18 @@ def show_separation(truth: GroundTruth, answer: Separation) -> tuple[StagePictur
 
 
 def separation_maps(answer: Separation) -> dict[str, np.ndarray]:
-    """Return the channels of the layers, named as `isc separate` names them."""
+    """Return the channels of the layers, named as `isc separate` names them.
+
+    Parameters
+    ----------
+    answer : Separation
+        The stage's result.
+
+    Returns
+    -------
+    dict of str to (H, W) ndarray
+        By channel name: "diffuse.R".
+    """
     layers = {"diffuse": answer.diffuse, "specular": answer.specular, "residual": answer.residual}
     planes = {
         f"{name}.{letter}": values[..., k]

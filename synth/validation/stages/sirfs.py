@@ -167,7 +167,18 @@ def show_sirfs(truth: GroundTruth, answer: Estimate) -> tuple[StagePicture, ...]
 
 
 def sirfs_maps(answer: Estimate) -> dict[str, np.ndarray]:
-    """Return the channels of the maps, named as `isc decompose` names them."""
+    """Return the channels of the maps, named as `isc decompose` names them.
+
+    Parameters
+    ----------
+    answer : Estimate
+        The stage's result.
+
+    Returns
+    -------
+    dict of str to (H, W) ndarray
+        By channel name: "reflectance.R".
+    """
     layers = {
         "reflectance": (answer.reflectance, "RGB"),
         "shading": (answer.shading, "RGB"),

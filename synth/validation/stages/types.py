@@ -172,6 +172,16 @@ class Stage(Generic[Answer, Scored]):
     def metric(self, name: str) -> Metric:
         """Return a metric by name.
 
+        Parameters
+        ----------
+        name : str
+            Name of the metric.
+
+        Returns
+        -------
+        Metric
+            The metric.
+
         Raises
         ------
         InputError
