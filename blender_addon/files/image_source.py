@@ -143,7 +143,18 @@ def inspect_image(image: Any, *, as_pixels: bool = False) -> ImageSource:
 
 
 def suffix_of(head: bytes) -> str:
-    """Return the suffix of an image file that begins with `head`, "" for an unknown format."""
+    """Return the suffix of an image file from its first bytes.
+
+    Parameters
+    ----------
+    head : bytes
+        First bytes of the file; four suffice.
+
+    Returns
+    -------
+    str
+        For example ".png"; "" for an unknown format.
+    """
     return next((suffix for magic, suffix in _SUFFIXES.items() if head[:4].startswith(magic)), "")
 
 

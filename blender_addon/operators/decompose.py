@@ -72,12 +72,40 @@ class ISC_OT_decompose(WorkerOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether no run is active."""
+        """Return whether no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context; not used.
+
+        Returns
+        -------
+        bool
+            False while a run is active; the tooltip then names it.
+        """
         del context
         return _is_idle(cls)
 
     def prepare(self, context: Any) -> WorkerRun:
-        """Create the run of the scene's panel; see `WorkerOperator`."""
+        """Create the run of the scene's panel; see `WorkerOperator`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If the panel's settings are incomplete, the request cannot be fulfilled, or a run is
+            active.
+        """
         return create_decompose_run(context, request_from_settings(context.scene))
 
 
@@ -104,14 +132,42 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether an ISC object is active and no run is."""
+        """Return whether an ISC object is active and no run is.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
         if find_built(context.object) is None:
             cls.poll_message_set("Select an object made by ISC")
             return False
         return _is_idle(cls)
 
     def prepare(self, context: Any) -> WorkerRun:
-        """Create the run; see `WorkerOperator`."""
+        """Create the run; see `WorkerOperator`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If no ISC object is active, the active one is a copy, the request cannot be fulfilled,
+            or a run is active.
+        """
         built = find_built(context.object)
         if built is None:
             raise InputError("no object made by ISC is active: select one")

@@ -43,14 +43,36 @@ class EditOperator:
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether an object, camera or sun of ISC is active."""
+        """Return whether an object, camera or sun of ISC is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
         if find_built(context.object) is None:
             cls.poll_message_set("Select an object made by ISC")  # type: ignore[attr-defined]
             return False
         return True
 
     def execute(self, context: Any) -> set[str]:
-        """Apply the edit."""
+        """Apply the edit.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
+        """
         built = find_built(context.object)
         try:
             if built is None:
@@ -107,7 +129,25 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start with the object's current values."""
+        """Start with the object's current values.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            Blender's result, as `execute`.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`.
+        """
         del event
         inputs = dichromatic_inputs(find_built(context.object))
         self.hue, self.saturation, self.value = (
@@ -116,7 +156,18 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
         return self.execute(context)
 
     def edit(self, built: BuiltObject) -> None:
-        """Set the node's inputs; see `EditOperator`."""
+        """Set the node's inputs; see `EditOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object; afterwards no other object shares its material.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`.
+        """
         inputs = single_user_inputs(built)
         inputs["Hue"].default_value = self.hue
         inputs["Saturation"].default_value = self.saturation
@@ -146,7 +197,25 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start with the object's current values."""
+        """Start with the object's current values.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            Blender's result, as `execute`.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`.
+        """
         del event
         inputs = dichromatic_inputs(find_built(context.object))
         self.diffuse_gain = inputs["Diffuse Gain"].default_value
@@ -154,7 +223,18 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
         return self.execute(context)
 
     def edit(self, built: BuiltObject) -> None:
-        """Set the nodes' inputs, of the lobe and of the photo's highlights; see `EditOperator`."""
+        """Set the nodes' inputs, of the lobe and of the photo's highlights; see `EditOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object; afterwards no other object shares its material.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`.
+        """
         single_user_inputs(built)["Diffuse Gain"].default_value = self.diffuse_gain
         set_specular_gain(find_material(built.object), self.specular_gain)
 
@@ -167,7 +247,18 @@ class ISC_OT_own_material(EditOperator, bpy.types.Operator):
     bl_description = "Give the object its own material, so that edits do not change its copies"
 
     def edit(self, built: BuiltObject) -> None:
-        """Copy the material; see `EditOperator`."""
+        """Copy the material; see `EditOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object; afterwards no other object shares its material.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`.
+        """
         single_user_inputs(built)
 
 
@@ -207,7 +298,18 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
     )
 
     def edit(self, built: BuiltObject) -> None:
-        """Set the sun and the world; see `EditOperator`."""
+        """Set the sun and the world; see `EditOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object and what belongs to it.
+
+        Raises
+        ------
+        InputError
+            If the object does not store its light, or the direction has no length.
+        """
         obj = built.object
         if self.light == "RECOVERED":
             relight(obj, sun=False)

@@ -48,20 +48,55 @@ class ISC_OT_export(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether an ISC object is active."""
+        """Return whether an ISC object is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
         if find_built(context.object) is None:
             cls.poll_message_set("Select an object made by ISC")
             return False
         return True
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Open the file browser."""
+        """Open the file browser.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"}; Blender calls `execute` once a folder is selected.
+        """
         del event
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Write the files."""
+        """Write the files.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
+        """
         built = find_built(context.object)
         try:
             if built is None or not self.directory:

@@ -37,11 +37,38 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether there is a photo and no run is active."""
+        """Return whether there is a photo and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
         return _can_cut(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
-        """Create the run; see `WorkerOperator`."""
+        """Create the run; see `WorkerOperator`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If no photo is selected, it cannot be used, the box is too small, or a run is active.
+        """
         require_no_active_run()
         settings = context.scene.isc
         if settings.image is None:
@@ -76,7 +103,18 @@ class ISC_OT_take_mask(bpy.types.Operator):
     scene: StringProperty(name="Scene", description="Full name of the scene that uses the mask")
 
     def execute(self, context: Any) -> set[str]:
-        """Load the mask; it replaces one that was cut out earlier."""
+        """Load the mask; it replaces one that was cut out earlier.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
+        """
         scene = find_by_full_name(bpy.data.scenes, self.scene) or context.scene
         photo = find_by_full_name(bpy.data.images, self.image)
         try:
@@ -102,7 +140,18 @@ class ISC_OT_new_mask(bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: Any) -> set[str]:
-        """Create the image; an image editor shows it in Paint mode."""
+        """Create the image; an image editor shows it in Paint mode.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} if no photo is selected.
+        """
         settings = context.scene.isc
         image = settings.image
         if image is None or 0 in tuple(image.size):
@@ -129,7 +178,18 @@ class ISC_OT_draw_box(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether an image editor shows the photo and no run is active."""
+        """Return whether an image editor shows the photo and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False for want of the editor or its image, the tooltip gives the reason.
+        """
         if (
             context.area is None
             or context.area.type != "IMAGE_EDITOR"
@@ -140,7 +200,20 @@ class ISC_OT_draw_box(bpy.types.Operator):
         return active_run() is None
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Wait for the mouse."""
+        """Wait for the mouse.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"}.
+        """
         del event
         context.scene.isc.image = context.space_data.image
         context.window.cursor_modal_set("CROSSHAIR")
@@ -154,7 +227,21 @@ class ISC_OT_draw_box(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Follow press, drag and release of the left mouse button."""
+        """Follow press, drag and release of the left mouse button.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard; its position is in pixels of the window.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while drawing; {"FINISHED"} with a box;
+            {"CANCELLED"} on Esc, the right mouse button or too small a box.
+        """
         region = _canvas(context)
         position = (event.mouse_x - region.x, event.mouse_y - region.y)
         if event.type in {"ESC", "RIGHTMOUSE"}:
@@ -172,7 +259,13 @@ class ISC_OT_draw_box(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
-        """Stop drawing: Blender ends the operator."""
+        """Stop drawing: Blender ends the operator.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        """
         self._leave(context, set())
 
     def _finish(self, context: Any, region: Any) -> set[str]:

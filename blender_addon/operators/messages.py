@@ -51,17 +51,54 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
 
 
 def join_notes(lines: Iterable[str]) -> str:
-    """Join notes on a result into one line."""
+    """Join notes on a result into one line.
+
+    Parameters
+    ----------
+    lines : iterable of str
+        The notes; empty ones are left out.
+
+    Returns
+    -------
+    str
+        The notes, separated by semicolons.
+    """
     return "; ".join(filter(None, (line.strip() for line in lines)))
 
 
 def busy_message(title: str) -> str:
-    """Return why nothing can start while the run of that title is active."""
+    """Return why nothing can start while the run of that title is active.
+
+    Parameters
+    ----------
+    title : str
+        Title of the active run.
+
+    Returns
+    -------
+    str
+        "What is wrong: what to do".
+    """
     return f"{title} is running: wait for it, or cancel it first"
 
 
 def progress_message(title: str, stage: str, fraction: float) -> str:
-    """Return the text of the status bar during a run."""
+    """Return the text of the status bar during a run.
+
+    Parameters
+    ----------
+    title : str
+        Title of the run.
+    stage : str
+        Present stage.
+    fraction : float
+        Completed fraction of the work in [0, 1].
+
+    Returns
+    -------
+    str
+        Title, stage and percentage, and that Esc cancels.
+    """
     return f"{title}: {stage} ({100 * fraction:.0f} %), Esc to cancel"
 
 

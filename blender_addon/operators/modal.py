@@ -53,7 +53,21 @@ class WorkerOperator:
         raise NotImplementedError
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start the run and return at once."""
+        """Start the run and return at once.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"}; {"CANCELLED"} if the run is impossible. Without a window as
+            `execute`.
+        """
         del event
         run = self._begin(context)
         if run is None:
@@ -68,12 +82,37 @@ class WorkerOperator:
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Start the run and wait for its end."""
+        """Start the run and wait for its end.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"} if the run is done; {"CANCELLED"} if it is impossible, failed or was
+            cancelled.
+        """
         run = self._begin(context)
         return {"CANCELLED"} if run is None else self._wait(context, run)
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Poll the run ten times a second; all events of the user pass through."""
+        """Poll the run ten times a second; all events of the user pass through.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            A tick of the timer or an event of the user; Esc cancels the run.
+
+        Returns
+        -------
+        set of str
+            {"PASS_THROUGH"} until the run has ended, then as `execute`.
+        """
         run = self._run
         if run is None:
             return {"CANCELLED"}
@@ -87,7 +126,13 @@ class WorkerOperator:
         return self._report_outcome(run)
 
     def cancel(self, context: Any) -> None:
-        """Cancel the run: Blender closes the window or loads another file."""
+        """Cancel the run: Blender closes the window or loads another file.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        """
         self._stop_timer(context)
         cancel_active_run()
 
@@ -182,7 +227,13 @@ def _set_status_text(context: Any, text: str | None) -> None:
 
 
 def redraw_panels(context: Any) -> None:
-    """Redraw the panels in all windows."""
+    """Redraw the panels in all windows.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+    """
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in _PANEL_EDITORS:
@@ -201,12 +252,33 @@ class ISC_OT_cancel(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Whether a run is active."""
+        """Return whether a run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context; not used.
+
+        Returns
+        -------
+        bool
+        """
         del context
         return active_run() is not None
 
     def execute(self, context: Any) -> set[str]:
-        """Cancel the run; its operator ends at its next tick."""
+        """Cancel the run; its operator ends at its next tick.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} if no run is active.
+        """
         run = active_run()
         if run is None:
             return {"CANCELLED"}

@@ -78,7 +78,18 @@ class ISC_OT_build_result(bpy.types.Operator):
     )
 
     def execute(self, context: Any) -> set[str]:
-        """Build the object; on an error the scene is unchanged."""
+        """Build the object; on an error the scene is unchanged.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
+        """
         try:
             request = (
                 request_from_json(self.request) if self.request else _panel_request(context.scene)
@@ -109,13 +120,38 @@ class ISC_OT_import_result(bpy.types.Operator):
     filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Open the file browser."""
+        """Open the file browser.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"}; Blender calls `execute` once a folder is selected.
+        """
         del event
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Build the object; a worker first adds missing arrays."""
+        """Build the object; a worker first adds missing arrays.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}, or {"CANCELLED"} after an error has been reported; the result of
+            `ISC_OT_complete_result` where arrays are missing.
+        """
         folder = Path(bpy.path.abspath(self.directory))
         if not self.directory or not (folder / DESCRIPTION).is_file():
             self.report(
@@ -143,7 +179,23 @@ class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
     directory: StringProperty(name="Folder", description="Result folder", subtype="DIR_PATH")
 
     def prepare(self, context: Any) -> WorkerRun:
-        """Create the run; see `WorkerOperator`."""
+        """Create the run; see `WorkerOperator`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If a run is active, the worker's modules are missing, or no folder can be created.
+        """
         require_no_active_run()
         folder = Path(self.directory)
         environment = worker_environment(read_preferences(context))

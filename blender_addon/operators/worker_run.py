@@ -160,7 +160,13 @@ class WorkerRun:
         return self.status
 
     def record_call(self, seconds: float) -> None:
-        """Record how long a call for this run has blocked the window."""
+        """Record how long a call for this run has blocked the window.
+
+        Parameters
+        ----------
+        seconds : float
+            Duration of the call in seconds; the longest is kept, in milliseconds.
+        """
         self.longest_call_ms = max(self.longest_call_ms, 1e3 * seconds)
 
     def import_result(self, context: Any) -> RunStatus:

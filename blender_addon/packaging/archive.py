@@ -24,7 +24,18 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def archive_name(target: Target) -> str:
-    """Return the file name of a target's zip."""
+    """Return the file name of a target's zip.
+
+    Parameters
+    ----------
+    target : Target
+        Platform and Python version.
+
+    Returns
+    -------
+    str
+        Name with the version of ISC and the name of the target.
+    """
     return f"isc_intrinsic-{__version__}-{target.name}.zip"
 
 

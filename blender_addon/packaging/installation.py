@@ -87,7 +87,21 @@ def check(condition: bool, expectation: str) -> None:
 
 
 def install(archive: Path, report: dict[str, Any]) -> None:
-    """Install and enable the zip; adds the duration to `report`."""
+    """Install and enable the zip; adds the duration to `report`.
+
+    Parameters
+    ----------
+    archive : Path
+        The zip.
+    report : dict of str to Any
+        Measurements; gets "install seconds".
+
+    Raises
+    ------
+    AssertionError
+        If the extension is not enabled, the source tree is importable although the zip contains
+        wheels, or Blender's process has loaded one of the packages in the wheels.
+    """
     began = time.perf_counter()
     done = bpy.ops.extensions.package_install_files(
         filepath=str(archive), repo="user_default", enable_on_install=True
@@ -122,7 +136,18 @@ def extension_folder() -> Path:
 
 
 def files_of(folder: Path) -> dict[str, int]:
-    """Return the sizes of all files in a folder by relative path, except Python's byte code."""
+    """Return the sizes of all files in a folder by relative path, except Python's byte code.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder, searched recursively.
+
+    Returns
+    -------
+    dict of str to int
+        Size in bytes by path relative to the folder.
+    """
     return {
         str(path.relative_to(folder)): path.stat().st_size
         for path in folder.rglob("*")
@@ -149,13 +174,29 @@ def create_photo() -> Any:
 
 
 def select_photo(photo: Any) -> None:
-    """Select the photo in the panel."""
+    """Select the photo in the panel.
+
+    Parameters
+    ----------
+    photo : bpy.types.Image
+        The photo; the longer side of its object is set to 64 pixels.
+    """
     settings = bpy.context.scene.isc
     settings.image, settings.max_size = photo, 64
 
 
 def extension_module(name: str) -> Any:
-    """Import a module of the installed extension."""
+    """Import a module of the installed extension.
+
+    Parameters
+    ----------
+    name : str
+        Name relative to the extension, for example "operators.modal".
+
+    Returns
+    -------
+    module
+    """
     return importlib.import_module(f"{MODULE}.{name}")
 
 
@@ -211,7 +252,23 @@ def complete_run() -> dict[str, Any]:
 
 
 def import_result(folder: Path) -> dict[str, Any]:
-    """Import a result folder by the operator and return its duration."""
+    """Import a result folder by the operator and return its duration.
+
+    Parameters
+    ----------
+    folder : Path
+        Result folder with arrays.
+
+    Returns
+    -------
+    dict of str to float
+        Duration as "seconds".
+
+    Raises
+    ------
+    AssertionError
+        If the import does not finish.
+    """
     began = time.perf_counter()
     check(
         bpy.ops.isc.import_result(directory=str(folder)) == {"FINISHED"}, "the result is imported"
@@ -291,7 +348,18 @@ def _wait_for(seconds: float, condition: Any) -> bool:
 
 
 def save_and_load(blend: Path) -> None:
-    """Save and load a file, and check that it contains everything."""
+    """Save and load a file, and check that it contains everything.
+
+    Parameters
+    ----------
+    blend : Path
+        File to write.
+
+    Raises
+    ------
+    AssertionError
+        If the file is incomplete: its object, a packed image or the panel's settings.
+    """
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     check(blend.stat().st_size > 50_000, "the file is written")
     bpy.ops.wm.open_mainfile(filepath=str(blend))
@@ -306,7 +374,18 @@ def save_and_load(blend: Path) -> None:
 
 
 def append(blend: Path) -> None:
-    """Append the object to another file, and check its material."""
+    """Append the object to another file, and check its material.
+
+    Parameters
+    ----------
+    blend : Path
+        File that contains the object.
+
+    Raises
+    ------
+    AssertionError
+        If the collection, an image of the material or the request is missing.
+    """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(str(blend)) as (source, target):
         target.collections = [name for name in source.collections if name.startswith("photo")]

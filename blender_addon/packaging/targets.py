@@ -61,7 +61,18 @@ class Target:
         return _PIP_PLATFORMS[self.platform]
 
     def runs(self, wheel: str) -> bool:
-        """Return whether the wheel of a file name is compatible."""
+        """Return whether the wheel of a file name is compatible.
+
+        Parameters
+        ----------
+        wheel : str
+            File name of a wheel.
+
+        Returns
+        -------
+        bool
+            Whether Python, ABI and platform in the name fit the target.
+        """
         python, abi, platforms = wheel.removesuffix(".whl").split("-")[-3:]
         fits_python = (
             python == "py3"

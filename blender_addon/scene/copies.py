@@ -32,7 +32,18 @@ def find_original(obj: bpy.types.Object) -> bpy.types.Object | None:
 
 
 def is_copy(obj: bpy.types.Object) -> bool:
-    """Return whether an object is a copy of one that ISC built."""
+    """Return whether an object is a copy of one that ISC built.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        Any object.
+
+    Returns
+    -------
+    bool
+        False for the original and for objects that ISC did not build.
+    """
     return obj.get(ROLE) in (OBJECT, COPY) and find_original(obj) != obj
 
 

@@ -21,7 +21,18 @@ MODIFIER = "ISC Displacement"
 
 
 def flatten(sheet: MeshGeometry) -> MeshGeometry:
-    """Return a mesh without its heights and normals."""
+    """Return a mesh without its heights and normals.
+
+    Parameters
+    ----------
+    sheet : MeshGeometry
+        The visible side of the object, in Blender's axes (y away from the viewer).
+
+    Returns
+    -------
+    MeshGeometry
+        The mesh in the plane y = 0.
+    """
     return replace(sheet, vertices=sheet.vertices * (1.0, 0.0, 1.0), normals=None)
 
 

@@ -115,6 +115,10 @@ def temporarily_assigned(
         slots has one for the duration.
     replacement : bpy.types.Material
         The other material.
+
+    Yields
+    ------
+    None
     """
     slot_added = not obj.material_slots
     if slot_added:

@@ -127,7 +127,17 @@ def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
 
 
 def shows_highlights(material: bpy.types.Material) -> bool:
-    """Return whether a material shows the photo's own highlights instead of the lobe."""
+    """Return whether a material shows the photo's own highlights instead of the lobe.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        The material.
+
+    Returns
+    -------
+    bool
+    """
     nodes = material.node_tree.nodes if material.node_tree else ()
     return any(
         node.type == "GROUP" and node.node_tree and node.node_tree.get("isc_group") == HIGHLIGHTS

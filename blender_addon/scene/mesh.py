@@ -47,7 +47,18 @@ class MeshGeometry:
 
 
 def to_blender(vectors: np.ndarray) -> np.ndarray:
-    """Convert vectors (..., 3) of the camera frame to Blender's axes."""
+    """Convert vectors of the camera frame to Blender's axes.
+
+    Parameters
+    ----------
+    vectors : (..., 3) ndarray
+        Camera frame: x right, y up, z toward the viewer.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        Blender's axes: x right, y away from the viewer, z up.
+    """
     return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], -1)
 
 

@@ -6,7 +6,18 @@ import bpy
 
 
 def node_tree(block: Any) -> bpy.types.NodeTree:
-    """Return the node tree of a material or world, created where needed (before Blender 5)."""
+    """Return the node tree of a material or world, created where needed (before Blender 5).
+
+    Parameters
+    ----------
+    block : bpy.types.Material or bpy.types.World
+        The datablock.
+
+    Returns
+    -------
+    bpy.types.NodeTree
+        Its node tree.
+    """
     if block.node_tree is None:
         block.use_nodes = True
     return block.node_tree

@@ -81,12 +81,36 @@ def tag(block: Any, key: str, role: str) -> Any:
 
 
 def is_isc_datablock(block: Any) -> bool:
-    """Return whether ISC made a datablock; False for None."""
+    """Return whether ISC made a datablock.
+
+    Parameters
+    ----------
+    block : bpy.types.ID or None
+        The datablock.
+
+    Returns
+    -------
+    bool
+        False for None.
+    """
     return block is not None and KEY in block
 
 
 def datablock_name(key: str, suffix: str = "") -> str:
-    """Return the key and a suffix; a long key is shortened so that the suffix remains."""
+    """Return the key and a suffix; a long key is shortened so that the suffix remains.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    suffix : str, optional
+        What follows the key after a space; "" for the key alone.
+
+    Returns
+    -------
+    str
+        Name of at most 63 bytes in UTF-8.
+    """
     end = f" {suffix}" if suffix else ""
     room = _NAME_BYTES - len(end.encode())
     return key.encode("utf-8", "replace")[:room].decode("utf-8", "ignore") + end
@@ -115,7 +139,18 @@ def require_local(key: str) -> None:
 
 
 def photo_hash(result: ResultArrays) -> str:
-    """Return the SHA-256 of the result's photo, "" if unknown."""
+    """Return the SHA-256 of the result's photo.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+
+    Returns
+    -------
+    str
+        Hexadecimal digits; "" if unknown.
+    """
     return str(result.description.get("input", {}).get("sha256", ""))
 
 

@@ -69,7 +69,13 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, context: Any) -> None:
-        """Draw the page."""
+        """Draw the page.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context; not used.
+        """
         del context
         layout = self.layout
         layout.use_property_split = True
