@@ -31,6 +31,14 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def append_row(path: Path, row: Mapping[str, object]) -> None:
-    """Append one row to the file."""
+    """Append one row to the file.
+
+    Parameters
+    ----------
+    path : Path
+        File of JSON lines; created if absent.
+    row : mapping of str to object
+        Values that JSON can store, by name.
+    """
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")

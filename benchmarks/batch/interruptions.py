@@ -207,7 +207,17 @@ def wait_for_kill(place: CampaignFolders, run: psutil.Process, rng: random.Rando
 
 
 def alive(process: psutil.Process) -> bool:
-    """Return whether a process is running."""
+    """Return whether a process is running.
+
+    Parameters
+    ----------
+    process : psutil.Process
+
+    Returns
+    -------
+    bool
+        False for a zombie.
+    """
     return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
 
 
@@ -246,7 +256,17 @@ def strike(
 
 
 def command_of(process: psutil.Process) -> list[str]:
-    """Return the command line of a process; empty if it has ended."""
+    """Return the command line of a process.
+
+    Parameters
+    ----------
+    process : psutil.Process
+
+    Returns
+    -------
+    list of str
+        Empty if the process has ended.
+    """
     with contextlib.suppress(psutil.NoSuchProcess, psutil.ZombieProcess):
         return list(process.cmdline())
     return []
@@ -369,7 +389,18 @@ def _started(command: list[str], place: CampaignFolders) -> psutil.Process:
 
 
 def results(output: Path) -> list[Path]:
-    """List the results under their final names."""
+    """List the results under their final names.
+
+    Parameters
+    ----------
+    output : Path
+        Output folder of the batch.
+
+    Returns
+    -------
+    list of Path
+        Their folders, unsorted; empty if there is no output folder yet.
+    """
     if not output.is_dir():
         return []
     return [
@@ -438,14 +469,36 @@ def content(folder: Path) -> dict[str, bytes | str]:
 
 
 def complete(place: CampaignFolders) -> bool:
-    """Return whether the output holds a result of every photo."""
+    """Return whether the output holds a result of every photo.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders of the campaign.
+
+    Returns
+    -------
+    bool
+        True if the output has the same results by name as the reference.
+    """
     return {path.name for path in results(place.output)} == {
         path.name for path in results(place.reference)
     }
 
 
 def table(rows: list[dict[str, object]]) -> str:
-    """Format the campaign as Markdown."""
+    """Format the campaign as Markdown.
+
+    Parameters
+    ----------
+    rows : list of dict
+        One row per run, as recorded.
+
+    Returns
+    -------
+    str
+        Kills by kind of process, and a line on the results compared after them.
+    """
     struck = [row for row in rows if row["struck"]]
     kinds: Counter[str] = Counter()
     for row in struck:

@@ -94,7 +94,15 @@ def write_manifest(path: Path, lines: int) -> Path:
 
 
 def start(manifest: Path, output: Path) -> None:
-    """Run a batch in this process and print the cells of its row."""
+    """Run a batch in this process and print the cells of its row.
+
+    Parameters
+    ----------
+    manifest : Path
+        File that lists the photos.
+    output : Path
+        Output folder of the batch.
+    """
     process, observer = psutil.Process(), RunObserver()
     with contextlib.suppress(Cancelled):
         run_batch(
@@ -125,7 +133,13 @@ class RunObserver:
         self.count = 0
 
     def progress(self, event: ProgressEvent) -> None:
-        """Take a progress event."""
+        """Take a progress event.
+
+        Parameters
+        ----------
+        event : ProgressEvent
+            Its detail contains the number of photos that are done.
+        """
         found = re.match(r"done (\d+)", event.detail)
         self.count = int(found.group(1)) if found else 0
         if self.count and not self.first:
@@ -137,7 +151,18 @@ class RunObserver:
 
 
 def no_task(job: ImageJob) -> ImageOutcome:
-    """Do nothing."""
+    """Do nothing.
+
+    Parameters
+    ----------
+    job : ImageJob
+        Ignored.
+
+    Returns
+    -------
+    ImageOutcome
+        Done.
+    """
     del job
     return ImageOutcome(DONE)
 

@@ -177,7 +177,18 @@ def batch(place: Path, photos: Path, model: str, which: str) -> BatchRun:
 
 
 def thumbnail_seconds(place: Path) -> float:
-    """Return the median seconds of a thumbnail, over ten."""
+    """Return the median seconds of a thumbnail, over ten.
+
+    Parameters
+    ----------
+    place : Path
+        Folder of the measurement; its subfolder `batch` contains the results.
+
+    Returns
+    -------
+    float
+        Seconds.
+    """
     sheets = sorted((place / "batch").glob("*/preview.png"))[:10]
     taken = []
     for sheet in sheets:

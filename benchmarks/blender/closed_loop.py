@@ -157,7 +157,20 @@ class Renders:
 
 
 def loop_row(name: str, renders: Renders) -> LoopRow:
-    """Measure an object in its own light."""
+    """Measure an object in its own light.
+
+    Parameters
+    ----------
+    name : str
+        The object.
+    renders : Renders
+        Its decomposition and Blender's renders of it.
+
+    Returns
+    -------
+    LoopRow
+        Relative RMS errors of the shading, and PSNR in dB of the diffuse image and the photo.
+    """
     r = renders.result
     mask, inner, peak, k = r.mask, _inner(r.mask), white(r.image, r.mask), r.reflectance_scale
     environment = np.zeros_like(r.shading)
@@ -230,25 +243,77 @@ def relit_row(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> R
 
 
 def white(image: np.ndarray, mask: np.ndarray) -> float:
-    """Return the peak of PSNR: the 99.9th percentile of an image (H, W, 3) inside the mask."""
+    """Return the peak of PSNR: the 99.9th percentile of an image inside the mask.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) ndarray of bool
+        Pixels of the object.
+
+    Returns
+    -------
+    float
+        In the unit of the image.
+    """
     return float(np.percentile(image[mask], 99.9))
 
 
 def relative_rms(found: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
-    """Return the RMS error of an image (H, W, 3) over the RMS of the truth, inside the mask."""
+    """Return the RMS error of an image over the RMS of the truth, inside the mask.
+
+    Parameters
+    ----------
+    found, truth : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) ndarray of bool
+        Pixels of the object.
+
+    Returns
+    -------
+    float
+        0 for equal images.
+    """
     return float(
         np.sqrt(np.square(found[mask] - truth[mask]).mean() / np.square(truth[mask]).mean())
     )
 
 
 def gain(truth: np.ndarray, found: np.ndarray, mask: np.ndarray) -> float:
-    """Return the factor of `found` with the least squared error."""
+    """Return the factor of `found` with the least squared error.
+
+    Parameters
+    ----------
+    truth, found : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        The factor, for all channels.
+    """
     inside = found[mask].astype(float)
     return float((inside * truth[mask]).sum() / max(float(np.square(inside).sum()), 1e-30))
 
 
 def scaled_psnr(truth: np.ndarray, found: np.ndarray, mask: np.ndarray) -> float:
-    """Return the PSNR of `found` after the best gain; the peak is the truth's."""
+    """Return the PSNR of `found` after the best gain; the peak is the truth's.
+
+    Parameters
+    ----------
+    truth, found : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        In dB.
+    """
     return psnr(truth, gain(truth, found, mask) * found, mask, peak=white(truth, mask))
 
 
@@ -258,7 +323,18 @@ def _inner(mask: np.ndarray) -> np.ndarray:
 
 
 def loop_table(rows: Sequence[LoopRow]) -> str:
-    """Format the rows of objects in their own light as Markdown."""
+    """Format the rows of objects in their own light as Markdown.
+
+    Parameters
+    ----------
+    rows : sequence of LoopRow
+        One per object.
+
+    Returns
+    -------
+    str
+        The table: errors of the shading in per cent, PSNR in dB.
+    """
     lines = [
         "| object | (i) white render against shading | without the outline | with own shadows "
         "| environment map alone | (ii) diffuse | without the outline | with own shadows "
@@ -287,7 +363,18 @@ def loop_table(rows: Sequence[LoopRow]) -> str:
 
 
 def relit_table(rows: Sequence[RelitRow]) -> str:
-    """Format the rows of relit objects as Markdown."""
+    """Format the rows of relit objects as Markdown.
+
+    Parameters
+    ----------
+    rows : sequence of RelitRow
+        One per object and new light.
+
+    Returns
+    -------
+    str
+        The table: PSNR in dB, and the gain.
+    """
     lines = [
         "| object | new light | unchanged photo | diffuse, no shadows | diffuse, own shadows "
         "| lobe, own shadows | diffuse light alone | true maps, diffuse light | gain |",
@@ -304,7 +391,20 @@ def relit_table(rows: Sequence[RelitRow]) -> str:
 
 
 def loop_panels(name: str, renders: Renders) -> list[MapPanel]:
-    """Show the photo, its maps and their renders."""
+    """Show the photo, its maps and their renders.
+
+    Parameters
+    ----------
+    name : str
+        The object.
+    renders : Renders
+        Its decomposition and Blender's renders of it.
+
+    Returns
+    -------
+    list of MapPanel
+        Images are divided by the peak of the photo, shadings by that of the shading map.
+    """
     r, peak = renders.result, white(renders.result.image, renders.result.mask)
     level = white(r.shading, r.mask)
     shown = (

@@ -78,7 +78,18 @@ def rendered(folder: Path, only: Sequence[str]) -> Iterator[CheckedPhoto]:
 
 
 def photographed(folder: Path) -> Iterator[CheckedPhoto]:
-    """Read the photos of a folder, whose truth is unknown."""
+    """Read the photos of a folder, whose truth is unknown.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of PNG files; its name becomes the group.
+
+    Returns
+    -------
+    Iterator of CheckedPhoto
+        Sorted by file name.
+    """
     for path in sorted(folder.glob("*.png")):
         photo = read_photo(path)
         yield CheckedPhoto(photo.image, photo.mask, folder.name, path.stem)

@@ -101,7 +101,18 @@ def run_model(
 
 
 def measure(given: argparse.Namespace) -> list[dict[str, object]]:
-    """Measure what is missing; return all rows, old and new."""
+    """Measure what is missing; return all rows, old and new.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        Arguments of the command line.
+
+    Returns
+    -------
+    list of dict
+        One row per set, object, model and rounding.
+    """
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"], row.get("rounding", 0)) for row in rows}

@@ -41,7 +41,21 @@ Approximation = Callable[[np.ndarray, np.ndarray, Estimate], np.ndarray]
 
 
 def blurred(layer: np.ndarray, mask: np.ndarray, share: float) -> np.ndarray:
-    """Blur a layer (H, W, 3) inside the mask by that share of the object's diagonal."""
+    """Blur a layer inside the mask by a share of the object's diagonal.
+
+    Parameters
+    ----------
+    layer : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) ndarray of bool
+        Pixels of the object.
+    share : float
+        Standard deviation of the Gaussian over the diagonal of the mask's bounding box.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+    """
     return masked_gaussian(layer, mask, share * float(np.hypot(*np.ptp(np.argwhere(mask), axis=0))))
 
 
@@ -89,7 +103,18 @@ APPROXIMATIONS: dict[str, Approximation] = {
 
 
 def measure(given: argparse.Namespace) -> list[dict[str, object]]:
-    """Measure what is missing; return all rows, old and new."""
+    """Measure what is missing; return all rows, old and new.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        Arguments of the command line.
+
+    Returns
+    -------
+    list of dict
+        One row per set, object and model.
+    """
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"]) for row in rows}

@@ -283,7 +283,18 @@ def _within(interval: Interval, value: float) -> bool:
 
 
 def truth_fit(scene: LobeScene) -> FitRow:
-    """Fit with true normals, heights and specular layer, and unknown light."""
+    """Fit with true normals, heights and specular layer, and unknown light.
+
+    Parameters
+    ----------
+    scene : LobeScene
+        A rendered scene with its true maps.
+
+    Returns
+    -------
+    FitRow
+        The fit compared with the truth.
+    """
     m = scene.maps
     start = time.perf_counter()
     fit = fit_lobe(m["specular"], m["normal"], m["mask"], pixels=PixelData(height=m["height"]))
@@ -291,7 +302,18 @@ def truth_fit(scene: LobeScene) -> FitRow:
 
 
 def known_light_fit(scene: LobeScene) -> FitRow:
-    """Fit with true normals and specular layer, under the true environment map."""
+    """Fit with true normals and specular layer, under the true environment map.
+
+    Parameters
+    ----------
+    scene : LobeScene
+        A rendered scene with its true maps.
+
+    Returns
+    -------
+    FitRow
+        The fit compared with the truth.
+    """
     m = scene.maps
     start = time.perf_counter()
     fit = fit_lobe(
@@ -301,7 +323,18 @@ def known_light_fit(scene: LobeScene) -> FitRow:
 
 
 def chain_fit(scene: LobeScene) -> FitRow:
-    """Fit with the results of the pipeline."""
+    """Fit with the results of the pipeline.
+
+    Parameters
+    ----------
+    scene : LobeScene
+        A rendered scene with the pipeline's specular layer, normals and shading.
+
+    Returns
+    -------
+    FitRow
+        The fit compared with the truth.
+    """
     m, mask = scene.maps, scene.maps["mask"]
     start = time.perf_counter()
     outline = silhouette_normals(mask, shipped_prior_set().silhouette)
@@ -399,6 +432,16 @@ def tables(found_cases: Sequence[LobeScene]) -> str:
 
     Tolerances with true layers: 5 %, 5 %, 2 degrees; of the pipeline: a factor of 1.5, 40 % over
     the shading, 20 degrees.
+
+    Parameters
+    ----------
+    found_cases : sequence of LobeScene
+        The scenes to fit.
+
+    Returns
+    -------
+    str
+        Markdown.
     """
     exact, loose = (1.05, 0.05, 2.0), (1.5, 0.4, 20.0)
     glossy = [c for c in found_cases if c.alpha and c.light != "sh"]

@@ -40,7 +40,18 @@ _COLUMNS = ("candidate", "group", "name", "value")
 
 
 def candidates(count: int) -> list[IscOptions]:
-    """Return the shipped options, followed by `count` - 1 random changes of them."""
+    """Return the shipped options, followed by random changes of them.
+
+    Parameters
+    ----------
+    count : int
+        Number of candidates, of which `count` - 1 are random.
+
+    Returns
+    -------
+    list of IscOptions
+        The same in every run.
+    """
     shipped, random = VARIANTS["improved"], np.random.default_rng(_SEED)
     return [shipped] + [_changed(shipped, random) for _ in range(count - 1)]
 
@@ -117,7 +128,19 @@ def _value(truth: SeparationTruth, options: IscOptions) -> float:
 
 
 def score(figures: dict[tuple[str, str], float]) -> float:
-    """Return the score of a candidate from its values by group and name; lower is better."""
+    """Return the score of a candidate; lower is better.
+
+    Parameters
+    ----------
+    figures : dict of (str, str) to float
+        Values by group and name: of groups without highlights, the RMS of the removed light in per
+        cent; of others, the squared error over that of the unchanged photo.
+
+    Returns
+    -------
+    float
+        Sum of the log ratios, plus penalties for harmed photos.
+    """
     clean = [value for (group, _), value in figures.items() if "clean" in group]
     ratios = np.array([value for (group, _), value in figures.items() if "clean" not in group])
     harm = (

@@ -233,7 +233,18 @@ def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
 
 
 def area(yes: np.ndarray, no: np.ndarray) -> float:
-    """Return the area under the ROC curve: how likely a `yes` exceeds a `no`."""
+    """Return the area under the ROC curve: how likely a `yes` exceeds a `no`.
+
+    Parameters
+    ----------
+    yes, no : (N,), (M,) ndarray
+        Values of the two classes.
+
+    Returns
+    -------
+    float
+        Between 0 and 1; ties count half.
+    """
     ordered = np.sort(no)
     below = np.searchsorted(ordered, yes, "left") + np.searchsorted(ordered, yes, "right")
     return float(below.mean() / 2 / len(no))

@@ -61,7 +61,18 @@ class ColourRow:
 
 
 def angle(colour: np.ndarray, other: np.ndarray) -> float:
-    """Return the angle between two colours (3,), in degrees."""
+    """Return the angle between two colours.
+
+    Parameters
+    ----------
+    colour, other : (3,) ndarray
+        Linear RGB, not 0.
+
+    Returns
+    -------
+    float
+        In degrees.
+    """
     return float(
         np.degrees(
             np.arccos(
@@ -72,7 +83,19 @@ def angle(colour: np.ndarray, other: np.ndarray) -> float:
 
 
 def relit(truth: SeparationTruth, colour: np.ndarray) -> SeparationTruth:
-    """Return the scene under a light of the given colour (3,)."""
+    """Return the scene under a light of the given colour.
+
+    Parameters
+    ----------
+    truth : SeparationTruth
+        The scene under white light.
+    colour : (3,) ndarray
+        Linear RGB; multiplies the image and its layers.
+
+    Returns
+    -------
+    SeparationTruth
+    """
     return replace(
         truth,
         image=(truth.image * colour).astype(np.float32),
@@ -167,7 +190,18 @@ def photos(given: argparse.Namespace) -> Iterator[ColourRow]:
 
 
 def markdown(found: Sequence[ColourRow]) -> str:
-    """Format the rows of all groups as a Markdown table."""
+    """Format the rows of all groups as a Markdown table.
+
+    Parameters
+    ----------
+    found : sequence of ColourRow
+        One per photo.
+
+    Returns
+    -------
+    str
+        One line per group.
+    """
     lines = [
         "| photos | number | too strongly coloured | angle: estimate / white | largest "
         "| determined | their angle / white | largest "

@@ -58,7 +58,18 @@ class MatchingRow:
 
 
 def procedural_texture(height: int, width: int) -> np.ndarray:
-    """Return a texture (height, width, 3) with shapes of all sizes and edges."""
+    """Return a texture with shapes of all sizes and edges.
+
+    Parameters
+    ----------
+    height, width : int
+        In pixels.
+
+    Returns
+    -------
+    (height, width, 3) ndarray
+        Between 0 and 1.
+    """
     rng = np.random.default_rng(1)
     image = np.zeros((height, width, 3))
     for sigma in (1.0, 3.0, 9.0, 27.0):
@@ -70,7 +81,18 @@ def procedural_texture(height: int, width: int) -> np.ndarray:
 
 
 def later_view(image: np.ndarray) -> np.ndarray:
-    """Return the image rotated by 4 degrees, enlarged by 4 %, with 0.5 % noise."""
+    """Return the image rotated by 4 degrees, enlarged by 4 %, with 0.5 % noise.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Between 0 and 1.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Not clipped.
+    """
     turn = (
         np.array([[np.cos(0.07), np.sin(0.07), 0], [-np.sin(0.07), np.cos(0.07), 0], [0, 0, 1.04]])
         / 1.04
@@ -82,7 +104,19 @@ def later_view(image: np.ndarray) -> np.ndarray:
 
 
 def resized(image: np.ndarray, megapixels: float) -> np.ndarray:
-    """Resize an image (H, W, 3) to about the given number of megapixels."""
+    """Resize an image to about the given number of megapixels.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    megapixels : float
+        Size of the result in millions of pixels.
+
+    Returns
+    -------
+    (H', W', 3) ndarray
+        Not negative.
+    """
     factor = float(np.sqrt(megapixels * 1e6 / (image.shape[0] * image.shape[1])))
     return np.clip(ndimage.zoom(image, (factor, factor, 1), order=3 if factor > 1 else 1), 0, None)
 

@@ -25,7 +25,18 @@ _TARGETS = {
 
 
 def megapixel(folder: Path) -> np.ndarray:
-    """Return Shen & Zheng's cups, enlarged to a million pixels, (H, W, 3) float32."""
+    """Return Shen & Zheng's cups, enlarged to a million pixels.
+
+    Parameters
+    ----------
+    folder : Path
+        Shen & Zheng's photos.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Linear, float32.
+    """
     image = load_shen_zheng(folder, "cups").image
     factor = float(np.sqrt(_PIXELS / (image.shape[0] * image.shape[1])))
     return np.clip(ndimage.zoom(image, (factor, factor, 1), order=1), 0, None)

@@ -20,7 +20,18 @@ _GROUPS = {
 
 
 def tables(rows: Sequence[SeparationRow]) -> str:
-    """Format all tables that the rows allow."""
+    """Format all tables that the rows allow.
+
+    Parameters
+    ----------
+    rows : sequence of SeparationRow
+        One per method and image.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     parts = [
         "# Separations against ground truth\n",
         "`none` leaves the photo unchanged: diffuse = input.\n",

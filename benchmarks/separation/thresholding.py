@@ -51,7 +51,18 @@ class OneOrbit:
         self._x = 0.1 + 0.8 * ((seed + 1) * 0.618034 % 1)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the next numbers as an array of the given shape."""
+        """Return the next numbers of the orbit.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Shape of the array.
+
+        Returns
+        -------
+        ndarray
+            Of the given shape, in [0, 1).
+        """
         x, values = self._x, []
         for _ in range(int(np.prod(shape))):
             x = 4 * x * (1 - x)
@@ -254,7 +265,18 @@ def summary(rows: list[ThresholdRow], needed: dict[str, np.ndarray]) -> str:
 
 
 def details(rows: list[ThresholdRow]) -> str:
-    """Format hits and standard deviations per image as a Markdown table."""
+    """Format hits and standard deviations per image as a Markdown table.
+
+    Parameters
+    ----------
+    rows : list of ThresholdRow
+        One per image, number of thresholds and optimiser.
+
+    Returns
+    -------
+    str
+        One line per image and number of thresholds.
+    """
     lines = [
         "| image | K | exact optimum | "
         + " | ".join(f"{name}: hits, deviation" for name in OPTIMISERS)
@@ -275,7 +297,13 @@ def details(rows: list[ThresholdRow]) -> str:
 
 
 def draw_map(folder: Path) -> None:
-    """Draw the mutation rate and the logistic map (figures 3.5 to 3.8 of the thesis)."""
+    """Draw the mutation rate and the logistic map (figures 3.5 to 3.8 of the thesis).
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write the PNG files.
+    """
     affinity = np.linspace(0, 1, 200)
     options = AxesOptions("Mutation rate", "affinity f", "exp(-rho f)", (0, 1), (0, 1))
     with png_axes(folder / "mutation_rate.png", options) as axes:

@@ -68,6 +68,15 @@ def fit_options(method: str) -> FitOptions:
     """Return how the priors of a method are fitted.
 
     "B, lights scaled" is the recipe with the contrast of the natural lights fitted to the objects.
+
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+
+    Returns
+    -------
+    FitOptions
     """
     return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[
         method
@@ -152,7 +161,19 @@ def solve_jobs(
 
 
 def without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, ObjectStatistics]:
-    """Return the statistics of the other objects."""
+    """Return the statistics of the other objects.
+
+    Parameters
+    ----------
+    statistics : dict of str to ObjectStatistics
+        By object.
+    name : str
+        The object to omit.
+
+    Returns
+    -------
+    dict of str to ObjectStatistics
+    """
     return {key: value for key, value in statistics.items() if key != name}
 
 
@@ -187,7 +208,13 @@ def main() -> None:
 
 
 def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
-    """Print the geometric means by method and light, and the ratios to B."""
+    """Print the geometric means by method and light, and the ratios to B.
+
+    Parameters
+    ----------
+    results : dict of (str, str) to dict
+        By method and illumination, the errors of each object: Z, N, S, R, RS, L.
+    """
     print(
         "\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n"
         + "|---" * 9

@@ -48,7 +48,21 @@ def parser(text: str | None) -> argparse.ArgumentParser:
 
 
 def training_object(shared: Path, name: str, illumination: str) -> MitBerkeleyObject:
-    """Read a training object with its diffuse image."""
+    """Read a training object with its diffuse image.
+
+    Parameters
+    ----------
+    shared : Path
+        Folder with data/.
+    name : str
+        The object.
+    illumination : str
+        One of `LIGHTS`.
+
+    Returns
+    -------
+    MitBerkeleyObject
+    """
     return load_object(shared / "data" / "mit_berkeley_train", name, illumination, "diffuse")
 
 
@@ -71,7 +85,19 @@ def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
 
 
 def rounded_image(image: np.ndarray, number: int) -> np.ndarray:
-    """Perturb the last digits of linear light (H, W, 3); `number` 0: not at all."""
+    """Perturb the last digits of an image.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear light.
+    number : int
+        Number of the perturbation; 0: none.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+    """
     return (
         image * (1 + _LAST_DIGIT * np.random.default_rng(number).standard_normal(image.shape))
         if number
@@ -111,7 +137,20 @@ def greyed(photo: MitBerkeleyObject) -> MitBerkeleyObject:
 
 
 def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, float]]:
-    """Read the reference program's scores by object, for diffuse input."""
+    """Read the reference program's scores for diffuse input.
+
+    Parameters
+    ----------
+    shared : Path
+        Folder with anchors/.
+    illumination : str
+        One of `LIGHTS`.
+
+    Returns
+    -------
+    dict of str to dict
+        Scores by name, by object.
+    """
     results: dict[str, dict[str, float]] = json.loads(
         (shared / "anchors" / "sirfs_reference.json").read_text()
     )["results"][f"{illumination}/diffuse"]
@@ -176,6 +215,14 @@ def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
 
 
 def write_json(path: Path | None, figures: object) -> None:
-    """Write the figures, if a path is given."""
+    """Write the figures, if a path is given.
+
+    Parameters
+    ----------
+    path : Path or None
+        File to write.
+    figures : object
+        Anything that JSON can store.
+    """
     if path is not None:
         path.write_text(json.dumps(figures, indent=1) + "\n")

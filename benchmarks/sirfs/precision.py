@@ -29,13 +29,34 @@ from .mit_berkeley import LIGHTS, parser, problem, scores, training_object
 
 
 def timed(function: Callable[[], SirfsResult]) -> tuple[SirfsResult, float]:
-    """Return the result of a function and the seconds it took."""
+    """Call a function and measure its time.
+
+    Parameters
+    ----------
+    function : callable
+        Takes no arguments and solves a problem.
+
+    Returns
+    -------
+    result : SirfsResult
+        What the function returned.
+    seconds : float
+        Wall time of the call.
+    """
     start = time.perf_counter()
     return function(), time.perf_counter() - start
 
 
 def against_double(shared: Path, names: list[str]) -> None:
-    """Print final losses and scores in both precisions."""
+    """Print final losses and scores in both precisions.
+
+    Parameters
+    ----------
+    shared : Path
+        Folder with data/.
+    names : list of str
+        The objects.
+    """
     for light in LIGHTS:
         priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
         averages: dict[bool, list[float]] = {True: [], False: []}
@@ -70,7 +91,18 @@ def against_double(shared: Path, names: list[str]) -> None:
 
 
 def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return ten heights and lights, from flat to steep."""
+    """Return ten heights and lights, from flat to steep.
+
+    Parameters
+    ----------
+    made : Problem
+        The problem whose image size applies.
+
+    Returns
+    -------
+    list of ((H, W) ndarray, (9, 3) ndarray)
+        Height in pixels and SH coefficients of log shading.
+    """
     rng = np.random.default_rng(0)
     i, j = np.mgrid[: made.valid.shape[0], : made.valid.shape[1]]
     found = []
@@ -86,7 +118,15 @@ def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def against_numpy(shared: Path, names: list[str]) -> None:
-    """Print the differences of both engines, at ten states and in whole solves."""
+    """Print the differences of both engines, at ten states and in whole solves.
+
+    Parameters
+    ----------
+    shared : Path
+        Folder with data/.
+    names : list of str
+        The objects.
+    """
     for light in LIGHTS:
         priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
         for name in names:

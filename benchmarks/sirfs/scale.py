@@ -32,12 +32,37 @@ SIZES = (192, 256, 384, 512)
 
 
 def angle(a: np.ndarray, b: np.ndarray, mask: np.ndarray) -> float:
-    """Return the median angle in degrees between two normal maps inside `mask`."""
+    """Return the median angle between two normal maps inside the mask.
+
+    Parameters
+    ----------
+    a, b : (H, W, 3) ndarray
+        Unit normals in the same frame.
+    mask : (H, W) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        In degrees.
+    """
     return float(np.degrees(np.median(np.arccos(np.clip((a * b).sum(-1)[mask], -1, 1)))))
 
 
 def magnified(photo: Photo, least: int) -> Photo:
-    """Enlarge the photo if its object is smaller than `least` pixels."""
+    """Enlarge the photo if its object is too small.
+
+    Parameters
+    ----------
+    photo : Photo
+    least : int
+        Least length of the longer side of the object's bounding box, in pixels.
+
+    Returns
+    -------
+    Photo
+        The same photo if its object is large enough.
+    """
     long = max(photo.box[2:])
     if long >= least:
         return photo
@@ -50,7 +75,18 @@ def magnified(photo: Photo, least: int) -> Photo:
 
 
 def padded(photo: Photo, by: int) -> Photo:
-    """Add black space around the photo."""
+    """Add black space around the photo.
+
+    Parameters
+    ----------
+    photo : Photo
+    by : int
+        Pixels to add on every side.
+
+    Returns
+    -------
+    Photo
+    """
     sides = [(by, by), (by, by)]
     return replace(
         photo,
@@ -98,7 +134,17 @@ def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
 
 
 def padding_figures(photo: Photo) -> list[tuple[int, float]]:
-    """Return, for each padding, the median change of the normals in degrees."""
+    """Measure how padding changes the normals.
+
+    Parameters
+    ----------
+    photo : Photo
+
+    Returns
+    -------
+    list of (int, float)
+        For each padding in pixels, the median change of the normals in degrees.
+    """
     plain = decompose(photo)
     figures = []
     for by in (16, 64):
@@ -108,7 +154,13 @@ def padding_figures(photo: Photo) -> list[tuple[int, float]]:
 
 
 def cost_of(megapixels: float) -> None:
-    """Solve a synthetic ball at full scale and print seconds and peak memory."""
+    """Solve a synthetic ball at full scale and print seconds and peak memory.
+
+    Parameters
+    ----------
+    megapixels : float
+        Area of the ball in millions of pixels.
+    """
     radius = int(np.sqrt(megapixels * 1e6 / np.pi))
     i, j = np.mgrid[-radius - 2 : radius + 3, -radius - 2 : radius + 3] / radius
     mask = i**2 + j**2 < 1

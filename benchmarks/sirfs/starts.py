@@ -118,7 +118,17 @@ class StartResult:
 
 
 def run_job(job: StartJob) -> StartResult:
-    """Solve from the starts of a job."""
+    """Solve from the starts of a job.
+
+    Parameters
+    ----------
+    job : StartJob
+        An object, or a scene if it has no priors.
+
+    Returns
+    -------
+    StartResult
+    """
     weights = replace(isc_weights(job.light, 3), starts=job.starts)
     return _of_scene(job, weights) if job.priors is None else _of_object(job, job.priors, weights)
 
@@ -220,7 +230,15 @@ def scene_jobs(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[St
 
 
 def report(found: Sequence[StartResult], ways: Sequence[Starts]) -> None:
-    """Print one row per start, and the cases in which the starts differ much."""
+    """Print one row per start, and the cases in which the starts differ much.
+
+    Parameters
+    ----------
+    found : sequence of StartResult
+        Results of all cases and starts.
+    ways : sequence of tuple of Start
+        The starts to compare; ratios are relative to the first.
+    """
     cases: dict[tuple[str, str | None, int], dict[Starts, StartResult]] = {}
     for one in found:
         cases.setdefault((one.job.case, one.job.other, one.job.rounding), {})[one.job.starts] = one

@@ -117,7 +117,20 @@ def height_colours(height: np.ndarray, mask: np.ndarray, limits: tuple[float, fl
 
 
 def normal_image(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Draw normals (H, W, 3) as (n + 1) / 2, cropped to the mask, white where unknown."""
+    """Draw normals as (n + 1) / 2, cropped to the mask, white where unknown.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Unit normals in the camera frame; not finite where unknown.
+    mask : (H, W) ndarray of bool
+        Pixels of the object.
+
+    Returns
+    -------
+    (h, w, 3) ndarray
+        The bounding box of the mask.
+    """
     known = mask & np.isfinite(normal).all(axis=2)
     return np.asarray(normal_colours(np.nan_to_num(normal), known)[mask_slices(mask)])
 

@@ -123,12 +123,38 @@ def _cut(panel: Panel) -> Panel:
 
 
 def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
-    """Create a panel of normals (H, W, 3), coloured as (n + 1) / 2."""
+    """Create a panel of normals, coloured as (n + 1) / 2.
+
+    Parameters
+    ----------
+    title : str
+        Text above the panel.
+    normal : (H, W, 3) ndarray
+        Unit normals in the camera frame.
+    mask : (H, W) ndarray
+        Pixels outside are white.
+
+    Returns
+    -------
+    Panel
+    """
     return Panel(title, normal_colours(normal, mask), mask, gain=1.0)
 
 
 def light_panel(title: str, illumination: np.ndarray) -> Panel:
-    """Create a panel of a white ball under a light, (9, 3) SH coefficients of log shading."""
+    """Create a panel of a white ball under a light.
+
+    Parameters
+    ----------
+    title : str
+        Text above the panel.
+    illumination : (9, 3) ndarray
+        SH coefficients of log shading.
+
+    Returns
+    -------
+    Panel
+    """
     return Panel(title, *light_ball(illumination))
 
 

@@ -74,7 +74,13 @@ def figure(
 
 
 def unify_titles(made: Figure) -> None:
-    """Set all titles to the common letter size."""
+    """Set all titles to the common letter size.
+
+    Parameters
+    ----------
+    made : Figure
+        Changed in place.
+    """
     for axes in made.axes:
         axes.title.set_fontsize(LETTERS)
 

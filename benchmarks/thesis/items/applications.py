@@ -99,13 +99,35 @@ def render_ball(direction: np.ndarray, size: int) -> Decomposition:
 
 
 def with_separated_layers(d: Decomposition) -> Decomposition:
-    """Replace the layers of a decomposition by those that `isc` separates from its image."""
+    """Replace the layers of a decomposition by those that `isc` separates from its image.
+
+    Parameters
+    ----------
+    d : Decomposition
+        Remains unchanged.
+
+    Returns
+    -------
+    Decomposition
+        With new diffuse, specular and residual layers.
+    """
     split: Separation = separate("isc", d.image, d.mask)
     return replace(d, diffuse=split.diffuse, specular=split.specular, residual=split.residual)
 
 
 def degrees_between(one: np.ndarray, other: np.ndarray) -> float:
-    """Compute the angle between two unit vectors (3,), degrees."""
+    """Compute the angle between two directions.
+
+    Parameters
+    ----------
+    one, other : (3,) ndarray
+        Unit vectors.
+
+    Returns
+    -------
+    float
+        In degrees.
+    """
     return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
 
 

@@ -299,7 +299,18 @@ CHARACTERISTICS = (
 
 
 def channels_of(characteristic: CharacteristicEntry) -> tuple[str, ...]:
-    """Return the channels of a part in `maps.exr`; none if it is stored elsewhere."""
+    """Return the channels of a part in `maps.exr`.
+
+    Parameters
+    ----------
+    characteristic : CharacteristicEntry
+        The part.
+
+    Returns
+    -------
+    tuple of str
+        None if the part is stored elsewhere.
+    """
     return tuple(
         f"{characteristic.field}.{letter}" for letter in LAYERS.get(characteristic.field, "")
     )

@@ -144,7 +144,18 @@ def exchange_test(pairs: np.ndarray, seed: int) -> np.ndarray:
 
 
 def holm_correction(p: np.ndarray) -> np.ndarray:
-    """p (F,) corrected for their number."""
+    """Correct p values for their number by Holm's method.
+
+    Parameters
+    ----------
+    p : (F,) ndarray
+        One p value per test.
+
+    Returns
+    -------
+    (F,) ndarray
+        In the same order, at most 1.
+    """
     order = np.argsort(p, kind="stable")
     raised = np.maximum.accumulate(p[order] * (len(p) - np.arange(len(p))))
     corrected = np.empty(len(p))

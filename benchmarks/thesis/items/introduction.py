@@ -61,7 +61,17 @@ class ShadedObject:
 
 
 def sphere(size: int) -> ShadedObject:
-    """Render a ball under `LIGHT` that fills 90 % of a picture of `size` pixels per side."""
+    """Render a ball under `LIGHT` that fills 90 % of the picture.
+
+    Parameters
+    ----------
+    size : int
+        Pixels per side of the picture.
+
+    Returns
+    -------
+    ShadedObject
+    """
     radius = 0.45 * size
     axis = (np.arange(size) + 0.5 - size / 2) / radius
     x, y = np.meshgrid(axis, -axis)
@@ -72,7 +82,17 @@ def sphere(size: int) -> ShadedObject:
 
 
 def vase(size: int) -> ShadedObject:
-    """Render the vase of the survey under `LIGHT`, as high as the picture, `size` pixels."""
+    """Render the vase of the survey under `LIGHT`, as high as the picture.
+
+    Parameters
+    ----------
+    size : int
+        Pixels per side of the picture.
+
+    Returns
+    -------
+    ShadedObject
+    """
     x, y = np.meshgrid((np.arange(size) + 0.5) / size - 0.5, 1 - (np.arange(size) + 0.5) / size)
     f = 0.15 - 0.1 * y * (6 * y + 1) ** 2 * (y - 1) ** 2 * (3 * y - 2)
     slope = np.gradient(f[:, 0], y[:, 0])[:, None]
@@ -97,7 +117,18 @@ def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) ->
 
 
 def shaded_objects(context: Context) -> tuple[ShadedObject, ...]:
-    """Return the sphere, the vase, and the first diffuse subject of known height."""
+    """Return the sphere, the vase, and the first diffuse subject of known height.
+
+    Parameters
+    ----------
+    context : Context
+        The run; its pictures are smaller if it is quick.
+
+    Returns
+    -------
+    tuple of ShadedObject
+        Two if there is no such subject.
+    """
     size = 64 if context.quick else 160
     found: list[ShadedObject] = [sphere(size), vase(size)]
     for subject in context.subjects("diffuse"):

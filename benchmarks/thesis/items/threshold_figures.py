@@ -35,7 +35,18 @@ _LINES = ("-", "--", "-.", ":")
 
 
 def mutation(context: Context) -> ItemContent:
-    """Make figure 3.5."""
+    """Make figure 3.5.
+
+    Parameters
+    ----------
+    context : Context
+        Ignored.
+
+    Returns
+    -------
+    ItemContent
+        The mutation rate over the affinity.
+    """
     del context
     affinity = np.linspace(0, 1, 201)
     made, axes = figure(1, 1, width=4.5, height=3.0)
@@ -66,7 +77,18 @@ def mutation(context: Context) -> ItemContent:
 
 
 def branching(context: Context) -> ItemContent:
-    """Make figure 3.6."""
+    """Make figure 3.6.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The bifurcation diagram of the logistic map.
+    """
     rates = np.linspace(2.8, 4, 400 if context.quick else 1400)
     ends = bifurcation(rates)
     made, axes = figure(1, 1, height=3.6)
@@ -96,7 +118,18 @@ def branching(context: Context) -> ItemContent:
 
 
 def distribution(context: Context) -> ItemContent:
-    """Make figure 3.7."""
+    """Make figure 3.7.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The distribution of an orbit of the logistic map.
+    """
     values = orbit(_start(context), _NUMBERS)
     edges = np.linspace(0, 1, 51)
     made, axes = figure(1, 1, width=4.5, height=3.0)
@@ -133,7 +166,18 @@ def distribution(context: Context) -> ItemContent:
 
 
 def generators(context: Context) -> ItemContent:
-    """Make figure 3.8."""
+    """Make figure 3.8.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        Distribution and consecutive values of random number generators.
+    """
     values = uniformised(orbit(_start(context), _NUMBERS))
     sources = (
         ("one orbit, transformed to uniform", values),
@@ -187,7 +231,20 @@ def generators(context: Context) -> ItemContent:
 
 
 def thresholded(context: Context, name: str) -> ItemContent:
-    """Make one of figures 4.1 to 4.9, for the image `name`."""
+    """Make one of figures 4.1 to 4.9.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    name : str
+        Name of the image.
+
+    Returns
+    -------
+    ItemContent
+        The image, its histogram and its thresholds.
+    """
     image, of = levels(name), image_objective(name)
     made, axes = figure(2, 1 + len(COUNTS), height=4.1)
     show(axes[0, 0], srgb_to_linear(image / 255), name)

@@ -77,7 +77,18 @@ def exhaustive_search(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
 
 
 def ground_truth(context: Context) -> ItemContent:
-    """Make table 4.1."""
+    """Make table 4.1.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The exact thresholds by Otsu's criterion.
+    """
     rows, checks = [], []
     names = image_names(context)
     for number, name in enumerate(names):
@@ -134,7 +145,18 @@ def ground_truth(context: Context) -> ItemContent:
 
 
 def objectives(context: Context) -> ItemContent:
-    """Make table 4.2."""
+    """Make table 4.2.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The objectives that the searches reach.
+    """
     found = run_searches(context, tuple(SEARCHES))
     names = image_names(context)
     shares = tuple(_shares(found, search, names) for search in SEARCHES)
@@ -195,7 +217,18 @@ _OBJECTIVES_TEXT = (
 
 
 def thresholds(context: Context) -> ItemContent:
-    """Make table 4.3."""
+    """Make table 4.3.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The thresholds that the searches find most often.
+    """
     found = run_searches(context, COMPARED)
     names, rows = image_names(context), []
     for name in names:
@@ -251,7 +284,18 @@ def thresholds(context: Context) -> ItemContent:
 
 
 def times(context: Context) -> ItemContent:
-    """Make table 4.4."""
+    """Make table 4.4.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    ItemContent
+        The time of the searches and their iterations to the optimum.
+    """
     found = run_searches(replace(context, monitor=context.monitor.part(0.0, 0.5)), COMPARED)
     names = image_names(context)
     cases = [(name, count) for name in names for count in COUNTS]

@@ -60,7 +60,18 @@ class SeparatorSetting:
         )
 
     def options(self, seed: int) -> dict[str, object]:
-        """Return the options by name; the seed is added for the method with random numbers."""
+        """Return the options of the method.
+
+        Parameters
+        ----------
+        seed : int
+            Added for the method with random numbers.
+
+        Returns
+        -------
+        dict of str to object
+            Options by name.
+        """
         return dict(self.changes) | ({"seed": seed} if self.method == SEGMENTATION else {})
 
 

@@ -137,7 +137,17 @@ def residual_highlight(kind: SpecularFreeImage, subject: Subject) -> float:
 
 
 def subjects_with_highlights(subjects: Sequence[Subject]) -> list[Subject]:
-    """Select the subjects whose known diffuse layer differs from the image."""
+    """Select the subjects whose known diffuse layer differs from the image.
+
+    Parameters
+    ----------
+    subjects : sequence of Subject
+
+    Returns
+    -------
+    list of Subject
+        In the same order.
+    """
     return [
         one
         for one in subjects
@@ -146,5 +156,14 @@ def subjects_with_highlights(subjects: Sequence[Subject]) -> list[Subject]:
 
 
 def subject_title(subject: Subject) -> str:
-    """Return name and kind; kinds share objects."""
+    """Return the name and the kind of a subject, as kinds share objects.
+
+    Parameters
+    ----------
+    subject : Subject
+
+    Returns
+    -------
+    str
+    """
     return f"{subject.name} ({subject.kind})"

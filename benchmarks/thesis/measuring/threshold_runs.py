@@ -67,13 +67,33 @@ class ThresholdRuns:
 
 
 def image_names(context: Context) -> tuple[str, ...]:
-    """Return the names of the images; three in a quick run."""
+    """Return the names of the images; three in a quick run.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+
+    Returns
+    -------
+    tuple of str
+    """
     return IMAGES[:_QUICK_IMAGES] if context.quick else IMAGES
 
 
 @cache
 def image_objective(image: str) -> OtsuObjective:
-    """Return Otsu's objective of an image."""
+    """Return Otsu's objective of an image.
+
+    Parameters
+    ----------
+    image : str
+        Name of the image.
+
+    Returns
+    -------
+    OtsuObjective
+    """
     return OtsuObjective.of(levels(image))
 
 

@@ -43,7 +43,17 @@ def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: i
 
 
 def format_ratio(ratio: Ratio | None) -> str:
-    """Format a ratio and its interval for a table cell; a dash for None."""
+    """Format a ratio and its interval for a table cell.
+
+    Parameters
+    ----------
+    ratio : Ratio or None
+
+    Returns
+    -------
+    str
+        A dash for None.
+    """
     if ratio is None:
         return "-"
     return f"{_brief(ratio.ratio)} ({_brief(ratio.low)} to {_brief(ratio.high)})"

@@ -143,7 +143,19 @@ def publish(source: Path, target: Path, items: Sequence[ThesisItem]) -> list[Pat
 
 
 def item_command(item: ThesisItem, context: Context) -> str:
-    """Return the command that regenerates an item, folders by placeholder only."""
+    """Return the command that regenerates an item.
+
+    Parameters
+    ----------
+    item : ThesisItem
+    context : Context
+        The run whose options the command repeats.
+
+    Returns
+    -------
+    str
+        Folders appear by placeholder only.
+    """
     words = ["isc thesis", item.kind, item.number]
     words += ["--data ROOT"] if context.data is not None else []
     words += ["--quick"] if context.quick else []

@@ -329,24 +329,65 @@ def format_cell(value: float | None, form: str = ".4g") -> str:
 
 
 def drop_missing(values: Sequence[float | None]) -> list[float]:
-    """Return the values that are not None."""
+    """Return the values that are not None.
+
+    Parameters
+    ----------
+    values : sequence of (float or None)
+
+    Returns
+    -------
+    list of float
+        In the same order.
+    """
     return [value for value in values if value is not None]
 
 
 def mean_or_none(values: Iterable[float]) -> float | None:
-    """Return the arithmetic mean, or None without values."""
+    """Return the arithmetic mean.
+
+    Parameters
+    ----------
+    values : iterable of float
+
+    Returns
+    -------
+    float or None
+        None without values.
+    """
     each = list(values)
     return sum(each) / len(each) if each else None
 
 
 def geometric_or_none(values: Iterable[float]) -> float | None:
-    """Return the geometric mean, or None without values."""
+    """Return the geometric mean.
+
+    Parameters
+    ----------
+    values : iterable of float
+        Positive.
+
+    Returns
+    -------
+    float or None
+        None without values.
+    """
     each = list(values)
     return geometric_mean(each) if each else None
 
 
 def times_thousand(value: float | None) -> float | None:
-    """Return a thousand times a value; None stays None."""
+    """Return a thousand times a value.
+
+    Parameters
+    ----------
+    value : float or None
+
+    Returns
+    -------
+    float or None
+        None stays None.
+    """
     return None if value is None else 1000 * value
 
 

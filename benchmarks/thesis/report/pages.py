@@ -119,13 +119,34 @@ def item_page(
 
 
 def without_files(page: str) -> str:
-    """Remove the pictures and the list of files from a page, for a folder without them."""
+    """Remove the pictures and the list of files from a page, for a folder without them.
+
+    Parameters
+    ----------
+    page : str
+        Markdown.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     parts = page.rstrip("\n").split("\n\n")
     return "\n\n".join(part for part in parts if not part.startswith(("![", FILES))) + "\n"
 
 
 def markdown_table(table: ItemTable) -> str:
-    """Format a table in Markdown, numbers with four digits."""
+    """Format a table in Markdown.
+
+    Parameters
+    ----------
+    table : ItemTable
+
+    Returns
+    -------
+    str
+        Numbers have four digits.
+    """
     rows = [[cell.replace("|", "\\|") for cell in row] for row in shown_cells(table)]
     rule = "|" + "---|" * len(table.header)
     lines = ["| " + " | ".join(row) + " |" for row in (table.header, *rows)]
@@ -133,7 +154,17 @@ def markdown_table(table: ItemTable) -> str:
 
 
 def shown_cells(table: ItemTable) -> list[list[str]]:
-    """Return the rows as text, numbers with four digits."""
+    """Return the rows of a table as text.
+
+    Parameters
+    ----------
+    table : ItemTable
+
+    Returns
+    -------
+    list of list of str
+        Cells by row; numbers have four digits.
+    """
     return [
         [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row]
         for row in table.rows
@@ -141,7 +172,17 @@ def shown_cells(table: ItemTable) -> list[list[str]]:
 
 
 def verdict_line(verdict: ClaimVerdict) -> str:
-    """Format a claim, the measurement, and whether the claim holds."""
+    """Format a claim, the measurement, and whether the claim holds.
+
+    Parameters
+    ----------
+    verdict : ClaimVerdict
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     why = f" {_sentence(verdict.why)}" if verdict.why else ""
     return (
         f"**The thesis:** {_sentence(verdict.claim)} **Here:** {_sentence(verdict.here)} "
@@ -202,7 +243,17 @@ def index_page(
 
 
 def sheet_name(chapter: int) -> str:
-    """Return the file name of a chapter's picture sheet."""
+    """Return the file name of a chapter's picture sheet.
+
+    Parameters
+    ----------
+    chapter : int
+        Number of the chapter.
+
+    Returns
+    -------
+    str
+    """
     return f"chapter-{chapter}.jpg"
 
 

@@ -60,7 +60,14 @@ class ItemRecord:
 
 
 def write_record(folder: Path, record: ItemRecord) -> None:
-    """Write a record below `folder`."""
+    """Write a record.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder; the records lie below it.
+    record : ItemRecord
+    """
     content = {"schema_version": _SCHEMA, **asdict(record)}
     with new_file(_record_path(folder, record.name)) as partial:
         partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
@@ -98,18 +105,52 @@ def read_record(folder: Path, name: str) -> ItemRecord | None:
 
 
 def read_records(folder: Path, items: Iterable[ThesisItem]) -> dict[str, ItemRecord]:
-    """Read the records of several items, by name; items without a record are omitted."""
+    """Read the records of several items.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder with records.
+    items : iterable of ThesisItem
+
+    Returns
+    -------
+    dict of str to ItemRecord
+        By the item's name; items without a record are omitted.
+    """
     records = ((item.name, read_record(folder, item.name)) for item in items)
     return {name: record for name, record in records if record is not None}
 
 
 def remove_record(folder: Path, name: str) -> None:
-    """Remove a record, so that its item counts as incomplete."""
+    """Remove a record, so that its item counts as incomplete.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder with records.
+    name : str
+        The item.
+    """
     _record_path(folder, name).unlink(missing_ok=True)
 
 
 def is_complete(folder: Path, name: str, fingerprint: str) -> bool:
-    """Check whether all files of an item exist and come from a run with this fingerprint."""
+    """Check whether all files of an item exist and come from a run with this fingerprint.
+
+    Parameters
+    ----------
+    folder : Path
+        Output folder with records.
+    name : str
+        The item.
+    fingerprint : str
+        Fingerprint of the run.
+
+    Returns
+    -------
+    bool
+    """
     record = read_record(folder, name)
     return (
         record is not None
