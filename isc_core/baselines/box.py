@@ -59,7 +59,18 @@ class Box:
         return cls((mask.shape[0], mask.shape[1]), spans[0], spans[1], (margins[0], margins[1]))
 
     def crop(self, array: np.ndarray) -> np.ndarray:
-        """Crop an array (H, W, ...) to the box with its margin, which is zero."""
+        """Crop an array to the box and surround it with its margin of zeros.
+
+        Parameters
+        ----------
+        array : (H, W, ...) ndarray
+            Of the frame.
+
+        Returns
+        -------
+        (h, w, ...) ndarray
+            Box and margin.
+        """
         inside = array[slice(*self.rows), slice(*self.columns)]
         return np.pad(inside, [*self.around, *[(0, 0)] * (array.ndim - 2)])
 

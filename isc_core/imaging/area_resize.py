@@ -36,7 +36,19 @@ class AreaFilter:
 
     @staticmethod
     def of(shape: tuple[int, ...], factor: float) -> "AreaFilter":
-        """Return the filter for images of `shape` (H, W), scaled by `factor` in (0, 1]."""
+        """Return the filter for images of one shape and one scale.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            (H, W) of the images.
+        factor : float
+            Scale in (0, 1].
+
+        Returns
+        -------
+        AreaFilter
+        """
         rows, columns = _overlaps(shape[0], factor), _overlaps(shape[1], factor)
         return AreaFilter(rows, columns, np.outer(rows.sum(axis=1), columns.sum(axis=1)))
 

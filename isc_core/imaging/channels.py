@@ -8,17 +8,44 @@ import numpy as np
 
 
 def smallest(image: np.ndarray) -> np.ndarray:
-    """Return the smallest channel (...) of an image (..., 3)."""
+    """Return the smallest channel of an image.
+
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) ndarray
+    """
     return np.minimum(np.minimum(image[..., 0], image[..., 1]), image[..., 2])
 
 
 def largest(image: np.ndarray) -> np.ndarray:
-    """Return the largest channel (...) of an image (..., 3)."""
+    """Return the largest channel of an image.
+
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) ndarray
+    """
     return np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2])
 
 
 def mean_channel(image: np.ndarray) -> np.ndarray:
-    """Return the mean channel (...) of an image (..., 3)."""
+    """Return the mean of the channels of an image.
+
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) ndarray
+    """
     return (image[..., 0] + image[..., 1] + image[..., 2]) / 3
 
 

@@ -40,7 +40,17 @@ def cut_line(mask: np.ndarray) -> np.ndarray:
 
 
 def is_cut(mask: np.ndarray) -> bool:
-    """Return whether the frame cuts the object of `mask` (H, W) bool."""
+    """Return whether the frame cuts an object.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        Pixels of the object.
+
+    Returns
+    -------
+    bool
+    """
     return any(bool(cut_line(m).any()) for m in _sides(mask))
 
 

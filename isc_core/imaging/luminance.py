@@ -9,7 +9,16 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
 
 
 def luminance(color: np.ndarray) -> np.ndarray:
-    """Return the luminance (...) of linear Rec.709 colours (..., 3), float64."""
+    """Return the luminance of linear Rec.709 colours.
+
+    Parameters
+    ----------
+    color : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) float64 ndarray
+    """
     return np.asarray(color, float) @ LUMINANCE
 
 

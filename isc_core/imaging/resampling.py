@@ -10,7 +10,20 @@ from scipy import ndimage, sparse
 
 
 def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
-    """Return the shape of the grid that covers `shape` after scaling by `factor`."""
+    """Return the shape of the grid that covers an image after scaling.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the image; rows and columns come first.
+    factor : float
+        Scale, greater than 0.
+
+    Returns
+    -------
+    tuple of int
+        (rows, columns), rounded, at least 1 each.
+    """
     return max(1, round(shape[0] * factor)), max(1, round(shape[1] * factor))
 
 

@@ -104,12 +104,32 @@ class Matches:
 
 
 def patches_within(image: np.ndarray, usable: np.ndarray) -> Patches:
-    """Return the patches of an image whose pixels all lie in `usable` (H, W) bool."""
+    """Return the patches of an image whose pixels are all usable.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    usable : (H, W) bool ndarray
+
+    Returns
+    -------
+    Patches
+    """
     return _listed(image, _windows(usable) == PATCH * PATCH)
 
 
 def patches_touching(image: np.ndarray, wanted: np.ndarray) -> Patches:
-    """Return the patches of an image that have a pixel in `wanted` (H, W) bool."""
+    """Return the patches of an image that contain a wanted pixel.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    wanted : (H, W) bool ndarray
+
+    Returns
+    -------
+    Patches
+    """
     return _listed(image, _windows(wanted) > 0)
 
 

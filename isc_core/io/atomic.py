@@ -77,6 +77,11 @@ def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
         Files that a folder of this kind holds, as relative paths with `/`. The first one is the
         marker, without which a folder counts as foreign.
 
+    Returns
+    -------
+    Path
+        The temporary folder, a sibling of `folder`.
+
     Raises
     ------
     InputError
@@ -105,6 +110,11 @@ def new_file(path: Path | str) -> Iterator[Path]:
     Parameters
     ----------
     path : Path or str
+
+    Returns
+    -------
+    Path
+        The temporary file, a sibling of `path`.
 
     Raises
     ------
@@ -210,7 +220,13 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
 
 
 def remove_unfinished_in(folder: Path) -> None:
-    """Apply `remove_unfinished` to everything in `folder`, which need not exist."""
+    """Apply `remove_unfinished` to everything in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Need not exist.
+    """
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for name in {
             origin for entry in folder.iterdir() if (origin := _origin(entry)) is not None
@@ -219,7 +235,19 @@ def remove_unfinished_in(folder: Path) -> None:
 
 
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
-    """Raise `InputError` unless `folder` may be created or replaced (see `new_folder`)."""
+    """Require that a folder may be created or replaced, see `new_folder`.
+
+    Parameters
+    ----------
+    folder : Path
+    ours : sequence of str
+        Files that a folder of this kind holds, as relative paths with `/`; the marker first.
+
+    Raises
+    ------
+    InputError
+        If `folder` is a file, the working folder or a mount point, or holds anything foreign.
+    """
     with _explained(folder):
         if not folder.exists():
             return

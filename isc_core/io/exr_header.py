@@ -47,7 +47,18 @@ class ExrPart:
 
 
 def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
-    """Return the width and height of a window (left, top, right, bottom)."""
+    """Return the width and height of a window.
+
+    Parameters
+    ----------
+    window : tuple of int
+        First and last column and row of pixels: (left, top, right, bottom).
+
+    Returns
+    -------
+    tuple of int
+        Width and height in pixels.
+    """
     left, top, right, bottom = window
     return right - left + 1, bottom - top + 1
 

@@ -37,7 +37,20 @@ class Limits:
     max_ratio: int = 20
 
     def check_pixels(self, path: Path | str, width: int, height: int) -> None:
-        """Raise `InputError` for an image with more pixels."""
+        """Raise `InputError` for an image with more than `max_pixels` pixels.
+
+        Parameters
+        ----------
+        path : Path or str
+            Opens the error message.
+        width, height : int
+            In pixels.
+
+        Raises
+        ------
+        InputError
+            If the image has more pixels.
+        """
         if width * height > self.max_pixels:
             limit = f"{self.max_pixels / 1e6:g} megapixels"
             raise InputError(
@@ -46,7 +59,20 @@ class Limits:
             )
 
     def check_stored(self, path: Path | str, stored: int) -> None:
-        """Raise `InputError` for a file larger than `max_bytes`, which is read into memory."""
+        """Raise `InputError` for a file larger than `max_bytes`, which is read into memory.
+
+        Parameters
+        ----------
+        path : Path or str
+            Opens the error message.
+        stored : int
+            Size of the file in bytes.
+
+        Raises
+        ------
+        InputError
+            If the file is larger.
+        """
         if stored > self.max_bytes:
             raise InputError(
                 f"{path} has {stored / 1e9:.1f} GB; the limit is {self.max_bytes / 1e9:.1f} GB: "

@@ -24,7 +24,17 @@ _DESCRIPTORS = Path("/proc/self/fd")
 
 @contextmanager
 def memory_file(content: bytes = b"") -> Iterator[Path]:
-    """Provide a path to a file that holds `content`; the file is gone after the block."""
+    """Provide a path to a file with given content; the file is gone after the block.
+
+    Parameters
+    ----------
+    content : bytes
+
+    Returns
+    -------
+    Path
+        The file; in memory where the system allows it, else in a temporary folder.
+    """
     if hasattr(os, "memfd_create") and _DESCRIPTORS.is_dir():
         with open(os.memfd_create("isc"), "wb") as file:
             file.write(content)

@@ -91,7 +91,22 @@ class LayerNetwork(Network):
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "LayerNetwork":
-        """Build the network; raise `InputError` if the parameters do not fit."""
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        LayerNetwork
+
+        Raises
+        ------
+        InputError
+            If the parameters do not fit.
+        """
         return cls(parameters.weights, parameters.biases)
 
     @property

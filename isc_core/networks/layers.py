@@ -127,7 +127,19 @@ def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def space_to_depth(layer: np.ndarray) -> np.ndarray:
-    """Rearrange (H, W, C) to (H / 2, W / 2, 4 C), channels first in each block's order."""
+    """Rearrange each block of 2 x 2 pixels into the channels of one pixel.
+
+    Parameters
+    ----------
+    layer : (H, W, C) ndarray
+        H and W even.
+
+    Returns
+    -------
+    (H / 2, W / 2, 4 C) ndarray
+        The four pixels of a channel follow each other, row by row; channels come first in the
+        order.
+    """
     rows, columns, channels = layer.shape
     blocks = layer.reshape(rows // 2, 2, columns // 2, 2, channels)
     return np.ascontiguousarray(blocks.transpose(0, 2, 4, 1, 3)).reshape(
@@ -136,7 +148,16 @@ def space_to_depth(layer: np.ndarray) -> np.ndarray:
 
 
 def depth_to_space(layer: np.ndarray) -> np.ndarray:
-    """Rearrange (H, W, 4 C) to (2 H, 2 W, C); the inverse of `space_to_depth`."""
+    """Rearrange the channels of each pixel into a block of 2 x 2; inverse of `space_to_depth`.
+
+    Parameters
+    ----------
+    layer : (H, W, 4 C) ndarray
+
+    Returns
+    -------
+    (2 H, 2 W, C) ndarray
+    """
     rows, columns, channels = layer.shape
     blocks = layer.reshape(rows, columns, channels // 4, 2, 2)
     return np.ascontiguousarray(blocks.transpose(0, 3, 1, 4, 2)).reshape(
@@ -145,13 +166,34 @@ def depth_to_space(layer: np.ndarray) -> np.ndarray:
 
 
 def average_pool(layer: np.ndarray) -> np.ndarray:
-    """Average 2 x 2 pixels: (H / 2, W / 2, C) of (H, W, C)."""
+    """Average blocks of 2 x 2 pixels.
+
+    Parameters
+    ----------
+    layer : (H, W, C) ndarray
+        H and W even.
+
+    Returns
+    -------
+    (H / 2, W / 2, C) ndarray
+    """
     rows, columns, channels = layer.shape
     return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
 
 
 def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
-    """Apply the next two convolutions of `steps`, each followed by max(0, .)."""
+    """Apply the next two convolutions of `steps`, each followed by max(0, .).
+
+    Parameters
+    ----------
+    layer : (H, W, C) ndarray
+    steps : Steps
+        Weights and biases of the remaining convolutions; advanced by two.
+
+    Returns
+    -------
+    (H, W, D) float32 ndarray
+    """
     for _ in range(2):
         layer = np.maximum(convolved(layer, *next(steps)), 0)
     return layer

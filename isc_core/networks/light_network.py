@@ -99,7 +99,22 @@ class LightNetwork(Network):
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "LightNetwork":
-        """Build the network; raise `InputError` or `KeyError` if the parameters do not fit."""
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        LightNetwork
+
+        Raises
+        ------
+        InputError, KeyError
+            If the parameters do not fit.
+        """
         others = parameters.others
         layers = {name: (others[f"{name}_weight"], others[f"{name}_bias"]) for name in _LAYERS}
         return cls(parameters.weights, parameters.biases, others["middle"], others["scale"], layers)

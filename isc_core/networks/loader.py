@@ -53,7 +53,23 @@ class Network:
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> Self:
-        """Build the network; raise `InputError` or `KeyError` if the parameters do not fit."""
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        Network
+            Of the class on which it is called.
+
+        Raises
+        ------
+        InputError, KeyError
+            If the parameters do not fit.
+        """
         raise NotImplementedError
 
     @classmethod

@@ -85,7 +85,22 @@ class NormalNetwork(Network):
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "NormalNetwork":
-        """Build the network; raise `InputError` if the parameters do not fit."""
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        NormalNetwork
+
+        Raises
+        ------
+        InputError
+            If the parameters do not fit.
+        """
         return cls(parameters.weights, parameters.biases)
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -75,7 +75,22 @@ class SceneClassifier(Network):
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "SceneClassifier":
-        """Build the network; raise `InputError` or `KeyError` if the parameters do not fit."""
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        SceneClassifier
+
+        Raises
+        ------
+        InputError, KeyError
+            If the parameters do not fit.
+        """
         head = (parameters.others[name] for name in ("middle", "scale", "head", "odds"))
         return cls(parameters.weights, parameters.biases, *head)
 

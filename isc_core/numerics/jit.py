@@ -39,7 +39,20 @@ def jit(loop: Loop, /) -> Loop:
 
 @overload
 def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop], Loop]:
-    """Return a decorator."""
+    """Return a decorator.
+
+    Parameters
+    ----------
+    math : frozenset of str
+        Floating-point freedom of the compiler, see the constants of this module.
+    inline : bool
+        Whether to inline the function where compiled code calls it.
+
+    Returns
+    -------
+    callable
+        Compiles the function it decorates.
+    """
 
 
 def jit(

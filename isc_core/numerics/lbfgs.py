@@ -114,11 +114,29 @@ class NumpyAlgebra:
     """`Algebra` in plain NumPy."""
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Return all inner products, see `Algebra`."""
+        """Return all inner products, see `Algebra`.
+
+        Parameters
+        ----------
+        vectors : (K, N) ndarray
+        others : (M, N) ndarray
+
+        Returns
+        -------
+        (K, M) float64 ndarray
+        """
         return np.stack([np.einsum("kn,n->k", vectors, v, dtype=float) for v in others], axis=1)
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
-        """Write a linear combination into `out`, see `Algebra`."""
+        """Write sum_k coefficients[k] vectors[k] into `out`, see `Algebra`.
+
+        Parameters
+        ----------
+        coefficients : (K,) ndarray
+        vectors : (K, N) ndarray
+        out : (N,) ndarray
+            Overwritten.
+        """
         np.einsum("k,kn->n", coefficients.astype(out.dtype), vectors, out=out)
 
 
@@ -195,7 +213,18 @@ class PairMemory:
             self.order.append(slot)
 
     def direction(self, out: np.ndarray) -> float:
-        """Write the descent direction into `out` (N,); return its product with the gradient."""
+        """Write the descent direction into `out`.
+
+        Parameters
+        ----------
+        out : (N,) ndarray
+            Overwritten.
+
+        Returns
+        -------
+        float
+            Inner product of the direction with the gradient.
+        """
         m, g = self.size, self._gram
         c = np.zeros(2 * m + 1)
         c[-1] = -1

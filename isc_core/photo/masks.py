@@ -153,5 +153,15 @@ def largest_channel(values: np.ndarray) -> np.ndarray:
 
 
 def finite_or_zero(values: np.ndarray) -> np.ndarray:
-    """Replace values that are not finite by 0."""
+    """Replace values that are not finite by 0.
+
+    Parameters
+    ----------
+    values : ndarray
+
+    Returns
+    -------
+    ndarray
+        Of the shape and dtype of `values`.
+    """
     return np.where(np.isfinite(values), values, np.zeros(1, values.dtype))

@@ -249,7 +249,20 @@ def grouped_specular(image: np.ndarray, mask: np.ndarray, informative: np.ndarra
 
 
 def stages(image: np.ndarray, mask: np.ndarray, informative: np.ndarray) -> Stages:
-    """Return the intermediate maps of the improved variant; arguments as `grouped_specular`."""
+    """Return the intermediate maps of the improved variant.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        0 outside the mask.
+    mask : (H, W) bool ndarray
+    informative : (H, W) bool ndarray
+        Pixels of the mask that shape the atoms.
+
+    Returns
+    -------
+    Stages
+    """
     options = VARIANTS["improved"]
     free = _specular_free(image, mask, options.blur)
     return _grouped(free, _learn(free, informative, options), options)

@@ -68,13 +68,35 @@ def reference_basis(normal: np.ndarray) -> np.ndarray:
 
 
 def normal_to_reference(normal: np.ndarray) -> np.ndarray:
-    """Convert vectors (..., 3) from the camera frame to (down, right, toward the viewer)."""
+    """Convert vectors from the camera frame to the reference frame.
+
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        In the camera frame: x right, y up, z toward the viewer.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        In the reference frame: (down, right, toward the viewer).
+    """
     x, y, z = _components(normal)
     return np.stack([-y, x, z], axis=-1)
 
 
 def normal_from_reference(normal: np.ndarray) -> np.ndarray:
-    """Convert vectors (..., 3) from (down, right, toward the viewer) to the camera frame."""
+    """Convert vectors from the reference frame to the camera frame.
+
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        In the reference frame: (down, right, toward the viewer).
+
+    Returns
+    -------
+    (..., 3) ndarray
+        In the camera frame: x right, y up, z toward the viewer.
+    """
     down, right, toward = _components(normal)
     return np.stack([right, -down, toward], axis=-1)
 

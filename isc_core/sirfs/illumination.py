@@ -36,10 +36,32 @@ def light_cost(light: np.ndarray, prior: LightPrior, weight: float) -> tuple[flo
 
 
 def stack(light: np.ndarray) -> np.ndarray:
-    """Flatten a light (9, C) to 9 C numbers, one channel after the other."""
+    """Flatten a light, one channel after the other.
+
+    Parameters
+    ----------
+    light : (9, C) ndarray
+        SH coefficients.
+
+    Returns
+    -------
+    (9 C,) ndarray
+    """
     return np.ascontiguousarray(light.T).ravel()
 
 
 def unstack(stacked: np.ndarray, channels: int) -> np.ndarray:
-    """Invert `stack`: 9 C numbers to (9, C)."""
+    """Invert `stack`.
+
+    Parameters
+    ----------
+    stacked : (9 C,) ndarray
+    channels : int
+        C.
+
+    Returns
+    -------
+    (9, C) ndarray
+        SH coefficients.
+    """
     return stacked.reshape(channels, 9).T

@@ -41,7 +41,16 @@ def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tupl
 
 
 def down(fine: np.ndarray) -> np.ndarray:
-    """Take one step down: (H, W) to (ceil(H / 2), ceil(W / 2))."""
+    """Take one step down.
+
+    Parameters
+    ----------
+    fine : (H, W) ndarray
+
+    Returns
+    -------
+    (ceil(H / 2), ceil(W / 2)) ndarray
+    """
     return _down_rows(_down_rows(fine).T).T
 
 
@@ -86,7 +95,18 @@ def _up_rows(coarse: np.ndarray, size: int) -> np.ndarray:
 
 
 def synthesise(levels: list[np.ndarray]) -> np.ndarray:
-    """Return the height map of the levels, finest first."""
+    """Return the height map of the levels.
+
+    Parameters
+    ----------
+    levels : list of ndarray
+        Finest first.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Of the shape of the finest level.
+    """
     height = levels[-1]
     for level in levels[-2::-1]:
         height = level + up(height, level.shape)

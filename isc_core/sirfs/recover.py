@@ -111,7 +111,18 @@ class Window:
     width: int
 
     def cut(self, array: np.ndarray, fill: float | bool) -> np.ndarray:
-        """Return the window of `array` (H, W, ...), with `fill` beyond the image."""
+        """Cut the window out of an array.
+
+        Parameters
+        ----------
+        array : (H, W, ...) ndarray
+        fill : float or bool
+            Value beyond the image.
+
+        Returns
+        -------
+        (height, width, ...) ndarray
+        """
         rows, columns = array.shape[:2]
         out = np.full((self.height, self.width, *array.shape[2:]), fill, array.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, rows)
@@ -120,7 +131,16 @@ class Window:
         return out
 
     def cut_replicated(self, array: np.ndarray) -> np.ndarray:
-        """Return the window of `array` (H, W), with its border values beyond the image."""
+        """Cut the window out of an array, which continues with its border values.
+
+        Parameters
+        ----------
+        array : (H, W) ndarray
+
+        Returns
+        -------
+        (height, width) ndarray
+        """
         rows, columns = (
             np.clip(np.arange(start, start + size), 0, n - 1)
             for start, size, n in zip(
@@ -130,7 +150,16 @@ class Window:
         return array[np.ix_(rows, columns)]
 
     def cut_silhouette(self, silhouette: np.ndarray) -> np.ndarray:
-        """Return the window of `silhouette` (H, W) bool, continued where the frame cuts it."""
+        """Cut the window out of a silhouette, which continues where the frame cuts it.
+
+        Parameters
+        ----------
+        silhouette : (H, W) bool ndarray
+
+        Returns
+        -------
+        (height, width) bool ndarray
+        """
         below = self.top + self.height - silhouette.shape[0]
         beyond = self.left + self.width - silhouette.shape[1]
         grown = continued(
@@ -140,7 +169,18 @@ class Window:
         return grown[top : top + self.height, left : left + self.width]
 
     def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return an image of `shape` that holds `window`, 0 elsewhere."""
+        """Return an image that holds the content of the window, 0 elsewhere.
+
+        Parameters
+        ----------
+        window : (height, width, ...) ndarray
+        shape : tuple of int
+            (H, W, ...) of the image.
+
+        Returns
+        -------
+        (H, W, ...) ndarray
+        """
         out = np.zeros(shape, window.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, shape[0])
         c, d = max(self.left, 0), min(self.left + self.width, shape[1])
@@ -179,7 +219,16 @@ class SolveInputs:
     depth: DepthObservation | None = None
 
     def cut(self, window: Window) -> "SolveInputs":
-        """Return the maps in `window`."""
+        """Cut the window out of all maps.
+
+        Parameters
+        ----------
+        window : Window
+
+        Returns
+        -------
+        SolveInputs
+        """
         weight, normals, depth = self.pixel_weight, self.normals, self.depth
         return SolveInputs(
             window.cut(self.image, 0),
@@ -193,7 +242,18 @@ class SolveInputs:
         )
 
     def scaled(self, factor: float) -> "SolveInputs":
-        """Return the maps at `factor` times the scale."""
+        """Resample all maps.
+
+        Parameters
+        ----------
+        factor : float
+            New size over the old.
+
+        Returns
+        -------
+        SolveInputs
+            `self` if the factor is 1.
+        """
         if factor == 1:
             return self
         weight, normals, depth = self.pixel_weight, self.normals, self.depth

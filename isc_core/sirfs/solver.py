@@ -101,7 +101,19 @@ class Engine(Protocol):
     """Evaluates the objective."""
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
-        """Compute the objective and its gradients at `height` (H, W) and `light` (9, C)."""
+        """Compute the objective and its gradients.
+
+        Parameters
+        ----------
+        height : (H, W) ndarray
+            Pixels toward the viewer.
+        light : (9, C) ndarray
+            Log-shading SH coefficients.
+
+        Returns
+        -------
+        Evaluation
+        """
         ...
 
 
@@ -149,7 +161,16 @@ class Backend:
         self._workers = workers
 
     def engine(self, problem: Problem) -> Engine:
-        """Return the engine for `problem`."""
+        """Return the engine for a problem.
+
+        Parameters
+        ----------
+        problem : Problem
+
+        Returns
+        -------
+        Engine
+        """
         if not self.compiled:
             return NumpyEngine(problem, self.dtype)
         from .numba_engine import NumbaEngine
@@ -253,7 +274,17 @@ class ParameterVector:
         self.terms = Terms()
 
     def levels(self, vector: np.ndarray) -> list[np.ndarray]:
-        """Return views of the pyramid levels in `vector`."""
+        """Return the pyramid levels in a vector.
+
+        Parameters
+        ----------
+        vector : (N,) ndarray
+
+        Returns
+        -------
+        list of ndarray
+            Views, finest first; none if the height is known.
+        """
         return [
             vector[a:b].reshape(s)
             for a, b, s in zip(self._edges[:-1], self._edges[1:], self.shapes, strict=True)

@@ -60,7 +60,17 @@ class CompiledAlgebra:
         self._workers = workers
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Return all inner products, see `Algebra`."""
+        """Return all inner products, see `Algebra`.
+
+        Parameters
+        ----------
+        vectors : (K, N) ndarray
+        others : (M, N) ndarray
+
+        Returns
+        -------
+        (K, M) float64 ndarray
+        """
         others = np.ascontiguousarray(others)
         sums = np.zeros((_PARTS, len(vectors), len(others)))
         self._workers.run(
@@ -72,7 +82,15 @@ class CompiledAlgebra:
         return sums.sum(axis=0)
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
-        """Write a linear combination into `out`, see `Algebra`."""
+        """Write sum_k coefficients[k] vectors[k] into `out`, see `Algebra`.
+
+        Parameters
+        ----------
+        coefficients : (K,) ndarray
+        vectors : (K, N) ndarray
+        out : (N,) ndarray
+            Overwritten.
+        """
         c = coefficients.astype(out.dtype)
         self._workers.run([partial(_combine, a, b, c, vectors, out) for a, b in _parts(out.size)])
 

@@ -59,7 +59,17 @@ class Numbers(Protocol):
     """A source of random numbers for an optimiser."""
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the next numbers, of `shape`, uniform in [0, 1)."""
+        """Return the next numbers.
+
+        Parameters
+        ----------
+        shape : tuple of int
+
+        Returns
+        -------
+        ndarray
+            Of `shape`, uniform in [0, 1).
+        """
 
 
 class PseudoRandomNumbers:
@@ -69,7 +79,17 @@ class PseudoRandomNumbers:
         self._generator = np.random.default_rng(seed)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the next numbers, of `shape`, uniform in [0, 1)."""
+        """Return the next numbers.
+
+        Parameters
+        ----------
+        shape : tuple of int
+
+        Returns
+        -------
+        ndarray
+            Of `shape`, uniform in [0, 1).
+        """
         return self._generator.random(shape)
 
 
@@ -153,7 +173,20 @@ def search(
 
 
 def mutation_rate(affinity: np.ndarray, decay: float) -> np.ndarray:
-    """Return exp(-rho f) in (0, 1], for affinities f in [0, 1]."""
+    """Return the mutation rate exp(-rho f).
+
+    Parameters
+    ----------
+    affinity : ndarray
+        f in [0, 1].
+    decay : float
+        rho, greater than 0.
+
+    Returns
+    -------
+    ndarray
+        In (0, 1], of the shape of `affinity`.
+    """
     return np.exp(-decay * affinity)
 
 

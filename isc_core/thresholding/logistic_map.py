@@ -90,12 +90,34 @@ def bifurcation(rates: np.ndarray, settle: int = 1000, keep: int = 200) -> np.nd
 
 
 def density(x: np.ndarray) -> np.ndarray:
-    """Return the density of the orbits at rate 4, for `x` in (0, 1)."""
+    """Return the invariant density of the orbits at rate 4.
+
+    Parameters
+    ----------
+    x : ndarray
+        In (0, 1).
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `x`.
+    """
     return 1 / (np.pi * np.sqrt(x * (1 - x)))
 
 
 def uniformised(x: np.ndarray) -> np.ndarray:
-    """Map values with the density of rate 4 to uniform ones; both in [0, 1]."""
+    """Map values that have the density of rate 4 to uniform ones.
+
+    Parameters
+    ----------
+    x : ndarray
+        In [0, 1].
+
+    Returns
+    -------
+    ndarray
+        In [0, 1], of the shape of `x`.
+    """
     return (2 / np.pi) * np.arcsin(np.sqrt(x))
 
 
@@ -120,7 +142,17 @@ class ChaoticNumbers:
         self._block = np.empty(0)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """Return the next numbers, of `shape`."""
+        """Return the next numbers.
+
+        Parameters
+        ----------
+        shape : tuple of int
+
+        Returns
+        -------
+        ndarray
+            Of `shape`, uniform in [0, 1).
+        """
         count = int(np.prod(shape))
         blocks, available = [self._block], len(self._block)
         while available < count:

@@ -54,7 +54,17 @@ class Budget:
         self._history: list[tuple[int, float]] = []
 
     def evaluate(self, thresholds: np.ndarray) -> np.ndarray:
-        """Return the values (n,) of candidates (n, K), ascending integers, n at most `left`."""
+        """Return the values of candidates and record the best one.
+
+        Parameters
+        ----------
+        thresholds : (n, K) int ndarray
+            Candidates, each in ascending order; n at most `left`.
+
+        Returns
+        -------
+        (n,) ndarray
+        """
         values = self._objective(thresholds)
         self.left -= len(values)
         self._used += len(values)

@@ -82,7 +82,22 @@ class OtsuObjective:
 
     @classmethod
     def of(cls, levels: np.ndarray) -> "OtsuObjective":
-        """Return the objective of an image's levels, integers 0..255 (see `quantise`)."""
+        """Return the objective of an image's levels.
+
+        Parameters
+        ----------
+        levels : int ndarray
+            From 0 to 255, see `quantise`; not empty.
+
+        Returns
+        -------
+        OtsuObjective
+
+        Raises
+        ------
+        InputError
+            If the levels are not integers from 0 to 255, or there are none.
+        """
         if (
             not np.issubdtype(np.asarray(levels).dtype, np.integer)
             or np.size(levels) == 0

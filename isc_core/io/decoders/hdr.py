@@ -9,7 +9,27 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a Radiance HDR."""
+    """Decode a Radiance HDR.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the size is not supported.
+    ValueError
+        If the header has no upright resolution line, or OpenCV cannot decode the file.
+    """
     size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data)
     if size is None:
         raise ValueError("no upright resolution line")

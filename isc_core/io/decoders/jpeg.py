@@ -11,5 +11,23 @@ from .raster import Raster
 
 
 def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a JPEG."""
+    """Decode a JPEG.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the size or the colour mode is not supported.
+    """
     return decode_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path, limits)

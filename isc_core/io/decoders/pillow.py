@@ -14,7 +14,17 @@ _ORIENTATION_TAG = 0x0112
 
 
 def exif_orientation(image: Image.Image) -> int:
-    """Return the EXIF orientation of an image, 1 if unknown."""
+    """Return the EXIF orientation of an image.
+
+    Parameters
+    ----------
+    image : PIL.Image.Image
+
+    Returns
+    -------
+    int
+        As stored; 1 if unknown.
+    """
     try:
         return int(image.getexif().get(_ORIENTATION_TAG, 1))
     except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):

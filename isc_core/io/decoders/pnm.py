@@ -13,7 +13,27 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a PPM or PGM."""
+    """Decode a PPM or PGM.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the size or the colour mode is not supported.
+    ValueError
+        If codes exceed the stated maximum, or the maximum exceeds 65535.
+    """
     gap = rb"(?:\s|#[^\n]*\n)+"
     header = re.match(rb"P([56])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
     if header is None or int(header[4]) < 256:

@@ -115,5 +115,15 @@ def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
 
 
 def as_rgb(values: np.ndarray) -> np.ndarray:
-    """Repeat a single channel three times: (H, W, 3) of (H, W, 1 or 3)."""
+    """Repeat a single channel three times.
+
+    Parameters
+    ----------
+    values : (H, W, 1) or (H, W, 3) ndarray
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        `values` itself if it has three channels.
+    """
     return np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values

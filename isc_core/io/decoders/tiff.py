@@ -18,7 +18,25 @@ _TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
 
 
 def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a TIFF: 8 bits by Pillow, others by OpenCV, which apply the orientation."""
+    """Decode a TIFF: 8 bits by Pillow, others by OpenCV, which apply the orientation.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the size, the colours, the number of channels or the bit depth is not supported.
+    """
     stream = io.BytesIO(data)
     tags = TiffImagePlugin.ImageFileDirectory_v2(
         stream.read(16 if data[2:3] == b"+" or data[3:4] == b"+" else 8)

@@ -60,7 +60,21 @@ def has_colour(image: np.ndarray, mask: np.ndarray) -> bool:
 
 
 def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
-    """Raise `InputError`, naming the method, unless some pixel of the mask has colour."""
+    """Require that some pixel of the mask has colour, see `has_colour`.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+        Not empty.
+    method : str
+        Name of the method, for the error message.
+
+    Raises
+    ------
+    InputError
+        If no pixel has colour.
+    """
     if not has_colour(image, mask):
         raise InputError(
             f"the photo has no colour, which {method} needs to find highlights: use --method isc, "

@@ -47,7 +47,20 @@ def two_band_shares(
 
 
 def colour_cells(red: np.ndarray, green: np.ndarray, cells: int) -> np.ndarray:
-    """Return the cell, 0 to `cells`**2 - 1, of shares (n,) of red and green."""
+    """Return the cell of each pair of colour shares on a square grid.
+
+    Parameters
+    ----------
+    red, green : (n,) ndarray
+        Shares of red and green, in [0, 1].
+    cells : int
+        Cells along each axis.
+
+    Returns
+    -------
+    (n,) int64 ndarray
+        From 0 to `cells`**2 - 1; red counts rows, green columns.
+    """
     row, column = (np.clip(share * cells, 0, cells - 1).astype(np.int64) for share in (red, green))
     return row * cells + column
 

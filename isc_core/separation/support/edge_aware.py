@@ -38,7 +38,16 @@ class Paths:
     reach: float
 
     def average(self, layers: np.ndarray) -> np.ndarray:
-        """Return `layers` (n, H, W), smoothed along the paths."""
+        """Smooth layers along the paths.
+
+        Parameters
+        ----------
+        layers : (n, H, W) ndarray
+
+        Returns
+        -------
+        (n, H, W) ndarray
+        """
         smooth = np.ascontiguousarray(layers.transpose(2, 0, 1))  # the filtered axis comes first
         for step in range(_PASSES):
             sigma = self.reach * np.sqrt(3) * 2 ** (_PASSES - 1 - step) / np.sqrt(4**_PASSES - 1)
@@ -50,7 +59,18 @@ class Paths:
         return smooth.transpose(1, 2, 0)
 
     def weighted(self, value: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Return the average (H, W) of `value` with `weight` >= 0, both (H, W)."""
+        """Return the weighted average along the paths.
+
+        Parameters
+        ----------
+        value : (H, W) ndarray
+        weight : (H, W) ndarray
+            Not negative.
+
+        Returns
+        -------
+        (H, W) ndarray
+        """
         total, weights = self.average(np.stack([weight * value, weight]))
         return total / np.maximum(weights, 1e-12)
 

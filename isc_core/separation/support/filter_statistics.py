@@ -94,7 +94,20 @@ class FilterTable:
 
 
 def bins(values: np.ndarray, spread: float) -> np.ndarray:
-    """Return the bin, in [0, BINS), of each value of a filter's outputs."""
+    """Return the histogram bin of each output of a filter.
+
+    Parameters
+    ----------
+    values : ndarray
+        Outputs of the filter.
+    spread : float
+        Unit of the outputs, greater than 0.
+
+    Returns
+    -------
+    int64 ndarray
+        In [0, BINS), of the shape of `values`.
+    """
     place = (np.arcsinh(values / spread) / _REACH + 1) * (BINS / 2)
     return np.clip(place, 0, BINS - 1).astype(np.int64)
 
@@ -245,7 +258,20 @@ def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def pooled_evidence(intensity: np.ndarray, mask: np.ndarray, table: FilterTable) -> np.ndarray:
-    """Return Lambda (H, W) of an intensity >= 0 inside `mask`; 0 outside."""
+    """Return Lambda, the log-likelihood ratios averaged over the neighbourhood.
+
+    Parameters
+    ----------
+    intensity : (H, W) ndarray
+        Not negative.
+    mask : (H, W) bool ndarray
+    table : FilterTable
+
+    Returns
+    -------
+    (H, W) ndarray
+        0 outside the mask.
+    """
     ratios = np.zeros(mask.shape)
     ratios[mask] = table.evidence(filter_outputs(intensity, mask))
     return np.where(mask, masked_gaussian(ratios, mask, _POOLED * _diagonal(mask)), 0)

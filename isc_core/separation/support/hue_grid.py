@@ -109,7 +109,19 @@ class HueGrid:
         return near, everywhere + _POOLED * total / total.sum()
 
     def places(self, rows: np.ndarray, columns: np.ndarray, hue: np.ndarray) -> "Places":
-        """Return the positions of pixels (n,) among the cells; hues in [0, 6)."""
+        """Return the positions of pixels among the cells.
+
+        Parameters
+        ----------
+        rows, columns : (n,) ndarray
+            In pixels.
+        hue : (n,) ndarray
+            In [0, 6).
+
+        Returns
+        -------
+        Places
+        """
         at = np.stack([rows / self.cell, columns / self.cell, hue * (self.hues / 6)])
         first = np.floor(at).astype(np.int64)
         return Places(first, (at - first).astype(np.float32), self.shape)
@@ -141,7 +153,17 @@ class Places:
         ]
 
     def read(self, table: np.ndarray) -> np.ndarray:
-        """Interpolate a table (down, across, hues) at the pixels (n,)."""
+        """Interpolate a table at the pixels, linearly.
+
+        Parameters
+        ----------
+        table : (down, across, hues) ndarray
+            One value for each cell.
+
+        Returns
+        -------
+        (n,) float32 ndarray
+        """
         flat = np.ascontiguousarray(table, np.float32).ravel()
         return np.sum([share * flat[cell] for cell, share in self.corners], axis=0)
 

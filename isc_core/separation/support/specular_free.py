@@ -53,12 +53,32 @@ def fixed_chromaticity(image: np.ndarray, chromaticity: float = 0.6) -> np.ndarr
 
 
 def two_band(image: np.ndarray) -> np.ndarray:
-    """Return the image (H, W, 3) less its smallest channel."""
+    """Subtract the smallest channel from every channel of an image.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+    """
     return image - smallest(image)[..., None]
 
 
 def lifted_two_band(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return the two-band image plus the mean of the smallest channel over `mask` (H, W) bool."""
+    """Return the two-band image plus the mean of the smallest channel over a mask.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+    """
     return two_band(image) + smallest(image)[mask].mean(dtype=float)
 
 

@@ -77,7 +77,19 @@ class Dichromatic:
             )
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (..., 3) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        (..., 3) ndarray
+            In 1/sr, 0 below the horizon.
+        """
         diffuse, specular = (
             lobe.value(normal, view, light)[..., None] for lobe in (self.diffuse, self.specular)
         )
@@ -86,7 +98,19 @@ class Dichromatic:
     def gradient(
         self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
     ) -> DichromaticGradient:
-        """Return the derivatives of `value` by the colour and by both lobes' parameters."""
+        """Return the derivatives of `value` by the colour and by both lobes' parameters.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        DichromaticGradient
+            0 below the horizon.
+        """
         diffuse = _coloured(self.diffuse.gradient(normal, view, light), np.asarray(self.colour))
         return DichromaticGradient(
             self.diffuse.value(normal, view, light),

@@ -70,12 +70,36 @@ class Ggx:
         check_range("f0", self.f0, 0, 1)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        (...) ndarray
+            In 1/sr, 0 below the horizon.
+        """
         angles = cosines(normal, view, light)
         return np.where(angles.lit, self._facets(angles) * self._fresnel(angles), 0)
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> GgxGradient:
-        """Return the derivatives of `value` by alpha and f0."""
+        """Return the derivatives of `value` by alpha and f0.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        GgxGradient
+            Each derivative (...); 0 below the horizon.
+        """
         angles = cosines(normal, view, light)
         facets = np.where(angles.lit, self._facets(angles), 0)
         square = angles.half**2

@@ -53,9 +53,33 @@ class Lambert:
         check_range("albedo", self.albedo, 0, 1)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        (...) ndarray
+            In 1/sr, 0 below the horizon.
+        """
         return self.albedo * self.gradient(normal, view, light).albedo
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> LambertGradient:
-        """Return the derivative of `value` by the albedo."""
+        """Return the derivative of `value` by the albedo.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        LambertGradient
+            The derivative (...) in 1/sr; 0 below the horizon.
+        """
         return LambertGradient(np.where(cosines(normal, view, light).lit, 1 / np.pi, 0))

@@ -37,7 +37,19 @@ class Lobe(Model, Protocol):
     """A model without colour, whose derivatives are known."""
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> object:
-        """Return a dataclass with the derivative (...) of f_r by each parameter, under its name."""
+        """Return the derivatives of f_r by the parameters.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        object
+            A dataclass with the derivative (...) by each parameter, under its name.
+        """
         ...
 
 
@@ -74,11 +86,35 @@ def check_range(name: str, value: Parameter | Sequence[float], low: float, high:
 
 
 def power(base: np.ndarray, exponent: Parameter) -> np.ndarray:
-    """Return base^exponent, 0 where the base is not above 0, whatever the exponent."""
+    """Return base^exponent, 0 where the base is not above 0, whatever the exponent.
+
+    Parameters
+    ----------
+    base : ndarray
+    exponent : float or ndarray
+        Broadcast against `base`.
+
+    Returns
+    -------
+    ndarray
+        Of the broadcast shape.
+    """
     above = base > 0
     return np.where(above, np.where(above, base, 1) ** exponent, 0)
 
 
 def log_above_zero(base: np.ndarray) -> np.ndarray:
-    """Return log(base), and 0 where the base is not above 0: there the power it multiplies is 0."""
+    """Return the natural logarithm, 0 where the argument is not above 0.
+
+    There the power that the logarithm multiplies is 0.
+
+    Parameters
+    ----------
+    base : ndarray
+
+    Returns
+    -------
+    ndarray
+        Of the shape of `base`.
+    """
     return np.log(np.where(base > 0, base, 1))

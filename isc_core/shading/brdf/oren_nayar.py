@@ -64,13 +64,37 @@ class OrenNayar:
         check_range("sigma", self.sigma, 0, np.pi / 2)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        (...) ndarray
+            In 1/sr, 0 below the horizon.
+        """
         return self.albedo * self.gradient(normal, view, light).albedo
 
     def gradient(
         self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
     ) -> OrenNayarGradient:
-        """Return the derivatives of `value` by albedo and sigma."""
+        """Return the derivatives of `value` by albedo and sigma.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        OrenNayarGradient
+            Each derivative (...); 0 below the horizon.
+        """
         angles = cosines(normal, view, light)
         term = _azimuth_term(angles)
         square = np.square(self.sigma)

@@ -67,11 +67,35 @@ class Phong:
         check_range("exponent", self.exponent, 0, np.inf)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        (...) ndarray
+            In 1/sr, 0 below the horizon.
+        """
         return self.strength * self.gradient(normal, view, light).strength
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> PhongGradient:
-        """Return the derivatives of `value` by strength and exponent."""
+        """Return the derivatives of `value` by strength and exponent.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors in one frame: surface normal, and directions to the camera and to the
+            light.
+
+        Returns
+        -------
+        PhongGradient
+            Each derivative (...); 0 below the horizon.
+        """
         angles = cosines(normal, view, light)
         mirrored = _mirrored(angles)
         lobe = np.where(angles.lit, power(mirrored, self.exponent), 0)

@@ -43,7 +43,17 @@ class ColorCells:
 
     @staticmethod
     def of(x: np.ndarray) -> "ColorCells":
-        """Return the occupied cells of finite samples `x` (n, 3)."""
+        """Return the occupied cells of samples.
+
+        Parameters
+        ----------
+        x : (n, 3) ndarray
+            Finite.
+
+        Returns
+        -------
+        ColorCells
+        """
         x = np.asarray(x, float)
         used, cell = np.unique(_cell_index(x), return_inverse=True)
         counts = np.bincount(cell, minlength=len(used)).astype(float)
@@ -57,7 +67,17 @@ class ColorCells:
 
     @staticmethod
     def merged(parts: Iterable["ColorCells"]) -> "ColorCells":
-        """Return the cells of all `parts` (at least one), without merging equal cells."""
+        """Return the cells of all parts, without merging equal cells.
+
+        Parameters
+        ----------
+        parts : iterable of ColorCells
+            At least one.
+
+        Returns
+        -------
+        ColorCells
+        """
         all_parts = list(parts)
         return ColorCells(
             np.concatenate([p.counts for p in all_parts]),

@@ -70,7 +70,17 @@ class GaussianLight:
         )
 
     def log_likelihood(self, lights: np.ndarray) -> np.ndarray:
-        """Return the log density (count,) of each of the stacked `lights` (count, n)."""
+        """Return the log density of each light.
+
+        Parameters
+        ----------
+        lights : (count, n) ndarray
+            Stacked coefficients, see `stacked`.
+
+        Returns
+        -------
+        (count,) ndarray
+        """
         factor = np.linalg.cholesky(self.covariance)
         white = scipy.linalg.solve_triangular(factor, (lights - self.mean).T, lower=True)
         log_determinant = 2 * np.log(np.diag(factor)).sum()
@@ -80,19 +90,46 @@ class GaussianLight:
 
 
 def mirrored(lights: np.ndarray) -> np.ndarray:
-    """Return the `lights` (count, 9, C) and their mirror images, (2 count, 9, C)."""
+    """Return lights and their mirror images.
+
+    Parameters
+    ----------
+    lights : (count, 9, C) ndarray
+
+    Returns
+    -------
+    (2 count, 9, C) ndarray
+    """
     return np.concatenate([lights, lights * _MIRROR[:, None]])
 
 
 def permuted(lights: np.ndarray) -> np.ndarray:
-    """Return the `lights` (count, 9, C) with their channels in every order."""
+    """Return lights with their channels in every order.
+
+    Parameters
+    ----------
+    lights : (count, 9, C) ndarray
+
+    Returns
+    -------
+    (C! count, 9, C) ndarray
+    """
     return np.concatenate(
         [lights[:, :, list(order)] for order in itertools.permutations(range(lights.shape[2]))]
     )
 
 
 def stacked(lights: np.ndarray) -> np.ndarray:
-    """Flatten lights (count, 9, C) to (count, 9 C), channel by channel."""
+    """Flatten lights, channel by channel.
+
+    Parameters
+    ----------
+    lights : (count, 9, C) ndarray
+
+    Returns
+    -------
+    (count, 9 C) ndarray
+    """
     return lights.transpose(0, 2, 1).reshape(len(lights), -1)
 
 

@@ -74,7 +74,18 @@ class SilhouetteProfile:
     spread: np.ndarray
 
     def at(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return mean and spread at `u` in [0, 1], linearly interpolated."""
+        """Return mean and spread at a relative depth, linearly interpolated.
+
+        Parameters
+        ----------
+        u : ndarray
+            In [0, 1].
+
+        Returns
+        -------
+        tuple of ndarray
+            Mean and spread, each of the shape of `u`.
+        """
         nodes = (np.arange(len(self.mean)) + 0.5) / len(self.mean)
         return np.interp(u, nodes, self.mean), np.interp(u, nodes, self.spread)
 

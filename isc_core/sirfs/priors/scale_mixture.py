@@ -73,7 +73,17 @@ class Magnitudes:
 
     @staticmethod
     def merged(parts: Iterable["Magnitudes"]) -> "Magnitudes":
-        """Return the histogram of all samples of `parts` (at least one) together."""
+        """Return the histogram of all samples together.
+
+        Parameters
+        ----------
+        parts : iterable of Magnitudes
+            At least one.
+
+        Returns
+        -------
+        Magnitudes
+        """
         all_parts = list(parts)
         counts = np.sum([p.counts for p in all_parts], axis=0)
         squares = np.sum([p.squares for p in all_parts], axis=0)
@@ -102,7 +112,17 @@ class ScaleMixture:
     reach: float
 
     def log_density(self, x: np.ndarray) -> np.ndarray:
-        """Return log p(x), at least -300, of the shape of `x`."""
+        """Return log p(x).
+
+        Parameters
+        ----------
+        x : ndarray
+
+        Returns
+        -------
+        float64 ndarray
+            At least -300, of the shape of `x`.
+        """
         density = _densities(np.asarray(x, float) ** 2, self.deviations) @ self.weights
         return np.log(np.maximum(density, np.exp(LOG_DENSITY_FLOOR)))
 

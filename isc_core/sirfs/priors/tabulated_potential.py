@@ -27,7 +27,17 @@ class TabulatedPotential:
     values: np.ndarray
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return cost and derivative at `x` (any shape), both float64 of its shape."""
+        """Return the cost and its derivative.
+
+        Parameters
+        ----------
+        x : ndarray
+
+        Returns
+        -------
+        tuple of float64 ndarray
+            Cost and derivative, each of the shape of `x`.
+        """
         position = (np.asarray(x, float) - self.low) / self.step
         cell = np.clip(np.floor(position), 0, len(self.values) - 2).astype(np.int64)
         below = self.values[cell]
