@@ -73,7 +73,17 @@ class Monitor:
         self.progress(ProgressEvent(stage, fraction, detail))
 
     def part(self, start: float, end: float) -> "Monitor":
-        """Return a monitor whose fractions 0 to 1 are the range `start` to `end` of this one."""
+        """Return a monitor of a part of this one's work.
+
+        Parameters
+        ----------
+        start, end : float
+            Fractions of this monitor that are the part's 0 and 1.
+
+        Returns
+        -------
+        Monitor
+        """
 
         def scaled(event: ProgressEvent) -> None:
             self.progress(replace(event, fraction=start + (end - start) * event.fraction))

@@ -301,7 +301,7 @@ def test_the_height_scale_is_the_unit(tmp_path: Path) -> None:
 
 def test_a_height_map_that_cannot_be_chosen(tmp_path: Path) -> None:
     write_channels(tmp_path / "two.exr", {"R": np.ones((4, 4)), "G": np.ones((4, 4))})
-    with pytest.raises(InputError, match="no channel Y, Z or height.Z but G, R"):
+    with pytest.raises(InputError, match="no channel Y, Z or height.Z, only G, R"):
         read_height(tmp_path / "two.exr", (4, 4))
 
 

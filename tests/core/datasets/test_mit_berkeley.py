@@ -179,7 +179,7 @@ def test_wrong_contents_are_refused(copy: Path) -> None:
     with pytest.raises(InputError, match="crop"):
         load_object(copy, "apple", "laboratory")
     scipy.io.savemat(folder / "Z.mat", {"height": np.zeros((334, 334))})
-    with pytest.raises(InputError, match="lacks 'depth'"):
+    with pytest.raises(InputError, match="has no 'depth'"):
         load_object(copy, "apple", "laboratory")
     scipy.io.savemat(folder / "Z.mat", {"depth": np.zeros((334, 334, 3))})
     with pytest.raises(InputError, match="channel"):
