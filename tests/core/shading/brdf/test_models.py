@@ -86,7 +86,7 @@ def test_gradients_are_the_values_derivatives(model: Lobe) -> None:
 def test_gradients_of_coloured_paint() -> None:
     geometry = lit_triples(400)
     gradient = GLOSSY_PLASTIC.gradient(*geometry)
-    for lobe in ("body", "interface"):
+    for lobe in ("diffuse", "specular"):
         inner, slopes = getattr(GLOSSY_PLASTIC, lobe), getattr(gradient, lobe)
         for parameter in numbers(slopes):
             here, step = getattr(inner, parameter), 1e-6
