@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.channels import largest
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
-from .masks import check_mask, find_mask, largest_channel
+from .masks import check_mask, find_mask
 from .photo import Photo, PhotoSource
 from .transfer import resolve_transfer, to_linear
 
@@ -73,7 +74,7 @@ def read_photo(
         code_value=_code_value(raster, used, linear, mask),
         clipped=np.zeros_like(mask)
         if raster.peak is None
-        else largest_channel(raster.values) == raster.peak,
+        else largest(raster.values) == raster.peak,
         original=PhotoSource(raster.sha256, (width, height), raster.bit_depth, used, mask_from),
         exposed=raster.peak is not None,
     )
@@ -123,7 +124,7 @@ def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.n
     inside.
     """
     brightest, too_bright = (
-        largest_channel(linear),
+        largest(linear),
         f"brighter than {_DEFECTIVE:g} times the object's median",
     )
     for bad, what in (
@@ -150,7 +151,7 @@ def _median_positive(light: np.ndarray) -> float:
 
 def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndarray) -> float:
     if raster.peak is None:
-        light = largest_channel(linear)[mask]
+        light = largest(linear)[mask]
         return FLOAT_STEP * float(np.percentile(light, 99.9) or light.max())
     step = 1.0 / raster.peak
     return float(srgb_to_linear(step)) if transfer == "srgb" else step

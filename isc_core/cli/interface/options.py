@@ -404,13 +404,41 @@ def number(text: str) -> float:
     argparse.ArgumentTypeError
         If it is not one.
     """
+    value = _finite_or_none(text)
+    if not value:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number other than 0")
+    return value
+
+
+def finite(text: str) -> float:
+    """Parse a finite number.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    value = _finite_or_none(text)
+    if value is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
+def _finite_or_none(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
-        value = math.nan
-    if not math.isfinite(value) or value == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number other than 0")
-    return value
+        return None
+    return value if math.isfinite(value) else None
 
 
 def positive(text: str) -> float:

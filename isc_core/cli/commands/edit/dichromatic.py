@@ -5,8 +5,8 @@ import argparse
 from ....editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from ....errors import InputError
 from ....scene.decomposition import Decomposition
+from ...interface.options import finite
 from .action import ActionResult, EditAction
-from .options import number
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
@@ -43,7 +43,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         ):
             group.add_argument(
                 f"--{layer}-{name}",
-                type=number,
+                type=finite,
                 default=getattr(defaults, name),
                 metavar="N",
                 help=f"{text} (default %(default)s)",

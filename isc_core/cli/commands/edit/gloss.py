@@ -5,8 +5,8 @@ import argparse
 from ....editing.blinn_phong_extension import METHODS, Gloss, change_gloss
 from ....errors import InputError
 from ....scene.decomposition import Decomposition
+from ...interface.options import finite
 from .action import ActionResult, EditAction
-from .options import number
 
 _LOOKS = {
     "glossier": {"sharper": 2.5, "gain": 1.5},
@@ -37,20 +37,20 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         help="preset: a sharper and stronger lobe, a wider one, or metal",
     )
     parser.add_argument(
-        "--exponent", type=number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5"
+        "--exponent", type=finite, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5"
     )
     parser.add_argument(
-        "--present", type=number, metavar="P", help="the current exponent (default: fitted)"
+        "--present", type=finite, metavar="P", help="the current exponent (default: fitted)"
     )
     parser.add_argument(
         "--gain",
-        type=number,
+        type=finite,
         metavar="G",
         help="factor of the highlights (default 1; 1.5 for --look glossier)",
     )
     parser.add_argument(
         "--metal",
-        type=number,
+        type=finite,
         metavar="M",
         help="metalness, 0 to 1 (default 0; 1 for --look metallic)",
     )

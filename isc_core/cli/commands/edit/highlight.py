@@ -15,8 +15,9 @@ from ....lobe_fitting.light_direction import (
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight, toward
 from ....shading.lobe_rendering import Lobe
+from ...interface.options import finite
 from .action import ActionResult, EditAction
-from .options import add_direction, add_lobe, lobe_of, number, plain
+from .options import add_direction, add_lobe, lobe_of, plain
 from .panels import sphere_panel
 
 _DEFAULT_LEVEL = 0.7
@@ -61,7 +62,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_lobe(parser)
     parser.add_argument(
         "--strength",
-        type=number,
+        type=finite,
         metavar="S",
         help="1: as bright as the photo's white (default 0.7; with --replace, the energy of the "
         "existing highlights)",

@@ -13,6 +13,7 @@ from ....shading.lobe_rendering import DEFAULT_EXPONENT, Lobe
 from ...interface.options import (
     add_limits,
     add_output_options,
+    finite,
 )
 
 
@@ -60,13 +61,13 @@ def add_lobe(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument(
         "--exponent",
-        type=number,
+        type=finite,
         metavar="P",
         help="Blinn-Phong exponent, 1 to 1e5, larger is sharper",
     )
     parser.add_argument(
         "--alpha",
-        type=number,
+        type=finite,
         metavar="A",
         help="GGX roughness alpha instead, 0.01 to 1, smaller is sharper",
     )
@@ -82,7 +83,7 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
     """
     parser.add_argument(
         "--direction",
-        type=number,
+        type=finite,
         nargs=3,
         metavar=("X", "Y", "Z"),
         help="toward the light: right, up, toward the viewer; of any length",
@@ -117,32 +118,6 @@ def lobe_of(options: argparse.Namespace) -> Lobe | None:
     if options.exponent is None and options.alpha is None:
         return None
     return Lobe(DEFAULT_EXPONENT if options.exponent is None else options.exponent, options.alpha)
-
-
-def number(text: str) -> float:
-    """Parse a finite number.
-
-    Parameters
-    ----------
-    text : str
-        Value on the command line.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    argparse.ArgumentTypeError
-        If it is not one.
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not np.isfinite(value):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
-    return value
 
 
 def color(text: str) -> np.ndarray:

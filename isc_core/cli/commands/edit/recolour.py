@@ -13,10 +13,11 @@ from ....photo import read_raster
 from ....scene.decomposition import Decomposition
 from ...interface.options import (
     count,
+    finite,
     limits_of,
 )
 from .action import ActionResult, EditAction
-from .options import color, number, plain
+from .options import color, plain
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
@@ -68,18 +69,18 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
 def _add_options(parser: argparse.ArgumentParser) -> None:
     defaults = ColourEdit()
     parser.add_argument(
-        "--hue", type=number, default=defaults.hue, metavar="DEGREES", help="rotation of the hue"
+        "--hue", type=finite, default=defaults.hue, metavar="DEGREES", help="rotation of the hue"
     )
     parser.add_argument(
         "--saturation",
-        type=number,
+        type=finite,
         default=defaults.saturation,
         metavar="F",
         help="factor (default %(default)s)",
     )
     parser.add_argument(
         "--value",
-        type=number,
+        type=finite,
         default=defaults.value,
         metavar="F",
         help="factor of the brightness (default %(default)s)",

@@ -14,10 +14,11 @@ from ....result_files.known_inputs import read_light
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight, toward, turn, turned_light
 from ...interface.options import (
+    finite,
     limits_of,
 )
 from .action import ActionResult, EditAction
-from .options import add_direction, add_lobe, lobe_of, number, plain
+from .options import add_direction, add_lobe, lobe_of, plain
 from .panels import recovered_light_panel, sphere_panel
 
 _COEFFICIENTS = ("", ".json", ".npy")  # suffixes of lights that are not images
@@ -97,7 +98,7 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     ):
         parser.add_argument(
             f"--{name}",
-            type=number,
+            type=finite,
             default=0.0,
             metavar="DEGREES",
             help=f"rotation of the light: {text}",
@@ -112,13 +113,13 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_direction(parser)
     parser.add_argument(
         "--ambient",
-        type=number,
+        type=finite,
         metavar="A",
         help="ambient light relative to that of --direction (default 0.15)",
     )
     parser.add_argument(
         "--exposure",
-        type=number,
+        type=finite,
         default=1.0,
         metavar="F",
         help="factor of the new light (default %(default)s)",
