@@ -169,7 +169,7 @@ ROOMS = (
     "baselines",
     "sirfs",
     "lobe_fitting",
-    "decompose",
+    "decomposition",
     "result_files",
     "datasets",
     "evaluation",

@@ -31,8 +31,8 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
-from isc_core.decompose.pipeline import decompose
-from isc_core.decompose.settings import Settings
+from isc_core.decomposition.pipeline import decompose
+from isc_core.decomposition.settings import Settings
 from isc_core.photo import read_photo
 from isc_core.result_files.result_folder import save
 

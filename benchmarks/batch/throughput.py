@@ -24,8 +24,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
-from isc_core.decompose.pipeline import decompose
-from isc_core.decompose.settings import Settings
+from isc_core.decomposition.pipeline import decompose
+from isc_core.decomposition.settings import Settings
 from isc_core.photo import read_photo
 from isc_core.result_files.contact_sheet import thumbnail
 from isc_core.result_files.result_folder import save

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
-from isc_core.decompose.assumption_checks import check_scene
+from isc_core.decomposition.assumption_checks import check_scene
 from isc_core.errors import InputError
 from isc_core.networks.light_network import LightNetwork, predict_light
 from isc_core.networks.scene_classifier import SceneClassifier, classify_scene

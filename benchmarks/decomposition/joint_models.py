@@ -27,7 +27,7 @@ import numpy as np
 from benchmarks.records import append_row, read_rows
 from benchmarks.sirfs.mit_berkeley import rounded
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
-from isc_core.decompose.settings import SHAPE_PRIORS, ShapePrior
+from isc_core.decomposition.settings import SHAPE_PRIORS, ShapePrior
 from isc_core.evaluation.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation.metrics import score
 from isc_core.evaluation.runner import RunnerOptions, make_runner

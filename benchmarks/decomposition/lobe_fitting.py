@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.decompose.pipeline import decompose
+from isc_core.decomposition.pipeline import decompose
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.networks.light_network import predict_light
 from isc_core.photo import Photo, PhotoSource

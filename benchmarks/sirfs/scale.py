@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.resampling import resample_inside
 from isc_core.numerics.lbfgs import LbfgsOptions

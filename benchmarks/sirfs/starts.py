@@ -26,7 +26,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_natural_lights
-from isc_core.decompose.shape import exposure_normalisation
+from isc_core.decomposition.shape import exposure_normalisation
 from isc_core.evaluation.metrics import Scores, truth_normal
 from isc_core.prior_fitting.fit import FitOptions, fit_priors
 from isc_core.prior_fitting.statistics import collect_statistics

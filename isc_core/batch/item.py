@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..decompose.settings import Settings
+from ..decomposition.settings import Settings
 from ..errors import InputError
 from ..io.limits import USUAL, Limits
 from ..photo import TRANSFERS

@@ -14,7 +14,7 @@ from functools import lru_cache
 from pathlib import Path, PurePath
 
 from .. import __version__
-from ..decompose.pipeline import decompose
+from ..decomposition.pipeline import decompose
 from ..errors import Cancelled, InputError
 from ..photo import read_photo
 from ..progress import Monitor

@@ -15,10 +15,10 @@ from enum import StrEnum
 import numpy as np
 
 from ..datasets.mit_berkeley import MitBerkeleyObject
-from ..decompose.models import solve
-from ..decompose.pipeline import decompose
-from ..decompose.settings import LightPrior, Settings, ShapePrior
-from ..decompose.task import DecompositionTask, SceneEstimate, SolveOptions
+from ..decomposition.models import solve
+from ..decomposition.pipeline import decompose
+from ..decomposition.settings import LightPrior, Settings, ShapePrior
+from ..decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
 from ..networks.layer_network import LayerNetwork
 from ..photo import Photo, PhotoSource
 from ..progress import Monitor

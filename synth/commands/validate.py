@@ -7,8 +7,8 @@ import shlex
 from pathlib import Path
 
 from isc_core.cli.interface.options import Commands, add_command, count, hints, names
-from isc_core.decompose.pipeline import ILLUMINATIONS
-from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.decomposition.pipeline import ILLUMINATIONS
+from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.errors import InputError, Rejected
 from isc_core.io.atomic import require_writable_file
 from isc_core.progress import Monitor

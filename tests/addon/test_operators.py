@@ -22,7 +22,7 @@ from blender_addon.panels import wrap_text  # noqa: E402
 from blender_addon.scene.build import BuildOptions, find_built  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
-from isc_core.decompose.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
+from isc_core.decomposition.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from isc_core.separation import BEST, METHODS  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402

@@ -11,7 +11,7 @@ import pytest
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED, ImageRecipe
 from isc_core.batch.run_batch import Batch, run_batch
-from isc_core.decompose.settings import Settings
+from isc_core.decomposition.settings import Settings
 from tests.core.command_line import ball_codes, write_image
 
 QUICK = ImageRecipe(Settings(model="retinex", engine="numpy"))

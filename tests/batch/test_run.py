@@ -19,8 +19,8 @@ from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageJob, ImageRecipe
 from isc_core.batch.journal import Journal
 from isc_core.batch.run_batch import run_batch
 from isc_core.batch.summary import PAGE
-from isc_core.decompose.pipeline import decompose
-from isc_core.decompose.settings import Settings
+from isc_core.decomposition.pipeline import decompose
+from isc_core.decomposition.settings import Settings
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.limits import Limits
 from isc_core.photo import read_photo

@@ -18,7 +18,7 @@ import pytest
 from isc_core.batch.item import ImageRecipe
 from isc_core.batch.names import Names
 from isc_core.batch.sources import Inputs
-from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.photo import read_photo

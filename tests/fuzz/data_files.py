@@ -20,7 +20,7 @@ from blender_addon.files.result_arrays import read_result
 from isc_core.batch.item import ImageRecipe
 from isc_core.batch.manifest import Manifest
 from isc_core.datasets.mit_berkeley import load_natural_lights, load_object
-from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.networks.layer_network import LayerNetwork
 from isc_core.networks.light_network import LightNetwork
 from isc_core.networks.scene_classifier import SceneClassifier

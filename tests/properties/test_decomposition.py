@@ -14,7 +14,7 @@ from unittest import mock
 import numpy as np
 from hypothesis import strategies as st
 
-from isc_core.decompose.pipeline import MODELS, Settings, decompose
+from isc_core.decomposition.pipeline import MODELS, Settings, decompose
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.photo import Photo, check_mask
 from isc_core.progress import Monitor, ProgressEvent
@@ -70,7 +70,7 @@ def small_solves() -> Iterator[None]:
         solver = replace(given.solver, lbfgs=FEW_STEPS)
         return replace(given, solve_size=SIDE, margin=4, solver=solver)
 
-    with mock.patch("isc_core.decompose.shape.RecoverOptions", small):
+    with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
         yield
 
 

@@ -16,9 +16,9 @@ import pytest
 pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
 from isc_core.cli.main import main
-from isc_core.decompose import layers, shape
-from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings, solve
-from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.decomposition import layers, shape
+from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
+from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
 from isc_core.numerics.lbfgs import LbfgsOptions
@@ -169,7 +169,7 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
         / np.where(truth.mask, truth.diffuse.mean(axis=2), 1)
     )
     joint = importlib.import_module(
-        "isc_core.decompose.joint"
+        "isc_core.decomposition.joint"
     )  # the package has a function of that name
     seen = np.repeat(
         (left + 1.0 * (left > 0.5))[..., None], 3, axis=2

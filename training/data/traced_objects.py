@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
-from isc_core.decompose.settings import Illumination
+from isc_core.decomposition.settings import Illumination
 from isc_core.io.atomic import new_file
 from synth.albedos import ALBEDOS as TEXTURES
 from synth.albedos import make_albedo

@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from isc_core.decompose.mbp import split_reflectance
+from isc_core.decomposition.mbp import split_reflectance
 from isc_core.editing.relight import NewLight, relight
 from isc_core.imaging.channels import smallest
 from isc_core.lobe_fitting.light_direction import explain_shading

@@ -6,7 +6,7 @@ clipped.
 
 import numpy as np
 
-from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.photo import FLOAT_STEP, Photo, PhotoSource
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition

@@ -9,7 +9,7 @@ from pathlib import Path
 from ...batch.engine import Crew
 from ...batch.item import DONE, FAILED, SKIPPED, ImageRecipe
 from ...batch.run_batch import Batch, run_batch
-from ...decompose.settings import Settings
+from ...decomposition.settings import Settings
 from ...errors import Rejected
 from ...progress import Monitor
 from ..interface.options import (

@@ -4,7 +4,7 @@ import argparse
 from dataclasses import fields
 from pathlib import Path
 
-from ...decompose.pipeline import KnownInputs, Settings, decompose
+from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import note_lines

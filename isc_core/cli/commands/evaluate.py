@@ -5,7 +5,7 @@ import json
 from pathlib import Path
 
 from ...datasets.mit_berkeley import ILLUMINATIONS, INPUTS
-from ...decompose.settings import LIGHT_PRIORS, SHAPE_PRIORS, LightPrior, ShapePrior
+from ...decomposition.settings import LIGHT_PRIORS, SHAPE_PRIORS, LightPrior, ShapePrior
 from ...evaluation.evaluate import evaluate
 from ...evaluation.runner import Protocol, RunnerOptions, make_runner
 from ...io.atomic import new_file, require_writable_file

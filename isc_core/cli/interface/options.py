@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ...decompose.settings import (
+from ...decomposition.settings import (
     ILLUMINATIONS,
     LIGHT_COLOURS,
     LIGHT_PRIORS,

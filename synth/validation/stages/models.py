@@ -1,7 +1,7 @@
 """The stage "models": every model on a glossy photo, beside plain SIRFS on the same photo and SIRFS
 on the true diffuse layer.
 
-Each model runs as in `isc decompose` (`isc_core.decompose.solve`), and is scored like the stage
+Each model runs as in `isc decompose` (`isc_core.decomposition.solve`), and is scored like the stage
 "sirfs". Errors are relative to plain SIRFS on the same scene, so that a mean over scenes is a
 paired comparison; the true diffuse layer shows the gain of a perfect separation.
 
@@ -18,9 +18,9 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from isc_core.decompose.layers import separated, shaded
-from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings, solve
-from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.decomposition.layers import separated, shaded
+from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
+from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
 from isc_core.networks.light_network import predict_light

@@ -11,8 +11,8 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
-from isc_core.decompose.pipeline import ILLUMINATIONS
-from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.decomposition.pipeline import ILLUMINATIONS
+from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation

@@ -12,8 +12,8 @@ import scipy.io
 
 from isc_core.baselines import retinex
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
-from isc_core.decompose.pipeline import decompose
-from isc_core.decompose.settings import LightPrior, Settings, ShapePrior
+from isc_core.decomposition.pipeline import decompose
+from isc_core.decomposition.settings import LightPrior, Settings, ShapePrior
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.evaluate import Estimate, EvaluationReport, evaluate, paired_bootstrap
 from isc_core.evaluation.metrics import truth_normal

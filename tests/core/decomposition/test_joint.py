@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose.joint import (
+from isc_core.decomposition.joint import (
     JointOptions,
     ResidualHighlights,
     continue_albedo,
     detect_residual_highlights,
     joint,
 )
-from isc_core.decompose.mdr import mdr
-from isc_core.decompose.models import DecompositionTask, Settings
-from isc_core.decompose.task import SceneEstimate
+from isc_core.decomposition.mdr import mdr
+from isc_core.decomposition.models import DecompositionTask, Settings
+from isc_core.decomposition.task import SceneEstimate
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.diagnostics import JointOutcome

@@ -3,8 +3,8 @@
 import pytest
 
 from isc_core.cli.commands import build_parser
-from isc_core.decompose import Settings
-from isc_core.decompose.settings import LightPrior, ShapePrior, renamed_value
+from isc_core.decomposition import Settings
+from isc_core.decomposition.settings import LightPrior, ShapePrior, renamed_value
 from isc_core.errors import InputError
 
 

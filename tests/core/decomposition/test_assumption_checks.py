@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose import assumption_checks
-from isc_core.decompose.assumption_checks import (
+from isc_core.decomposition import assumption_checks
+from isc_core.decomposition.assumption_checks import (
     check_photo,
     check_scene,
     share_in_blocks,
     with_warnings,
 )
-from isc_core.decompose.models import SceneEstimate
+from isc_core.decomposition.models import SceneEstimate
 from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
 from isc_core.photo import Photo, PhotoSource
 from isc_core.result_files.diagnostics_text import warning_text

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose.mbp import split_reflectance
-from isc_core.decompose.pipeline import KnownInputs, Settings, decompose
+from isc_core.decomposition.mbp import split_reflectance
+from isc_core.decomposition.pipeline import KnownInputs, Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor

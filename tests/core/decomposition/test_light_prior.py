@@ -5,7 +5,7 @@ photos.
 import numpy as np
 import pytest
 
-from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose.light_colour import under_light
-from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings
-from isc_core.decompose.pipeline import decompose
+from isc_core.decomposition.light_colour import under_light
+from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
+from isc_core.decomposition.pipeline import decompose
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.photo import Photo, PhotoSource

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.decompose.pipeline import KnownInputs, Settings, decompose
+from isc_core.decomposition.pipeline import KnownInputs, Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
