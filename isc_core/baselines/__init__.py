@@ -1,14 +1,26 @@
 """Simple decompositions to compare SIRFS with: one method a file, and `estimate`, which selects
-one by name.
+one by name and imports it.
 """
 
-import numpy as np
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from . import ikeuchi_horn_1981, naive, retinex, tsai_shah_1994
-from .estimate import BaselineEstimate
 
-METHODS = ("naive", "retinex", "sfs-tsai-shah", "sfs-ikeuchi-horn")
+if TYPE_CHECKING:
+    import numpy as np
+
+    from .from_shading import BaselineEstimate
+
+_MODULES = {
+    "naive": ".naive",
+    "retinex": ".retinex",
+    "sfs-tsai-shah": ".tsai_shah_1994",
+    "sfs-ikeuchi-horn": ".ikeuchi_horn_1981",
+}
+METHODS = tuple(_MODULES)
 
 
 def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
@@ -31,13 +43,7 @@ def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEs
     InputError
         For an unknown method, and for arrays that do not fit.
     """
-    match method:
-        case "naive":
-            return naive.estimate(log_image, mask)
-        case "retinex":
-            return retinex.estimate(log_image, mask)
-        case "sfs-tsai-shah":
-            return tsai_shah_1994.estimate(log_image, mask)
-        case "sfs-ikeuchi-horn":
-            return ikeuchi_horn_1981.estimate(log_image, mask)
-    raise InputError(f"unknown model {method!r}: choose one of {', '.join(METHODS)}")
+    if method not in METHODS:
+        raise InputError(f"unknown model {method!r}: choose one of {', '.join(METHODS)}")
+    found: BaselineEstimate = import_module(_MODULES[method], __package__).estimate(log_image, mask)
+    return found

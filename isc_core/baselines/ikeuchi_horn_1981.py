@@ -27,7 +27,7 @@ from scipy import ndimage
 
 from ..shading.occluding_contour import occluding_contour
 from .box import Box
-from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
+from .from_shading import BaselineEstimate, from_log_shading, grey_log_shading
 from .poisson import integrate
 
 _AROUND = np.array([[1.0, 4.0, 1.0], [4.0, 0.0, 4.0], [1.0, 4.0, 1.0]]) / 20

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from .estimate import BaselineEstimate, check_log_image
+from .from_shading import BaselineEstimate, check_log_image
 
 
 def estimate(log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:

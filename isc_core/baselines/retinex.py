@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .box import Box
-from .estimate import BaselineEstimate, check_log_image, from_log_shading
+from .from_shading import BaselineEstimate, check_log_image, from_log_shading
 from .ikeuchi_horn_1981 import IkeuchiHorn1981Options, height_from_brightness
 from .poisson import integrate
 

@@ -23,7 +23,7 @@ import numpy as np
 from scipy import ndimage
 
 from .box import Box
-from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
+from .from_shading import BaselineEstimate, from_log_shading, grey_log_shading
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,7 @@ import numpy as np
 from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..io.decoders.raster import Raster, as_rgb
-
-TRANSFERS = ("auto", "srgb", "linear")
+from .names import TRANSFERS
 
 
 def resolve_transfer(transfer: str, raster: Raster) -> str:

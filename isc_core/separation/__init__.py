@@ -9,18 +9,21 @@ public toolbox of that name behaves, from which most published comparisons come.
 To add a method, write its module here (or in `published`) and add its name to `METHODS`.
 """
 
+from __future__ import annotations
+
 import dataclasses
 import importlib
 from collections.abc import Mapping
 from types import ModuleType
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from ..errors import InputError
-from ..imaging.bounding_box import mask_slices
-from ..progress import Monitor
-from ..scene.decomposition import Separation
-from .support.checks import check_arrays
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from ..progress import Monitor
+    from ..scene.decomposition import Separation
 
 PUBLISHED = (
     "tan_2005",
@@ -88,6 +91,10 @@ def separate(
     Cancelled
         If the user cancels.
     """
+    from ..imaging.bounding_box import mask_slices
+    from ..scene.decomposition import Separation
+    from .support.checks import check_arrays
+
     options = method_options(method, variant, changes)
     check_arrays(image, mask, clipped)
     if prior is not None and (method != BEST or prior.shape != mask.shape):
@@ -95,7 +102,7 @@ def separate(
             f"only the method {BEST} takes a prior, and it must have the photo's size {mask.shape}"
         )
     toolbox = variant == _TOOLBOX
-    box = np.s_[:, :] if toolbox else mask_slices(mask)
+    box = (slice(None), slice(None)) if toolbox else mask_slices(mask)
     cropped = image[box], mask[box], None if clipped is None or toolbox else clipped[box]
     if options is None:
         split = _module(method).separate(cropped[0], cropped[1], clipped=cropped[2])
@@ -177,6 +184,8 @@ def _module(method: str) -> ModuleType:
 
 
 def _uncrop(layer: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:
+    import numpy as np
+
     full = np.zeros((*shape, *layer.shape[2:]), layer.dtype)
     full[box] = layer
     return full
