@@ -1,0 +1,48 @@
+"""What to type to install an optional dependency that is missing.
+
+Problem: the distribution is on no package index, so `pip install 'isc3d[batch]'` fails. The
+metadata of the installed distribution, whether it came from a wheel or a clone, list what each
+extra requires. The command names these packages themselves.
+
+Limits: markers of a requirement (version of Python, platform) are left out: pip reports a package
+that has no build for this Python.
+"""
+
+import re
+import shlex
+
+_DISTRIBUTION = "isc3d"
+
+
+def install_command(extra: str) -> str:
+    """Return the command that installs what an extra requires.
+
+    Parameters
+    ----------
+    extra : str
+        Name of an extra of this distribution, such as "batch".
+
+    Returns
+    -------
+    str
+        A shell command with the requirements of the extra. Without metadata (a clone that is not
+        installed, an add-on inside Blender): the command for the folder of the source.
+    """
+    requirements = _requirements(extra) or [f".[{extra}]"]
+    return shlex.join(["pip", "install", *requirements])
+
+
+def _requirements(extra: str) -> list[str]:
+    # Slow to import, and used only for error messages.
+    from importlib.metadata import PackageNotFoundError, requires
+
+    try:
+        listed = requires(_DISTRIBUTION) or []
+    except PackageNotFoundError:
+        return []
+    split = (text.partition(";") for text in listed)
+    return [
+        requirement.strip()
+        for requirement, _, marker in split
+        if re.search(rf"""\bextra\s*==\s*["']{re.escape(extra)}["']""", marker)
+    ]
