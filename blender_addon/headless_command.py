@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from isc_core.cli.interface.terminal import Interrupts, ProgressBar, printable
 from isc_core.errors import Cancelled, InputError
+from isc_core.extras import install_command
 
 DONE, INVALID_INPUT, CANCELLED = 0, 2, 130
 
@@ -64,7 +65,8 @@ def _require_blender() -> None:
         import bpy  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"Blender or its Python module is missing ({error}): pip install 'isc3d[blender]'"
+            f"Blender or its Python module is missing ({error}): install the module with "
+            f"`{install_command('blender')}`"
         ) from error
 
 

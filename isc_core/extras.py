@@ -1,6 +1,6 @@
 """What to type to install an optional dependency that is missing.
 
-Problem: the distribution is on no package index, so `pip install 'isc3d[batch]'` fails. The
+Problem: the distribution is on no package index, so pip cannot install its extras by name. The
 metadata of the installed distribution, whether it came from a wheel or a clone, list what each
 extra requires. The command names these packages themselves.
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from isc_core.cli.interface.options import Commands, add_command, add_output_options, count, hints
 from isc_core.errors import InputError
+from isc_core.extras import install_command
 from isc_core.progress import Monitor
 
 if TYPE_CHECKING:
@@ -251,7 +252,7 @@ def _require_libraries() -> None:
     """Check for the drawing library and the nine images; Mitsuba is checked where it renders."""
     if missing := [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]:
         raise InputError(
-            f"isc thesis needs {' and '.join(missing)}; install with `pip install 'isc3d[thesis]'`"
+            f"isc thesis needs {' and '.join(missing)}: install with `{install_command('thesis')}`"
         )
 
 

@@ -19,6 +19,7 @@ LIGHT_MODULES = frozenset(
     {
         "isc_core.cli.interface.terminal",
         "isc_core.errors",
+        "isc_core.extras",
         "isc_core.imaging.srgb",
         "isc_core.io.atomic",
         "isc_core.io.json_files",

@@ -27,6 +27,7 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from ..errors import InputError
+from ..extras import install_command
 from .item import FAILED, ImageJob, ImageOutcome
 from .work import process
 
@@ -89,7 +90,7 @@ def require_dask() -> None:
         import dask.distributed  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"isc batch needs Dask ({error}): install it with `pip install 'isc3d[batch]'`"
+            f"isc batch needs Dask ({error}): install it with `{install_command('batch')}`"
         ) from error
 
 

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import InputError
+from ..extras import install_command
 from ..io.limits import Limits
 
 _BLOCK = 1 << 20
@@ -41,7 +42,7 @@ def fsspec_module() -> ModuleType:
         import fsspec
     except ImportError as error:
         raise InputError(
-            f"URLs need fsspec ({error}): install it with `pip install 'isc3d[batch]'`"
+            f"URLs need fsspec ({error}): install it with `{install_command('batch')}`"
         ) from error
     return fsspec  # type: ignore[no-any-return]
 

@@ -11,9 +11,9 @@ doi:10.1145/3528223.3530099.
 from types import ModuleType
 
 from isc_core.errors import InputError
+from isc_core.extras import install_command
 
 OLDEST_LLVM = 19
-_MISSING = "rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`"
 
 
 def llvm_is_usable(major: int) -> bool:
@@ -43,7 +43,7 @@ def newest_llvm() -> int:
     try:
         import drjit
     except ImportError as error:
-        raise InputError(_MISSING) from error
+        raise _missing() from error
     return int(drjit.detail.llvm_version()[0])
 
 
@@ -63,7 +63,7 @@ def load_mitsuba() -> ModuleType:
     try:
         import mitsuba
     except ImportError as error:
-        raise InputError(_MISSING) from error
+        raise _missing() from error
     if mitsuba.variant() is None:
         fast = "llvm_ad_rgb" in mitsuba.variants() and llvm_is_usable(newest_llvm())
         mitsuba.set_variant("llvm_ad_rgb" if fast else "scalar_rgb")
@@ -98,3 +98,7 @@ def slower_without() -> str:
         f"{what}, so rendering is slower (scalar_rgb): install libLLVM {OLDEST_LLVM} or later "
         "(Debian: apt-get install libllvm19)"
     )
+
+
+def _missing() -> InputError:
+    return InputError(f"rendering needs Mitsuba: install it with `{install_command('synth')}`")

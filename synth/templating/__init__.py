@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from isc_core.errors import InputError
+from isc_core.extras import install_command
 
 if TYPE_CHECKING:
     from jinja2 import Environment
-
-_MISSING = "writing reports needs Jinja2: install it with `pip install 'isc3d[synth]'`"
 
 
 def render(module: str, template: str, **values: object) -> str:
@@ -43,7 +42,9 @@ def _environment(folder: Path) -> "Environment":
     try:
         from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
     except ImportError as error:
-        raise InputError(_MISSING) from error
+        raise InputError(
+            f"writing reports needs Jinja2: install it with `{install_command('synth')}`"
+        ) from error
     return Environment(
         loader=FileSystemLoader(folder),
         autoescape=select_autoescape(enabled_extensions=("html.j2",)),

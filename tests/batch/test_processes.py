@@ -106,7 +106,7 @@ def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) ->
     """Found before any worker starts."""
     without = "import sys; sys.modules['dask'] = None"
     for words, before, told in (
-        ((photos,), without, "pip install 'isc3d[batch]'"),
+        ((photos,), without, "pip install 'dask[distributed]>="),
         ((tmp_path / "none.csv",), "", "none.csv: cannot be read"),
         ((photos, "--model", "nosuch"), "", 'unknown model "nosuch"'),
         ((photos, "--timeout", "-1"), "", "is not above 0"),

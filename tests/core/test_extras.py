@@ -1,5 +1,6 @@
 """The command that an error message gives for a missing optional dependency."""
 
+import re
 import shlex
 import tomllib
 from importlib import metadata
@@ -37,6 +38,21 @@ def test_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(metadata, "requires", missing)
     assert install_command("batch") == "pip install '.[batch]'"
+
+
+def test_no_file_advises_to_install_isc3d_from_an_index() -> None:
+    # A message, or a page that shows one.
+    files = [
+        path
+        for folder in ("isc_core", "synth", "blender_addon", "training", "benchmarks", "docs")
+        for suffix in ("py", "md", "j2", "html")
+        for path in (ROOT / folder).rglob(f"*.{suffix}")
+    ]
+    assert [
+        path.relative_to(ROOT).as_posix()
+        for path in files
+        if re.search(r"""pip install [`'"]*isc3d""", path.read_text(encoding="utf-8"))
+    ] == []
 
 
 def test_markers_of_a_requirement_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:

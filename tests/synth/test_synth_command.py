@@ -11,6 +11,7 @@ import pytest
 
 from isc_core.cli import commands
 from isc_core.cli.main import main
+from isc_core.extras import install_command
 from isc_core.io.exr import write_channels
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,7 +66,7 @@ def test_help_needs_no_mitsuba_and_running_prints_what_to_install(tmp_path: Path
     assert refused.returncode == 2
     assert (
         refused.stderr
-        == "isc: error: rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`\n"
+        == f"isc: error: rendering needs Mitsuba: install it with `{install_command('synth')}`\n"
     )
     assert not (tmp_path / "set").exists()
 

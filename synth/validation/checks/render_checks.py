@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.extras import install_command
 from isc_core.progress import Monitor
 
 from ...capture.recipe import FamilyMember, PictureSettings, Recipe, build
@@ -102,7 +103,7 @@ def check_dataset(
         return tuple(checks), ("no scene was rendered again",)
     if find_spec("mitsuba") is None:
         return tuple(checks), (
-            "no scene was rendered again: install Mitsuba with `pip install 'isc3d[synth]'`",
+            f"no scene was rendered again: install Mitsuba with `{install_command('synth')}`",
         )
     chosen = [folder for folder in folders if not needs_files(folder)]
     order = np.random.default_rng(seed).permutation(len(chosen))[:renders]

@@ -301,9 +301,9 @@ def test_missing_libraries_are_named_with_the_remedy(
     tmp_path: Path, refused: Refusal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setitem(sys.modules, "mitsuba", None)
-    assert "isc3d[" in refused("figure", "1.4", "--quick", "-o", tmp_path / "out")
+    assert "pip install 'mitsuba>=" in refused("figure", "1.4", "--quick", "-o", tmp_path / "out")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
-    assert "needs matplotlib; install" in refused("list")
+    assert "needs matplotlib: install with `pip install 'matplotlib>=" in refused("list")
 
 
 def test_the_other_commands_need_no_matplotlib() -> None:
