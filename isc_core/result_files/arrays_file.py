@@ -116,7 +116,7 @@ def _mesh(built: MeshResult) -> dict[str, np.ndarray]:
         "vertices": mesh.vertices,
         "faces": mesh.faces,
         "vertex_normals": mesh.vertex_normals,
-        "uv": mesh.visual.uv,
+        "uv": mesh.uv,
         "vertex_pixel": built.vertex_pixel,
         "base_color": built.base_color,
         "normal_map": (built.detail + 1) / 2,

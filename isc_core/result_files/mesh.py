@@ -39,14 +39,15 @@ from math import ceil, log, pi, sqrt
 from typing import Any
 
 import numpy as np
-import trimesh
 from PIL import Image
 from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
+from .glb import TexturedMesh, encode_glb
 
+_SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
 _MIN_NORMAL_Z = (
     1e-3  # smallest z of a vertex normal: it faces the viewer, and its tangent is defined
@@ -88,7 +89,7 @@ class MeshResult:
 
     Attributes
     ----------
-    mesh : trimesh.Trimesh
+    mesh : TexturedMesh
         In metres, +Y up, facing +Z.
     reflectance_scale : float
         k: base colour = k * reflectance.
@@ -108,7 +109,7 @@ class MeshResult:
     gloss : SpecularFit
     """
 
-    mesh: trimesh.Trimesh
+    mesh: TexturedMesh
     reflectance_scale: float
     metres_per_pixel: float
     origin: tuple[float, float, float]
@@ -145,31 +146,34 @@ class MeshResult:
 
     def glb(self) -> bytes:
         """Return the content of a `.glb` file; equal meshes give equal bytes."""
-        scene = trimesh.Scene()
-        scene.add_geometry(self.mesh, node_name="object", geom_name="object")
-        return bytes(
-            scene.export(
-                file_type="glb", include_normals=True, buffer_postprocessor=self._add_specular
-            )
-        )
+        extension, pictures = self._specular_extension(first_texture=2)
+        material = {
+            "name": "recovered",
+            "pbrMetallicRoughness": {
+                "baseColorTexture": {"index": 0},
+                "metallicFactor": self.options.metallic,
+                "roughnessFactor": _roughness(self.options, self.gloss),
+            },
+            "normalTexture": {"index": 1},
+            # The mesh is open at the back, and should stay visible from behind.
+            "doubleSided": True,
+            "extensions": {_SPECULAR: extension},
+        }
+        textures = [_png(_color_codes(self.base_color)), _png(_vector_codes(self.detail))]
+        return encode_glb(self.mesh, material, textures + pictures)
 
-    def _add_specular(self, buffers: dict[str, bytes], tree: dict[str, Any]) -> None:
-        """Add KHR_materials_specular to the glTF tree and its texture to the buffers; trimesh lacks
-        the extension.
-        """
+    def _specular_extension(self, first_texture: int) -> tuple[dict[str, Any], list[bytes]]:
+        """KHR_materials_specular of the material, and the texture that it refers to, if any."""
         variation = self.gloss.variation
         largest = 1.0 if variation is None else float(variation.max())
         level = self.specular * largest
         extension: dict[str, Any] = {"specularFactor": min(level, 1.0)}
         if level > 1:
             extension["specularColorFactor"] = [level] * 3
-        if variation is not None:
-            extension["specularTexture"] = {"index": len(tree["textures"])}
-            tree["textures"].append({"source": len(tree["images"])})
-            tree["images"].append({"bufferView": len(buffers), "mimeType": "image/png"})
-            buffers["specular"] = _alpha_png(variation / largest)
-        tree["materials"][0]["extensions"] = {"KHR_materials_specular": extension}
-        tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), "KHR_materials_specular"]
+        if variation is None:
+            return extension, []
+        extension["specularTexture"] = {"index": first_texture}
+        return extension, [_png(_alpha_codes(variation / largest))]
 
     def describe(self) -> dict[str, Any]:
         """Return what a reader needs beside the file, ready for JSON."""
@@ -242,14 +246,11 @@ def build_mesh(
     )
     detail = _detail_normals(normal, mask, smooth, cells, stride)
     color, k = base_color(reflectance, mask, options.bleed)
-    visual = trimesh.visual.TextureVisuals(
-        # In trimesh v starts at the bottom of the texture and is flipped on export.
-        uv=np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
-        material=_material(color, detail, options, gloss),
-    )
-    normals = smooth.reshape(-1, 3)[used].astype(np.float64)
-    mesh = trimesh.Trimesh(
-        (pixels - middle) * size, faces, vertex_normals=normals, visual=visual, process=False
+    mesh = TexturedMesh(
+        (pixels - middle) * size,
+        faces,
+        smooth.reshape(-1, 3)[used].astype(np.float64),
+        np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
     )
     origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
     return MeshResult(
@@ -448,12 +449,25 @@ def _detail_normals(
     return np.where((covered & mask)[..., None], local, flat)
 
 
-def _color_picture(linear: np.ndarray) -> Image.Image:
-    return Image.fromarray(np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8))
+def _color_codes(linear: np.ndarray) -> np.ndarray:
+    return np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
 
 
-def _vector_picture(vectors: np.ndarray) -> Image.Image:
-    return Image.fromarray(np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8))
+def _vector_codes(vectors: np.ndarray) -> np.ndarray:
+    return np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8)
+
+
+def _alpha_codes(values: np.ndarray) -> np.ndarray:
+    """(H, W) in [0, 1] as the alpha of white pixels, (H, W, 4)."""
+    pixels = np.full((*values.shape, 4), 255, np.uint8)
+    pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
+    return pixels
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="png")
+    return stream.getvalue()
 
 
 def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.ndarray:
@@ -482,27 +496,3 @@ def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.n
 
 def _roughness(options: MeshOptions, gloss: SpecularFit) -> float:
     return options.roughness if gloss.roughness is None else gloss.roughness
-
-
-def _alpha_png(values: np.ndarray) -> bytes:
-    """(H, W) in [0, 1] as the alpha of a white PNG, padded to a multiple of 4 bytes, the
-    alignment of buffers.
-    """
-    pixels = np.full((*values.shape, 4), 255, np.uint8)
-    pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
-    stream = io.BytesIO()
-    Image.fromarray(pixels).save(stream, format="png")
-    return stream.getvalue() + bytes(-len(stream.getvalue()) % 4)
-
-
-def _material(
-    color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: SpecularFit
-) -> trimesh.visual.material.PBRMaterial:
-    return trimesh.visual.material.PBRMaterial(
-        name="recovered",
-        baseColorTexture=_color_picture(color),
-        normalTexture=_vector_picture(detail),
-        metallicFactor=options.metallic,
-        roughnessFactor=_roughness(options, gloss),
-        doubleSided=True,  # the mesh is open at the back, and should stay visible from behind
-    )
