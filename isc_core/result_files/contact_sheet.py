@@ -12,6 +12,7 @@ light as a white sphere.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -325,13 +326,13 @@ class _Frame:
         box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
         return cls(mask, box, _PANEL * (1 - 2 * _MARGIN) / max(box[1] - box[0], box[3] - box[2]))
 
-    @property
+    @cached_property
     def coverage(self) -> np.ndarray:
         """Coverage of each pixel of the panel, (N, N), by the object; the outline of a small object
         is smoothed.
         """
         zoom = max(1.0, self.zoom)
-        soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
+        soft = Image.fromarray(np.rint(255 * self._weight).astype(np.uint8))
         if zoom > 1:
             soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
         return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
@@ -342,12 +343,16 @@ class _Frame:
         """
         if values.ndim == 3:
             return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
-        weight = self._resized(self.mask)
+        weight = self._weight
         return np.where(
             weight > 1e-3,
             self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
             0,
         )
+
+    @cached_property
+    def _weight(self) -> np.ndarray:
+        return self._resized(self.mask)
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
         first_row, end_row, first_column, end_column = self.box
@@ -465,10 +470,11 @@ def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> 
     draw = ImageDraw.Draw(sheet)
     _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
     _write(draw, (_EDGE, 80), subtitle, 16, _FAINT, width - 2 * _EDGE)
+    card = _rounded()
     for index, panel in enumerate(panels):
         row, column = divmod(index, columns)
         x, y = _EDGE + column * (_PANEL + _GAP), _HEAD + row * (_PANEL + _LABEL + _GAP)
-        sheet.paste(_picture(panel), (x, y), _rounded())
+        sheet.paste(_picture(panel), (x, y), card)
         end = _write(draw, (x + 2, y + _PANEL + 27), panel.label, 18, _TEXT, _PANEL)
         _write(
             draw,
@@ -504,10 +510,16 @@ def _write(
 
 def _picture(panel: Panel) -> Image.Image:
     """The panel on its card, blended in linear light."""
-    card = srgb_to_linear(np.array(_CARD) / 255.0)
-    alpha = panel.coverage[..., None]
-    linear = alpha * np.clip(panel.color, 0, 1) + (1 - alpha) * card
-    return Image.fromarray(np.rint(255 * linear_to_srgb(linear)).astype(np.uint8))
+    covered = np.flatnonzero(panel.coverage)  # all around is the card alone
+    alpha = panel.coverage.ravel()[covered]
+    planes = []
+    for channel, card in enumerate(_CARD):
+        color = np.clip(panel.color[..., channel].ravel()[covered], 0, 1)
+        linear = alpha * color + (1 - alpha) * srgb_to_linear(card / 255.0)
+        plane = np.full(panel.coverage.shape, card, np.uint8)
+        plane.ravel()[covered] = np.rint(255 * linear_to_srgb(linear))
+        planes.append(plane)
+    return Image.fromarray(np.stack(planes, -1))
 
 
 def _rounded() -> Image.Image:
