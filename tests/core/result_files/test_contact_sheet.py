@@ -112,7 +112,7 @@ def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:
     """A white object on its card: from the inside out the tone falls once and never below the
     card's.
     """
-    white = np.where(scene.mask[..., None], 0.8, 0.0)
+    white = np.where(scene.mask[..., None], np.full(3, 0.8), 0.0)
     row = panels(contact_sheet(replace(scene, reflectance=white)))["reflectance"][160, 160:, 1]
     assert (np.diff(row) < 1e-6).all()
     assert row[0] == pytest.approx(0.95, abs=0.01)
