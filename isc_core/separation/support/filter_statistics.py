@@ -157,7 +157,7 @@ def _read(data: bytes, name: str) -> FilterTable:
     except (ValueError, KeyError) as error:
         raise InputError(
             f"{name} is not a table of filter statistics: fit one with "
-            "benchmarks.separation.filter_statistics"
+            "`python -m benchmarks.separation.filter_statistics`"
         ) from error
     shape = (len(FILTERS), BINS)
     fit = (
@@ -172,7 +172,7 @@ def _read(data: bytes, name: str) -> FilterTable:
     ):
         raise InputError(
             f"{name} does not match the filters of this version: refit it with "
-            "benchmarks.separation.filter_statistics"
+            "`python -m benchmarks.separation.filter_statistics`"
         )
     return FilterTable(spread, without, highlight, float(temperature))
 
