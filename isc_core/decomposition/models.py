@@ -8,6 +8,7 @@ predicted light and normals (`networks.light_network`, `networks.normal_network`
 `assumption_checks` lowers the confidence of photos that violate what the models assume.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,16 +19,9 @@ from ..networks.normal_network import predict_normals
 from ..scene.light_estimate import LightEstimate
 from ..scene.normal_estimate import NormalEstimate
 from .assumption_checks import with_warnings
-from .baseline import baseline
-from .joint import joint
 from .light_colour import under_light
-from .mbp import mbp
-from .mdr import mdr
 from .settings import SEPARATING_MODELS, SIRFS_MODELS, Settings
-from .sirfs_only import sirfs
 from .task import DecompositionTask, SceneEstimate, SolveOptions
-
-_SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 
 
 def solve(task: DecompositionTask) -> SceneEstimate:
@@ -52,7 +46,7 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     Cancelled
         If the monitor cancels.
     """
-    solver = _SOLVERS.get(task.settings.model, baseline)
+    solver = _solver(task.settings.model)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
     light_estimate = _light_estimate(task)
@@ -63,6 +57,31 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     if light_estimate is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, light_estimate)
+
+
+def _solver(model: str) -> Callable[[DecompositionTask], SceneEstimate]:
+    """The function of a model; only its module is imported."""
+    match model:
+        case "joint":
+            from .joint import joint
+
+            return joint
+        case "mdr":
+            from .mdr import mdr
+
+            return mdr
+        case "mbp":
+            from .mbp import mbp
+
+            return mbp
+        case "sirfs":
+            from .sirfs_only import sirfs
+
+            return sirfs
+        case _:
+            from .baseline import baseline
+
+            return baseline
 
 
 def _light_estimate(task: DecompositionTask) -> LightEstimate | None:

@@ -5,7 +5,7 @@ maps that satisfy the identities.
 """
 
 import platform
-from importlib import metadata
+import sys
 
 import numpy as np
 
@@ -217,11 +217,23 @@ def _settings_json(settings: Settings) -> dict[str, object]:
 def _versions() -> dict[str, str]:
     versions = {"isc": __version__, "python": platform.python_version()}
     for package in _PACKAGES:
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            continue
+        version = _version(package)
+        if version is not None:
+            versions[package] = version
     return versions
+
+
+def _version(package: str) -> str | None:
+    """The version of a package; None if it is not installed. A loaded one need not be looked up."""
+    loaded = sys.modules.get(package)
+    if loaded is not None:
+        return str(loaded.__version__)
+    from importlib import metadata
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def _input_json(photo: Photo, name: str) -> dict[str, object]:

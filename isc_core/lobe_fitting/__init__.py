@@ -10,9 +10,29 @@ estimate of the shape-from-shading baselines, from the gradients of a photo with
 they share is `starts.light_of_half_vector`.
 """
 
-from ..scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeFitOutcome, LobeLight
-from .fit import fit_lobe
-from .observed import GivenLight, PixelData, RecoveredScene
+from typing import TYPE_CHECKING
+
+from ..lazy import exports
+
+if TYPE_CHECKING:
+    from ..scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeFitOutcome, LobeLight
+    from .fit import fit_lobe
+    from .observed import GivenLight, PixelData, RecoveredScene
+else:
+    __getattr__ = exports(
+        __name__,
+        {
+            "GivenLight": ".observed",
+            "Interval": "..scene.lobe_fit",
+            "LobeFit": "..scene.lobe_fit",
+            "LobeFitOptions": "..scene.lobe_fit",
+            "LobeFitOutcome": "..scene.lobe_fit",
+            "LobeLight": "..scene.lobe_fit",
+            "PixelData": ".observed",
+            "RecoveredScene": ".observed",
+            "fit_lobe": ".fit",
+        },
+    )
 
 __all__ = [
     "GivenLight",

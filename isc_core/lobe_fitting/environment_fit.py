@@ -14,7 +14,6 @@ undetermined.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from ..errors import InputError
 from ..scene.lobe_fit import (
@@ -78,6 +77,8 @@ def fit_under(
     InputError
         If the environment map is unusable.
     """
+    from scipy.optimize import minimize_scalar
+
     specular, normal, mask = seen.specular, seen.normal, seen.mask
     environment = _checked(radiance)
     convention = CONVENTION[options.model]

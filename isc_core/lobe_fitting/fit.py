@@ -21,7 +21,6 @@ shadows cast on the highlight.
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import nnls
 
 from ..errors import InputError
 from ..progress import Monitor
@@ -34,7 +33,6 @@ from ..scene.lobe_fit import (
     LobeLight,
 )
 from ..shading.brdf.directions import unit
-from .environment_fit import fit_under
 from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, predicted
 from .observed import GivenLight, Observed, PixelData, RecoveredScene, observe
 from .pixels import Pixels, choose_pixels
@@ -120,6 +118,8 @@ def fit_lobe(
     most = options.most_pixels if known is None else min(options.most_pixels, _PIXELS_UNDER_MAP)
     chosen = choose_pixels(observed, (options.floor, options.relative), most)
     if known is not None:
+        from .environment_fit import fit_under
+
         return fit_under(np.asarray(known, float), observed, chosen, options)
     if recovered is not None:
         shading = _checked_shading(recovered.shading, observed)
@@ -356,6 +356,8 @@ def _coloured(
     """The predicted image, the gains (K, 3) of each light's channels, its shape kept, and the share
     explained.
     """
+    from scipy.optimize import nnls
+
     pixels, lamps = problem.pixels, fitted.lamps
     shapes = contributions(problem.model, lamps, pixels.normal, pixels.place)
     root = np.sqrt(fitted.weight) / pixels.sigma

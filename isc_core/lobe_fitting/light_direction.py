@@ -26,7 +26,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
 
 from ..imaging.luminance import luminance, white_of
 from ..scene.decomposition import Decomposition
@@ -133,6 +132,8 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
     explained : float
         Share of the shading that it explains, in [0, 1].
     """
+    from scipy.optimize import nnls
+
     samples = _samples(d, d.shading)
     facing = np.maximum(samples.normal @ direction, 0)
     design = np.stack([facing, np.ones_like(facing)], 1)
@@ -279,6 +280,8 @@ def _refined(
     """Robust least squares over the direction and the other parameters, from a start: light (3,),
     parameters, cone in degrees.
     """
+    from scipy.optimize import least_squares
+
     bounds = (
         np.concatenate([[-1.0, -1.0], low]),
         np.concatenate([[1.0, 1.0], np.broadcast_to(high, rest.shape)]),

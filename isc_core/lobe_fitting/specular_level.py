@@ -28,7 +28,6 @@ from enum import StrEnum
 
 import numpy as np
 from scipy import ndimage
-from scipy.optimize import nnls
 
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
@@ -157,6 +156,8 @@ def specular_variation(d: Decomposition) -> np.ndarray | None:
 def _level(d: Decomposition, fit: LobeFit) -> float | None:
     if fit.direction is None or fit.strength_light is None:
         return None
+    from scipy.optimize import nnls
+
     facing = np.maximum(d.normal[d.mask].astype(float) @ fit.direction, 0)
     shading = d.shading[d.mask].mean(-1, dtype=float)
     lamp, _ = nnls(np.stack([facing, np.ones_like(facing)], 1), shading)[0]

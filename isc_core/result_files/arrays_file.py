@@ -43,10 +43,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..lobe_fitting.light_direction import explain_shading
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from ..shading.environment_map import environment_from_shading
 from .mesh import MeshResult, build_mesh
 
 ARRAYS = "arrays.npz"
@@ -127,6 +125,9 @@ def _mesh(built: MeshResult) -> dict[str, np.ndarray]:
 
 
 def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    from ..lobe_fitting.light_direction import explain_shading
+    from ..shading.environment_map import environment_from_shading
+
     mesh_light, sun = built.illumination(d.illumination), explain_shading(d)
     return {
         "illumination": d.illumination,

@@ -12,7 +12,7 @@ import pytest
 from isc_core.lazy import exports
 
 ROOT = Path(__file__).resolve().parents[2]
-LAZY_PACKAGES = ("isc_core.decomposition", "isc_core.photo")
+LAZY_PACKAGES = ("isc_core.decomposition", "isc_core.lobe_fitting", "isc_core.photo")
 NUMERICAL = ("numpy", "scipy", "numba", "cv2", "OpenEXR", "PIL", "trimesh", "networkx")
 
 

@@ -18,8 +18,6 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
-import scipy.optimize
 
 from ...errors import InputError
 from .priors import LightPrior
@@ -81,8 +79,10 @@ class GaussianLight:
         -------
         (count,) ndarray
         """
+        from scipy.linalg import solve_triangular
+
         factor = np.linalg.cholesky(self.covariance)
-        white = scipy.linalg.solve_triangular(factor, (lights - self.mean).T, lower=True)
+        white = solve_triangular(factor, (lights - self.mean).T, lower=True)
         log_determinant = 2 * np.log(np.diag(factor)).sum()
         return -0.5 * (
             np.sum(white**2, axis=0) + log_determinant + len(self.mean) * np.log(2 * np.pi)
@@ -222,6 +222,8 @@ def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = 
     -------
     Contrast
     """
+    from scipy.optimize import minimize
+
     samples = stacked(lights)
 
     def cost(log_factors: np.ndarray) -> float:
@@ -233,7 +235,7 @@ def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = 
         )
 
     start = np.zeros(2 if split else 1)
-    result = scipy.optimize.minimize(
+    result = minimize(
         cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 1000}
     )
     factors = np.exp(result.x)
