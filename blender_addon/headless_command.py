@@ -12,7 +12,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from isc_core.cli.interface.terminal import Interrupts, ProgressBar, printable
+from isc_core.cli.interface.interrupts import Interrupts
+from isc_core.cli.interface.terminal import ProgressBar, printable
 from isc_core.errors import Cancelled, InputError
 from isc_core.extras import install_command
 

@@ -1,8 +1,44 @@
-"""`python -m isc_core` is the command `isc`."""
+"""Start of the process: `python -m isc_core`, and the script `isc`.
 
+Importing the libraries takes longer than a user takes to press Ctrl-C, and some of them catch the
+exception that it raises. Until `cli.main` takes over, nothing has been written, so Ctrl-C ends the
+process at once. The handler is installed before anything else is imported.
+"""
+
+import os
+import signal
 import sys
+from types import FrameType
 
-from .cli.main import main
+_CANCELLED = 130
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    """End the process as `cli.main` ends a cancelled run."""
+    if "json" in sys.argv or "--progress=json" in sys.argv:
+        os.write(1, b'{"event": "cancelled"}\n')
+    else:
+        os.write(2, b"isc: cancelled\n")
+    os._exit(_CANCELLED)
+
+
+def start() -> int:
+    """Run `isc` with the arguments of the process.
+
+    Returns
+    -------
+    int
+        The exit code.
+    """
+    if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
+        signal.signal(signal.SIGINT, _end)
+    from .cli.main import main
+
+    code = main()
+    # The result is complete: the interpreter's own end cannot be cancelled.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    return code
+
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(start())

@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from isc_core.cli.interface.options import Commands, add_command, add_output_options, count, hints
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count
 from isc_core.errors import InputError
 from isc_core.extras import install_command
 from isc_core.progress import Monitor
@@ -33,21 +34,19 @@ ROOT is a folder with MIT-Berkeley-Laboratory/ (or mit_berkeley_train/), highlig
 Without --data, the project renders all images itself. An interrupted run resumes."""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command and its subcommands to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : Commands
-        Subparsers of `isc`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "thesis",
+    describe(
+        parser,
         _no_subcommand,
-        "regenerate the tables and figures of the thesis",
         _DESCRIPTION,
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     below = parser.add_subparsers(
         title="commands", metavar="list | table N | figure N | all | publish"
@@ -86,7 +85,6 @@ def _output() -> argparse.ArgumentParser:
         metavar="DIR",
         help="output folder (default: %(default)s)",
     )
-    add_output_options(parser)
     return parser
 
 

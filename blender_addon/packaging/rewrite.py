@@ -17,6 +17,7 @@ CORE = "isc_core"
 # Blender's own process.
 LIGHT_MODULES = frozenset(
     {
+        "isc_core.cli.interface.interrupts",
         "isc_core.cli.interface.terminal",
         "isc_core.errors",
         "isc_core.extras",

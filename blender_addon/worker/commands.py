@@ -248,6 +248,7 @@ def _start(
     with contextlib.suppress(OSError):  # without a cache the worker compiles every time
         environment.cache.mkdir(parents=True, exist_ok=True)
     command = [str(environment.python), "-m", "isc_core", *words, "--progress", "json"]
+    command.append("--cancel-at-eof")  # the worker ends with Blender
     try:
         return WorkerProcess(command, Path(_absolute(output)), environment.variables(threads))
     except OSError as error:

@@ -1,20 +1,22 @@
 """The command `isc`: runs a sub-command and maps its end to an exit code and at most one line.
 
-0: done. 1: done, but a measurement violates a bound; stderr names it. 2: an input cannot be used,
-or the machine has no room for it; one line on stderr says what to do. 130: cancelled by Ctrl-C (the
-first lets the work stop at its next step, the second stops it at once). Nothing half-written
-remains in any case. With `--progress json` the output is for a program instead of a person, see
-`interface.json_progress`.
+0: done. 1: done, but a measurement violates a bound, or some of several inputs failed; stderr names
+them. 2: an input cannot be used, or the machine has no room for it; one line on stderr says what to
+do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second stops it at
+once). Nothing half-written remains in any case. With `--progress json` the output is for a program
+instead of a person, see `interface.json_progress`.
 """
 
+import argparse
 import re
 import sys
 from collections.abc import Sequence
 from itertools import pairwise
 
 from ..errors import Cancelled, InputError, Rejected
+from .interface.interrupts import Interrupts
 from .interface.json_progress import JsonReporter
-from .interface.terminal import Interrupts, TerminalReporter, discard_output
+from .interface.terminal import TerminalReporter, Verbosity, discard_output
 
 SUCCESS, BROKEN_PIPE, REJECTED, REFUSED, CANCELLED = 0, 1, 1, 2, 130
 
@@ -37,12 +39,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     argv = list(sys.argv[1:] if arguments is None else arguments)
     # Checked before parsing, so that errors in other options are reported as JSON, too.
     json_progress = "--progress=json" in argv or ("--progress", "json") in pairwise(argv)
-    reporter: _Reporter = JsonReporter(sys.stdout) if json_progress else TerminalReporter()
+    reporter: _Reporter = TerminalReporter()
+    if json_progress:
+        reporter = JsonReporter(sys.stdout, cancel_at_eof="--cancel-at-eof" in argv)
     try:
-        with reporter:
-            output, lines = _run(argv, reporter)
-        reporter.done(output, lines)
-        sys.stdout.flush()
+        # A program that runs in the background passes on that Ctrl-C is ignored, but its line
+        # `cancel` relies on it.
+        with Interrupts(even_if_ignored=json_progress) as interrupts:
+            with reporter:
+                output, lines = _run(argv, reporter, interrupts)
+            interrupts.finish()
+            reporter.done(output, lines)
+            sys.stdout.flush()
         return SUCCESS
     except InputError as error:
         return _report_failure(reporter, str(error))
@@ -65,19 +73,34 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _report_failure(reporter, f"{location}{error.strerror or error}")
 
 
-def _run(arguments: list[str], reporter: _Reporter) -> tuple[str, list[str]]:
+def _run(
+    arguments: list[str], reporter: _Reporter, interrupts: Interrupts
+) -> tuple[str, list[str]]:
     """The path of the result, and the lines to print."""
-    # Numerical libraries take a second to load: inside `main`, where Ctrl-C works meanwhile.
+    # The parser imports what the command needs: inside `main`, where Ctrl-C works meanwhile.
     from .commands import build_parser
+    from .config import apply_config
 
+    parser = build_parser(arguments)
+    config = apply_config(parser, arguments)
     try:
-        options = build_parser().parse_args(arguments)
+        options = parser.parse_args(arguments)
     except SystemExit:  # --help and --version
         return "", []
-    with Interrupts() as interrupts, reporter.progress(options.quiet) as progress:
+    interrupts.check()
+    verbosity = _verbosity(options)
+    if verbosity is Verbosity.VERBOSE and config is not None:
+        print(f"isc: defaults of options from {config}", file=sys.stderr)
+    with reporter.progress(verbosity) as progress:
         lines = options.run(options, interrupts.monitor(progress))
     written = getattr(options, "output", None) or getattr(options, "result", None)
     return "" if written is None else str(written), lines
+
+
+def _verbosity(options: argparse.Namespace) -> Verbosity:
+    if options.quiet:
+        return Verbosity.QUIET
+    return Verbosity.VERBOSE if options.verbose else Verbosity.NORMAL
 
 
 def _report_failure(reporter: _Reporter, message: str) -> int:

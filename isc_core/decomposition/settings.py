@@ -12,6 +12,17 @@ SEPARATING_MODELS = ("mdr", "mbp", "joint")
 WEIGHTING_MODELS = ("mdr", "joint")
 BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
+# One line for the help of the commands.
+MODEL_SUMMARIES = {
+    "joint": "highlights, shape and light explain the photo together (default)",
+    "mdr": "modified dichromatic: highlights removed first, then SIRFS (Akbar 2016)",
+    "mbp": "modified Blinn-Phong: SIRFS first, highlights taken from its reflectance (Akbar 2016)",
+    "sirfs": "shape, light and reflectance of a photo without highlights (Barron and Malik 2015)",
+    "naive": "a flat shape, the image as its own reflectance",
+    "retinex": "colour Retinex, then shape from its shading (Grosse et al. 2009)",
+    "sfs-tsai-shah": "linear shape from shading (Tsai and Shah 1994)",
+    "sfs-ikeuchi-horn": "variational shape from shading (Ikeuchi and Horn 1981)",
+}
 
 
 class Illumination(StrEnum):

@@ -31,6 +31,7 @@ from ..scene.lobe_fit import LobeFit
 from .arrays_file import ARRAYS, write_arrays
 from .contact_sheet import contact_sheet, separation_sheet
 from .diagnostics_json import diagnostics_from_json
+from .layer_pngs import LAYER_PNGS, write_layer_pngs
 from .lobe_json import lobe_fit_from_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 
@@ -58,7 +59,7 @@ DECOMPOSITION_FILES = (
     "preview.png",
     *(f"maps/{name}.exr" for name in SINGLE),
 )
-_RESULT_FILES = (*DECOMPOSITION_FILES, ARRAYS)  # including files written on demand
+_RESULT_FILES = (*DECOMPOSITION_FILES, ARRAYS, *LAYER_PNGS)  # including files written on demand
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
@@ -71,6 +72,7 @@ def save(
     *,
     mesh: MeshOptions | None = None,
     arrays: bool = False,
+    png: bool = False,
     monitor: Monitor | None = None,
 ) -> None:
     """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
@@ -82,6 +84,8 @@ def save(
     mesh : MeshOptions, optional
     arrays : bool
         Write `arrays.npz` too.
+    png : bool
+        Write the layers as PNG files too, see `layer_pngs`.
     monitor : Monitor, optional
 
     Raises
@@ -113,6 +117,8 @@ def save(
         if arrays:
             monitor.report("writing arrays", 0.6)
             write_arrays(d, partial / ARRAYS, built)
+        if png:
+            write_layer_pngs(d, partial)
         monitor.report("drawing the preview", 0.7)
         contact_sheet(decomposition).save(partial / "preview.png")
         text = json.dumps(

@@ -6,7 +6,8 @@ without the dependencies of other methods. Each module has `separate`, a datacla
 guards relative to the object's brightness. "paper" is the method as published, and "sihr" as the
 public toolbox of that name behaves, from which most published comparisons come.
 
-To add a method, write its module here (or in `published`) and add its name to `METHODS`.
+To add a method, write its module here (or in `published`) and add its name and one line to
+`SUMMARIES`.
 """
 
 from __future__ import annotations
@@ -25,24 +26,24 @@ if TYPE_CHECKING:
     from ..progress import Monitor
     from ..scene.decomposition import Separation
 
-PUBLISHED = (
-    "tan_2005",
-    "mallick_2006",
-    "yoon_2006",
-    "shen_2009",
-    "yang_2010",
-    "kim_2013",
-    "shen_2013",
-    "akashi_2016",
-)
-METHODS = (
-    "none",
-    *PUBLISHED,
-    "chaotic_segmentation",
-    "sparse_coding",
-    "network",
-    "isc",
-)
+# One line for the help of the commands.
+SUMMARIES = {
+    "none": "no separation: everything is diffuse",
+    "tan_2005": "derivatives compared with a specular-free image (Tan and Ikeuchi 2005)",
+    "mallick_2006": "erosion of the angle between colour and white (Mallick et al. 2006)",
+    "yoon_2006": "ratios of neighbours in the two-band image (Yoon et al. 2006)",
+    "shen_2009": "one gain for the modified specular-free image (Shen and Cai 2009)",
+    "yang_2010": "smoothing of the largest chromaticity (Yang et al. 2010)",
+    "kim_2013": "dark channel and maximum a posteriori estimation (Kim et al. 2013)",
+    "shen_2013": "intensity ratio of clustered pixels (Shen and Zheng 2013)",
+    "akashi_2016": "sparse non-negative matrix factorisation (Akashi and Okatani 2016)",
+    "chaotic_segmentation": "chaotic multilevel thresholds and inpainting (Akbar 2016)",
+    "sparse_coding": "sparse coding over specular-free images (Akbar 2016)",
+    "network": "the layer network of this project",
+    "isc": "removes only what colour proves to be a highlight (this project; default)",
+}
+METHODS = tuple(SUMMARIES)
+PUBLISHED = tuple(name for name in METHODS if name[-4:].isdigit())
 BEST = "isc"
 IMPROVED = "improved"
 # The toolbox processes the whole frame and ignores clipping; its published figures can only be

@@ -37,6 +37,7 @@ reflectance that fades in smoothly on a coloured object passes for a highlight.
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -49,7 +50,7 @@ from ..imaging.upsampling import enlarged
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .sparse_coding import grouped_specular
-from .support.checks import check_arrays
+from .support.checks import check_arrays, has_colour
 from .support.edge_aware import Paths
 from .support.filter_statistics import highlight_prior
 from .support.highlight_cues import (
@@ -290,6 +291,64 @@ def separate(
     )
 
 
+class Abstention(Enum):
+    """Why a photo was left unchanged.
+
+    Attributes
+    ----------
+    NO_COLOUR
+        All channels are equal.
+    NO_CANDIDATE
+        No pixel is paler than pixels of its hue.
+    NEAR_GREY
+        The object's colours are too pale to tell a highlight from them.
+    NOT_PROVEN
+        There are pale pixels, but they look like reflectance: they have its edges, or run with its
+        colours.
+    """
+
+    NO_COLOUR = "no colour"
+    NO_CANDIDATE = "no candidate"
+    NEAR_GREY = "near grey"
+    NOT_PROVEN = "not proven"
+
+
+def abstention(
+    image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None
+) -> Abstention:
+    """Return why `separate` with its defaults left a photo unchanged.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        As for `separate`.
+    mask : (H, W) bool ndarray
+    clipped : (H, W) bool ndarray, optional
+
+    Returns
+    -------
+    Abstention
+        The first reason that applies.
+    """
+    if not has_colour(image, mask):
+        return Abstention.NO_COLOUR
+    options = VARIANTS["improved"]
+    unit = _unit(image[mask])
+    scaled = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
+    usable = mask if clipped is None else mask & ~clipped
+    photo = _object_maps(*_block_averages(scaled, mask, usable, -(-max(mask.shape) // _MAX_SIDE)))
+    ratios = _diffuse_ratios(photo, options)
+    share = _as_map(ratios.places.read(ratios.share), photo.mask)
+    candidate = _specular(photo.low, photo.chroma, share) * ramp(
+        photo.low / photo.base, options.bright
+    )
+    if float(candidate[photo.mask].max()) < _MIN_PEAK * photo.peak:
+        return Abstention.NO_CANDIDATE
+    if _saturation(photo) <= options.colourful[0]:
+        return Abstention.NEAR_GREY
+    return Abstention.NOT_PROVEN
+
+
 def _unit(values: np.ndarray) -> np.float32:
     """A power of two near the largest value: dividing by it is exact, and makes
     the small constants independent of exposure.
@@ -456,13 +515,9 @@ def _gain_by_hue(
     mask, low = photo.mask, photo.low
     bright = ramp(low / photo.base, options.bright)
     specular = candidate * bright
-    weight = np.where(mask, ramp(low / photo.base, (0.5, 1.2)), 0)
-    colour = (photo.chroma * weight).sum(dtype=float) / max(
-        (photo.high * weight).sum(dtype=float), float(_TINY)
-    )
     scale = max(0.015 * photo.diagonal, 2.5)
     rough, rough_here = roughness(specular, edge_weight, mask, scale, fine=1.5)
-    gain = float(ramp(colour, options.colourful) * ramp(rough, options.smooth))
+    gain = float(ramp(_saturation(photo), options.colourful) * ramp(rough, options.smooth))
     if gain > 0:
         gain *= float(ramp(_mixing(photo, specular, share, edge_weight), options.unmixed))
     if gain == 0:
@@ -470,6 +525,13 @@ def _gain_by_hue(
     clear = ramp(specular / (options.scatter * (low - specular) + _TINY), options.clear)
     kept = _suppress_borders(specular * ramp(rough_here, options.smooth_here) * clear, edge_weight)
     return np.where(mask, gain * kept / np.maximum(candidate, _TINY), 0)
+
+
+def _saturation(photo: _ObjectMaps) -> float:
+    """Saturation of the bright pixels: the sum of C over that of max I."""
+    weight = np.where(photo.mask, ramp(photo.low / photo.base, (0.5, 1.2)), 0)
+    brightness = (photo.high * weight).sum(dtype=float)
+    return float((photo.chroma * weight).sum(dtype=float) / max(brightness, float(_TINY)))
 
 
 def _mixing(

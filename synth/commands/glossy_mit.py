@@ -5,11 +5,14 @@ layer.
 import argparse
 from pathlib import Path
 
-from isc_core.cli.interface.options import Commands, add_command, count, hints, names, positive
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count, names, positive
 from isc_core.progress import Monitor
 
 from ..glossy_mit.generate import make_glossy
 from ..glossy_mit.settings import GlossySettings
+
+SUMMARY = "MIT-Berkeley objects with strong highlights"
 
 _EXAMPLES = """  isc synth glossy-mit DATA -o glossy
   isc evaluate glossy/level-25_natural-area --dataset mit-berkeley --input original --model mdr
@@ -19,22 +22,20 @@ the layout of the MIT-Berkeley set. An interrupted run continues in the same fol
 derives from research data and must not be redistributed."""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "glossy-mit",
+    describe(
+        parser,
         run,
-        "MIT-Berkeley objects with strong highlights",
         "Add a specular layer of a given share to the MIT-Berkeley objects, with the set's own "
         "reflectance, shape and light.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     usual = GlossySettings()
     parser.add_argument("root", metavar="ROOT", type=Path, help="folder of the MIT-Berkeley set")

@@ -6,7 +6,8 @@ import sys
 from pathlib import Path
 from typing import get_args
 
-from isc_core.cli.interface.options import Commands, add_command, count, hints, names, positive
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count, names, positive
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
@@ -33,23 +34,21 @@ A scene depends on its seed only: --seed 200 --count 100 renders the scenes that
 --count 200. The same command continues an interrupted run; a larger --count adds scenes."""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command, and its subcommands, to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "synth",
+    describe(
+        parser,
         run,
-        "render glossy objects with ground truth",
         "Render a data set of glossy objects: photos with the ground truth of their decomposition. "
         "Each scene is a folder with preview.png, maps.exr and scene.json; README.md describes the "
         "set.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument(
         "-o",
@@ -74,7 +73,8 @@ def declare(commands: Commands) -> None:
     )
     _add_choices(parser)
     _add_picture(parser)
-    glossy_mit.declare(parser.add_subparsers(title="other data sets", metavar="SET"))
+    others = parser.add_subparsers(title="other data sets", metavar="SET")
+    glossy_mit.declare(others.add_parser("glossy-mit", help=glossy_mit.SUMMARY))
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:

@@ -6,7 +6,8 @@ import argparse
 import shlex
 from pathlib import Path
 
-from isc_core.cli.interface.options import Commands, add_command, count, hints, names
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count, names
 from isc_core.decomposition.pipeline import ILLUMINATIONS
 from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.errors import InputError, Rejected
@@ -22,25 +23,23 @@ _EXAMPLES = """  isc synth --count 60 --size 128 -o scenes
 _NO_BOUNDS = "none"
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "validate",
+    describe(
+        parser,
         run,
-        "measure every stage on rendered scenes",
         "Run the stages on a data set of isc synth. The report (report.html, report.json, "
         "summary.md) has errors with confidence intervals, an error budget by substituting the "
         "ground truth for one stage at a time, slices by gloss, light, albedo, material and size, "
         "pictures, and a comparison of models. The exit code is 1 if a bound is violated; the "
         "maps of the worst scenes are then in the folder evidence.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument("dataset", metavar="DATASET", type=Path, help="output folder of isc synth")
     parser.add_argument(

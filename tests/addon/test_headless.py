@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from blender_addon.headless import main
-from isc_core.cli.interface.terminal import Interrupts
+from isc_core.cli.interface.interrupts import Interrupts
 from isc_core.result_files.diagnostics_text import status_lines
 from tests.addon.scene_fixture import bump, write_result
 from tests.core.lit_balls import under_lights

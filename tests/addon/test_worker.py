@@ -35,7 +35,7 @@ ROOT = Path(__file__).resolve().parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 
 # A package in place of `isc_core`. Its behaviour is in `behave.py` beside it; its last arguments
-# are always `--progress json`.
+# are always `--progress json --cancel-at-eof`.
 STAND_IN = """
 import json, os, sys, time
 from pathlib import Path
@@ -314,7 +314,8 @@ def test_the_job_reaches_the_command_line(
     asked = DecomposeJob(
         Path("-a.png"), Path("out"), Path("m.png"), "mdr", "isc", "laboratory", 300, 2, "linear"
     )
-    words = ended(start_decompose(asked, environment)).message.split("\n")
+    *words, last = ended(start_decompose(asked, environment)).message.split("\n")
+    assert last == "--cancel-at-eof"
     here = tmp_path.resolve()
     assert words[:5] == ["decompose", str(here / "-a.png"), "--arrays", "-o", str(here / "out")]
     pairs = dict(zip(words[5::2], words[6::2], strict=True))

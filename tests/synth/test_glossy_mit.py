@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isc_core.cli.interface.options import Parser
+from isc_core.cli.interface.parser import Parser, add_general_options
 from isc_core.datasets.highlight_set import load_laboratory
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.errors import Cancelled, InputError
@@ -473,7 +473,9 @@ def test_impossible_settings_are_refused(change: dict[str, object], words: str) 
 
 def parsed(*words: str) -> argparse.Namespace:
     parser = Parser(prog="isc synth")
-    glossy_mit.declare(parser.add_subparsers(required=True))
+    command = parser.add_subparsers(required=True).add_parser("glossy-mit")
+    glossy_mit.declare(command)
+    add_general_options(command)
     return parser.parse_args(["glossy-mit", *words])
 
 

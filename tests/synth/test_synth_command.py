@@ -82,20 +82,37 @@ def test_the_parser_loads_no_renderer() -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_a_command_that_cannot_be_imported_refuses_alone(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    broken = EntryPoint("paint", "no_such_package.commands.paint", "isc.commands")
+def install(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+    """Make `value` the only entry point of another package's command, named paint."""
+    found = [EntryPoint("paint", value, "isc.commands")]
     monkeypatch.setattr(
-        commands, "entry_points", lambda group: [broken] if group == "isc.commands" else []
+        "importlib.metadata.entry_points", lambda group: found if group == "isc.commands" else []
     )
+
+
+@pytest.mark.parametrize("value", ["no_such_package:PAINT", "paint_entry:PAINT"])
+def test_a_command_that_cannot_be_imported_refuses_alone(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    value: str,
+) -> None:
+    (tmp_path / "paint_entry.py").write_text(
+        "from isc_core.cli.commands.registry import CommandEntry\n"
+        "PAINT = CommandEntry('paint', 'another coat', 'no_such_package.paint', 'synth')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    install(monkeypatch, value)
     assert main(["--help"]) == 0
     assert "paint" in capsys.readouterr().out
     assert main(["separate", "--help"]) == 0
     capsys.readouterr()
+    advice = f": install it with `{install_command('synth')}`" if "entry" in value else ""
     for arguments in ([], ["--help"], ["photo.png", "--json", "x", "-o", "y"]):
         assert main(["paint", *arguments]) == 2
-        assert refusal(capsys).endswith("install it with `pip install 'isc3d[no_such_package]'`")
+        assert refusal(capsys).endswith(
+            f"isc paint is not available (No module named 'no_such_package'){advice}"
+        )
 
 
 def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
@@ -103,9 +120,7 @@ def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
 ) -> None:
     (tmp_path / "broken_command.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(
-        commands, "entry_points", lambda group: [EntryPoint("paint", "broken_command", group)]
-    )
+    install(monkeypatch, "broken_command:PAINT")
     with pytest.raises(ZeroDivisionError):
         commands.build_parser()
 

@@ -1,74 +1,80 @@
-"""The sub-commands of `isc`, one per file: each declares its options and runs.
-
-A command's `run(options, monitor)` returns the lines to print; it raises `InputError` and
-`Cancelled`.
-
-Packages that build on the core add commands of their own: each is an entry point of the group
-`isc.commands` that names a module with `declare(commands)`. One that cannot be imported here stays
-in the list and says what to install; the others work all the same.
-"""
+"""The sub-commands of `isc`, one per file; `registry` lists them, this module builds the parser."""
 
 import argparse
-from importlib.metadata import EntryPoint, entry_points
+import importlib
+from collections.abc import Sequence
 from typing import NoReturn
 
 from ... import __version__
 from ...errors import InputError
 from ...progress import Monitor
-from ..interface.options import Commands, Parser
-from . import arrays, batch, decompose, edit, evaluate, fit_priors, mask, separate
-
-_GROUP = "isc.commands"
+from ..interface.parser import EXIT_CODES, Parser, add_general_options
+from .registry import CommandEntry, all_commands, find_command
 
 _EXAMPLES = """examples:
   isc decompose cup.png -o cup                          everything, into the folder cup
   isc mask photo.jpg --box 120,80,400,360 -o mask.png   first mask the object if needed
   isc decompose photo.jpg --mask mask.png -o result
-`isc COMMAND --help` shows every option.
-Exit codes: 0 done, 1 done with failures, 2 an input cannot be used, 130 cancelled."""
+`isc COMMAND --help` shows the options of a command."""
 
 
-def build_parser() -> argparse.ArgumentParser:
-    """Build the parser of `isc`; it sets `run`, the function to call, and `quiet`."""
+def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentParser:
+    """Build the parser of `isc`; it sets `run`, the function to call, and the general options.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        What will be parsed: only the command that it names is imported. By default all are.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+    """
     parser = Parser(
         prog="isc",
         description="Intrinsic scene characteristics from one photo of a glossy object: diffuse "
         "and specular light, shape, illumination, "
         "shading and reflectance, and a textured mesh.",
-        epilog=_EXAMPLES,
+        epilog=f"{_EXAMPLES}\n\n{EXIT_CODES}",
     )
+    parser.add_argument("-h", "--help", action="help", help="show this help and exit")
     parser.add_argument("--version", action="version", version=f"isc {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (decompose, batch, separate, edit, arrays, mask, evaluate, fit_priors):
-        command.declare(commands)
-    for entry in entry_points(group=_GROUP):
-        _declare_plugin(entry, commands)
+    chosen = next((word for word in arguments or () if not word.startswith("-")), "")
+    entry = find_command(chosen)
+    for known in all_commands() if entry is None else (entry,):
+        added = commands.add_parser(known.name, help=known.summary)
+        if known is entry or arguments is None:
+            _declare(added, known)
     return parser
 
 
-def _declare_plugin(entry: EntryPoint, commands: Commands) -> None:
-    """Add the command of another package; if that cannot be imported, a command that takes any
-    arguments and fails.
-    """
+def _declare(parser: argparse.ArgumentParser, entry: CommandEntry) -> None:
+    """Add the options of a command; if it cannot be imported, a `run` that says why."""
     try:
-        module = entry.load()
+        module = importlib.import_module(entry.module)
     except ImportError as error:
-        extra = entry.module.partition(".")[0]
-        reason = (
-            f"isc {entry.name} is not available ({error}): install it with "
-            f"`pip install 'isc3d[{extra}]'`"
-        )
+        if (error.name or "").startswith(f"{entry.module.partition('.')[0]}."):
+            raise  # the package is there and lacks a module: a defect of its own
+        _declare_unavailable(parser, entry, error)
     else:
-        module.declare(commands)
-        return
+        module.declare(parser)
+        add_general_options(parser)
+
+
+def _declare_unavailable(
+    parser: argparse.ArgumentParser, entry: CommandEntry, error: ImportError
+) -> None:
+    from ...extras import install_command
+
+    advice = f": install it with `{install_command(entry.extra)}`" if entry.extra else ""
+    reason = f"isc {entry.name} is not available ({error}){advice}"
 
     def fail(options: argparse.Namespace, monitor: Monitor) -> NoReturn:
         del options, monitor
         raise InputError(reason)
 
-    # No argument begins with this prefix, so the parser accepts all arguments, options included.
-    parser = commands.add_parser(
-        entry.name, help="not available: run it to see why", prefix_chars="\0", add_help=False
-    )
+    # No argument begins with this prefix, so that the parser accepts all of them.
+    parser.prefix_chars = "\0"
     parser.add_argument("anything", nargs="*")
-    parser.set_defaults(run=fail, quiet=True)
+    parser.set_defaults(run=fail, quiet=True, verbose=False, config=None, no_config=True)

@@ -9,28 +9,26 @@ from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
 from ...result_files.arrays_file import ARRAYS, write_arrays
 from ...result_files.result_folder import load
-from ..interface.options import Commands, add_command, hints
+from ..interface.parser import describe, hints
 
 _EXAMPLES = """  isc arrays cup"""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "arrays",
+    describe(
+        parser,
         run,
-        "a result as plain NumPy arrays",
         f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, "
         "for programs that have only NumPy. "
         "isc decompose --arrays writes it directly.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"

@@ -4,7 +4,6 @@ import argparse
 import importlib.util
 import sys
 from dataclasses import fields
-from pathlib import Path
 
 from ...batch.engine import Crew
 from ...batch.item import DONE, FAILED, SKIPPED, ImageRecipe
@@ -13,17 +12,17 @@ from ...decomposition.settings import Settings
 from ...errors import Rejected
 from ...progress import Monitor
 from ..interface.options import (
-    Commands,
-    add_command,
     add_engine,
     add_limits,
-    add_settings,
+    add_main_settings,
+    add_model_settings,
+    add_output,
     add_transfer,
-    count,
-    hints,
     limits_of,
-    positive,
+    names_table,
 )
+from ..interface.parser import describe, hints
+from ..interface.values import count, positive
 
 _EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
@@ -36,23 +35,23 @@ Inputs may be URLs that fsspec supports (s3://bucket/photos). Run the same comma
 resume: finished images are skipped. Exit code 1: some images failed, see failures.jsonl."""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "batch",
+    describe(
+        parser,
         run,
-        "isc decompose for many photos, resumable",
         "Decomposes many photos, one folder each in DIR. Writes summary.html (start here), "
         "summary.csv, summary.jsonl and "
         "failures.jsonl next to them.",
-        _EXAMPLES,
+        usage="[options] INPUT [INPUT ...] -o DIR",
+        examples=_EXAMPLES,
+        more=names_table(),
     )
     parser.add_argument(
         "inputs",
@@ -60,30 +59,26 @@ def declare(commands: Commands) -> None:
         metavar="INPUT",
         help="a folder, photo, quoted pattern, URL, or a .csv or .jsonl manifest",
     )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="the folder to write; finished results are kept",
-    )
-    parser.add_argument(
+    main = parser.add_argument_group("main options")
+    add_output(main, "the folder to write; finished results are kept")
+    main.add_argument(
         "--masks",
         metavar="DIR",
         help="a folder with the masks of all photos: cup.png or cup_mask.png for cup.jpg",
     )
-    add_transfer(parser)
-    add_settings(parser)
-    _add_workers(parser)
-    add_limits(parser)
-    parser.add_argument(
+    add_main_settings(main)
+    main.add_argument(
         "--timeout",
         type=positive,
         default=0.0,
         metavar="SECONDS",
         help="stop images that take longer (default: no limit)",
     )
+    reading = parser.add_argument_group("reading the photos")
+    add_transfer(reading)
+    add_limits(reading)
+    add_model_settings(parser)
+    _add_workers(parser)
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
@@ -106,7 +101,7 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
         metavar="ADDRESS",
         help="use this Dask cluster instead of this machine",
     )
-    add_engine(parser, "threads per image (0: the cores, shared among the workers)")
+    add_engine(crew, "threads per image (0: the cores, shared among the workers)")
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:

@@ -1,68 +1,85 @@
-"""`isc decompose`: one photo in, the folder of its decomposition out."""
+"""`isc decompose`: photos in, the folder of each one's decomposition out."""
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import fields
 from pathlib import Path
 
+from ...batch.names import safe_name
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
+from ...errors import InputError, Rejected
 from ...photo import Photo, read_photo
-from ...progress import Monitor
+from ...progress import Monitor, ProgressEvent
 from ...result_files.diagnostics_text import note_lines
 from ...result_files.known_inputs import read_height, read_light
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...sirfs.priors.prior_file import load_prior_set
+from ...sirfs.priors.prior_set import PriorSet
 from ..interface.options import (
-    Commands,
-    add_command,
     add_engine,
+    add_limits,
+    add_main_settings,
+    add_mask,
+    add_model_settings,
+    add_open,
+    add_output,
     add_photo,
-    add_settings,
-    hints,
+    add_transfer,
     limits_of,
-    number,
-    positive,
+    names_table,
 )
+from ..interface.parser import describe, hints
+from ..interface.standard_input import STDIN, photo_file
+from ..interface.values import number, positive
+from ..interface.viewer import show
 
 _EXAMPLES = """  isc decompose cup.png -o cup
+  isc decompose cup.png jug.png vase.png -o results      one folder each, results/cup and so on
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
   isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
+  curl -s https://example.org/cup.png | isc decompose - -o cup
 
 Height maps (--shape, --depth) have the photo's size, in photo pixels toward the viewer: EXR with
 a channel Y, Z or height.Z; NumPy .npy; PNG or TIFF of 16 bits, where one code is 1/64 pixel and 0
 is a hole; or the folder of an earlier result. NaN is a hole. --height-scale changes the unit: -0.2
-for distances from the camera whose unit is 0.2 pixels."""
+for distances from the camera whose unit is 0.2 pixels.
+
+isc.toml in the current folder sets defaults: a line max-size = 384 below [decompose]."""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "decompose",
+    describe(
+        parser,
         run,
-        "everything: layers, shape, light, shading, reflectance, mesh",
         "Decomposes a photo of one glossy object into diffuse and specular light, shape, "
         "illumination, shading, reflectance. Writes a folder "
         "with preview.png (start here), maps.exr, mesh.glb and decomposition.json.",
-        _EXAMPLES,
+        usage="[options] PHOTO [PHOTO ...] -o DIR",
+        examples=_EXAMPLES,
+        more=names_table(),
     )
-    add_photo(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="the folder to write; an earlier result is replaced",
+    add_photo(parser, several=True)
+    main = parser.add_argument_group("main options")
+    add_output(main)
+    add_mask(main)
+    add_main_settings(main)
+    main.add_argument(
+        "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
     )
-    add_settings(parser)
+    add_open(main)
+    reading = parser.add_argument_group("reading the photo")
+    add_transfer(reading)
+    add_limits(reading)
+    add_model_settings(parser)
     _add_known_inputs(parser)
-    add_engine(parser)
+    add_engine(parser.add_argument_group("computing"))
 
 
 def _add_known_inputs(parser: argparse.ArgumentParser) -> None:
@@ -117,28 +134,102 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     -------
     list of str
         Lines to print.
+
+    Raises
+    ------
+    Rejected
+        If some of several photos failed.
     """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
-    require_writable_result(options.output, inputs=(options.photo, options.mask))
     prior_set = None if options.priors is None else load_prior_set(options.priors)
-    photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
+    if len(options.photo) == 1:
+        return _decompose_one(
+            options.photo[0], options.output, options, settings, prior_set, monitor
+        )
+    return _decompose_several(options, settings, prior_set, monitor)
+
+
+def _decompose_one(
+    path: Path,
+    output: Path,
+    options: argparse.Namespace,
+    settings: Settings,
+    prior_set: PriorSet | None,
+    monitor: Monitor,
+) -> list[str]:
+    """Decompose a photo, and return the lines to print."""
+    require_writable_result(output, inputs=(path, options.mask))
+    with photo_file(path, options) as file:
+        photo = read_photo(file, options.mask, options.transfer, limits=limits_of(options))
     known = _known_inputs(options, photo)
-    require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
+    require_room(output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(
         photo,
         settings,
         known=known,
         prior_set=prior_set,
-        name=options.photo.name,
+        name="standard input" if path == STDIN else path.name,
         monitor=monitor.part(0.0, 0.8),
     )
-    save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
+    writing = monitor.part(0.8, 1.0)
+    save(result, output, arrays=options.arrays, png=options.png, monitor=writing)
+    preview = output / "preview.png"
     return hints(
         options,
         *note_lines(result.provenance.diagnostics),
-        f"see {options.output / 'preview.png'}",
+        *(show(preview) if options.open else ()),
+        f"see {preview}",
     )
+
+
+def _decompose_several(
+    options: argparse.Namespace, settings: Settings, prior_set: PriorSet | None, monitor: Monitor
+) -> list[str]:
+    """Decompose each photo into a folder of its own; one that fails does not stop the others."""
+    for option in ("mask", "shape", "depth"):
+        if getattr(options, option) is not None:
+            raise InputError(
+                f"--{option} belongs to one photo: give one, or list the photos and their masks "
+                "in a manifest (see `isc batch --help`)"
+            )
+    outputs = dict(_outputs(options.photo, options.output))
+    lines, failures = [], []
+    for index, (path, output) in enumerate(outputs.items()):
+        part = _named(monitor.part(index / len(outputs), (index + 1) / len(outputs)), path.name)
+        try:
+            lines += _decompose_one(path, output, options, settings, prior_set, part)
+        except InputError as error:
+            failures.append(str(error))
+    if failures:
+        done = f"{len(failures)} of {len(outputs)} photos failed, see above"
+        raise Rejected("\n".join([*failures, done]))
+    return lines
+
+
+def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
+    """Each photo and the folder of its result."""
+    seen: dict[str, Path] = {}
+    for path in photos:
+        if path == STDIN:
+            raise InputError("- is one photo from standard input: give it alone")
+        name = safe_name(path.stem)
+        other = seen.setdefault(name.casefold(), path)
+        if other is not path:
+            raise InputError(
+                f"{other} and {path} would both be written to {folder / name}: decompose them "
+                "into different folders"
+            )
+        yield path, folder / name
+
+
+def _named(monitor: Monitor, name: str) -> Monitor:
+    """A monitor whose stages begin with the name of the photo."""
+
+    def report(event: ProgressEvent) -> None:
+        monitor.progress(ProgressEvent(f"{name}: {event.stage}", event.fraction, event.detail))
+
+    return Monitor(report, monitor.cancelled)
 
 
 def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:

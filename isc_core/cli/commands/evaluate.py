@@ -11,7 +11,9 @@ from ...evaluation.runner import Protocol, RunnerOptions, make_runner
 from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
 from ...sirfs.priors.prior_file import load_prior_set, shipped_prior_set
-from ..interface.options import Commands, add_command, add_engine, current_name, names
+from ..interface.options import add_engine
+from ..interface.parser import describe
+from ..interface.values import current_name, names
 
 _EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
   isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
@@ -25,22 +27,20 @@ leave the object out:
 _PRIOR = "as for isc decompose (default for --protocol reference: {}, which measures SIRFS alone)"
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "evaluate",
+    describe(
+        parser,
         run,
-        "accuracy on a data set with ground truth",
         "Prints the errors of height, normals, shading, reflectance and light for each object, "
         "and their geometric means.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
     parser.add_argument(

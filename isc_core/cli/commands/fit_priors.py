@@ -10,29 +10,28 @@ from ...errors import InputError
 from ...io.atomic import require_writable_file
 from ...numerics.jit import ensure_cache_folder
 from ...progress import Monitor
-from ..interface.options import Commands, add_command, hints, names
+from ..interface.parser import describe, hints
+from ..interface.values import names
 
 _EXAMPLES = """  isc fit-priors DATA -o priors.npz
   isc fit-priors DATA --leave-out cup1,cup2 -o without-cups.npz"""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "fit-priors",
+    describe(
+        parser,
         run,
-        "fit the priors of shape, reflectance and light",
         "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with "
         "natural_lights.mat) and writes them to a file "
         "for --priors.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
     chosen = parser.add_mutually_exclusive_group()

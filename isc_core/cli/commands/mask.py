@@ -5,29 +5,29 @@ from pathlib import Path
 
 from ...photo.grabcut import Box, cut_out
 from ...progress import Monitor
-from ..interface.options import Commands, add_command, add_limits, add_transfer, hints, limits_of
+from ..interface.options import add_limits, add_photo, add_transfer, limits_of
+from ..interface.parser import describe, hints
+from ..interface.standard_input import photo_file
 
 _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "mask",
+    describe(
+        parser,
         run,
-        "segment the object inside a box",
         "Finds the object inside a box and writes its mask, white on black. Check it before you "
         "use it: the segmentation uses colours alone.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
-    parser.add_argument("photo", metavar="PHOTO", type=Path, help="the photo, as for isc decompose")
+    add_photo(parser)
     parser.add_argument(
         "--box",
         type=_box,
@@ -56,7 +56,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         Lines to print.
     """
     del monitor  # one step of a second or two
-    mask = cut_out(options.photo, options.box, options.output, options.transfer, limits_of(options))
+    with photo_file(options.photo, options) as file:
+        mask = cut_out(file, options.box, options.output, options.transfer, limits_of(options))
     return hints(options, f"{options.output}: {int(mask.sum())} pixels; check it before you use it")
 
 

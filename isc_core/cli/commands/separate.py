@@ -1,7 +1,6 @@
 """`isc separate`: a photo's diffuse and specular layers, without shape and light."""
 
 import argparse
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,48 +14,70 @@ from ...result_files.result_folder import require_writable_result, save_separati
 from ...scene.decomposition import Separation
 from ...separation import BEST, IMPROVED, METHODS, separate
 from ...separation.option_text import parse_changes
-from ...separation.support.checks import has_colour
-from ..interface.options import Commands, add_command, add_photo, hints, limits_of
+from ..interface.options import (
+    add_limits,
+    add_mask,
+    add_open,
+    add_output,
+    add_photo,
+    add_transfer,
+    limits_of,
+    methods_table,
+)
+from ..interface.parser import describe, hints
+from ..interface.standard_input import photo_file
+from ..interface.viewer import show
 
 _EXAMPLES = """  isc separate cup.png -o cup-layers
   isc separate highlights.bmp --transfer linear --method shen_2013 --variant paper -o layers
   isc separate cup.png --method shen_2013 --set ratio_quantile=0.4 -o cup-layers"""
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "separate",
+    describe(
+        parser,
         run,
-        "diffuse and specular light only",
         "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
         "images of both. A photo without mask, "
         "transparency and black border is processed as a whole.",
-        _EXAMPLES,
+        usage="[options] PHOTO -o DIR",
+        examples=_EXAMPLES,
+        more=methods_table(),
     )
     add_photo(parser)
-    parser.add_argument(
+    main = parser.add_argument_group("main options")
+    add_output(main)
+    add_mask(main)
+    main.add_argument(
         "--method",
         choices=METHODS,
         default=BEST,
         metavar="NAME",
-        help=f"separation method: {', '.join(METHODS)} (default {BEST})",
+        help=f"separation method, see below (default {BEST})",
     )
-    parser.add_argument(
+    add_open(main)
+    _add_method_options(parser.add_argument_group("method"))
+    reading = parser.add_argument_group("reading the photo")
+    add_transfer(reading)
+    add_limits(reading)
+
+
+def _add_method_options(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
         "--variant",
         default=IMPROVED,
         metavar="NAME",
         help="improved (default), paper (as published) or, for some methods, sihr (as in the "
         "public toolbox SIHR)",
     )
-    parser.add_argument(
+    group.add_argument(
         "--set",
         action="append",
         default=[],
@@ -64,20 +85,12 @@ def declare(commands: Commands) -> None:
         metavar="NAME=VALUE",
         help="change an option of the method; can be repeated; an unknown NAME lists all options",
     )
-    parser.add_argument(
+    group.add_argument(
         "--prior",
         type=Path,
         metavar="FILE",
         help=f"for {BEST}: a grey image of the photo's size, the probability of a highlight: "
         "black never, middle grey (0.5) unknown",
-    )
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="the folder to write; an earlier result is replaced",
     )
 
 
@@ -105,13 +118,13 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     require_writable_result(
         options.output, separation=True, inputs=(options.photo, options.mask, options.prior)
     )
-    photo = read_photo(
-        options.photo, options.mask, options.transfer, whole_frame=True, limits=limits_of(options)
-    )
+    limits = limits_of(options)
+    with photo_file(options.photo, options) as file:
+        photo = read_photo(file, options.mask, options.transfer, whole_frame=True, limits=limits)
     prior = (
         None
         if options.prior is None
-        else _read_prior(options.prior, photo.mask.shape, limits_of(options))
+        else _read_prior(options.prior, photo.mask.shape, limits)
     )
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
@@ -120,24 +133,44 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )  # fmt: skip
     monitor.report("writing", 0.8)
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
-    for note in [] if options.quiet else _notes(options, photo, layers):
-        print(f"isc: note: {note}", file=sys.stderr)
-    return hints(options, f"see {options.output / 'preview.png'}")
+    preview = options.output / "preview.png"
+    return hints(
+        options,
+        *(f"note: {note}" for note in _notes(options, photo, layers)),
+        *(show(preview) if options.open else ()),
+        f"see {preview}",
+    )
 
 
 def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Iterator[str]:
     """Notes on the result."""
     if photo.original.mask_from == "whole frame":
         yield "no mask: the whole image was processed; set one with --mask"
-    if options.method == "none" or layers.specular[~photo.clipped].any():
-        return
-    if has_colour(photo.image, photo.mask):
-        yield "no highlight was detected with confidence, so the photo was left unchanged"
-    else:
-        yield (
-            "the photo has no colour, which distinguishes highlights from reflectance, so it was "
-            "left unchanged: use a colour photo"
-        )
+    if options.method != "none" and not layers.specular[~photo.clipped].any():
+        yield f"nothing was taken as a highlight: {_why_unchanged(options.method, photo)}"
+
+
+def _why_unchanged(method: str, photo: Photo) -> str:
+    if method != BEST:
+        return f"{method} found no pixel that its equation explains by one; try --method {BEST}"
+    from ...separation.isc import Abstention, abstention
+
+    reasons = {
+        Abstention.NO_COLOUR: (
+            "the photo has no colour, which distinguishes highlights from reflectance; use a "
+            "colour photo"
+        ),
+        Abstention.NO_CANDIDATE: "no pixel is paler than the others of its hue",
+        Abstention.NEAR_GREY: (
+            "the object is nearly grey, and a highlight has no other colour; "
+            "isc decompose --model joint also uses its shape"
+        ),
+        Abstention.NOT_PROVEN: (
+            "what is pale looks like paint: it has sharp edges, or runs with the object's "
+            "colours; --prior marks highlights by hand"
+        ),
+    }
+    return reasons[abstention(photo.image, photo.mask, photo.clipped)]
 
 
 def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:

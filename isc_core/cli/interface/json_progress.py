@@ -8,10 +8,11 @@
 Any number of progress events comes first; their fraction, of the whole job, never decreases. One of
 the other three comes last.
 
-The calling program holds the other end of standard input: the line `cancel`, or the end of the
-stream because that program has ended, acts as Ctrl-C. The work is asked to stop; after a second it
-is interrupted wherever it is; both let it clean up. Ten seconds later the process ends in any case.
-Notes for people, and the traceback of a bug, go to standard error.
+The calling program holds the other end of standard input: the line `cancel` acts as Ctrl-C. With
+`--cancel-at-eof` so does the end of the stream, which comes when that program has ended; without
+it, a command whose standard input is empty (cron, CI) runs on. The work is asked to stop; after a
+second it is interrupted wherever it is; both let it clean up. Ten seconds later the process ends in
+any case. Notes for people, and the traceback of a bug, go to standard error.
 
 Limits: a process without standard input is not watched. Ignore lines of standard output that are
 not JSON.
@@ -20,7 +21,6 @@ not JSON.
 import _thread
 import json
 import os
-import signal
 import sys
 import threading
 import time
@@ -30,7 +30,7 @@ from types import TracebackType
 from typing import TextIO
 
 from ...progress import ProgressEvent
-from .terminal import discard_output
+from .terminal import Verbosity, discard_output
 
 _REPEAT_SECONDS = 0.05
 GRACE_SECONDS = (1.0, 10.0)  # seconds to wait after the first and the second interrupt
@@ -40,24 +40,31 @@ _CANCELLED = 130
 class JsonReporter:
     """Reports to a program.
 
-    As a context manager, in the main thread of the process, it lets the program cancel by
-    `KeyboardInterrupt`.
+    As a context manager inside `Interrupts`, in the main thread of the process, it lets the program
+    cancel.
+
+    Parameters
+    ----------
+    stream : text file
+        Usually standard output.
+    cancel_at_eof : bool
+        The end of standard input cancels, too.
     """
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO, *, cancel_at_eof: bool = False) -> None:
         self._stream = stream
+        self._cancel_at_eof = cancel_at_eof
         self._stage, self._most, self._reported = "", 0.0, float("-inf")
         self._ended = threading.Event()
         self._lock = threading.Lock()
-        self._previous_handler: object = None
 
     @contextmanager
-    def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
+    def progress(self, verbosity: Verbosity) -> Iterator[Callable[[ProgressEvent], None]]:
         """Provide the receiver of progress events.
 
         Parameters
         ----------
-        quiet : bool
+        verbosity : Verbosity
             Without effect: progress is reported even with --quiet.
 
         Returns
@@ -65,7 +72,7 @@ class JsonReporter:
         context manager of callable
             The receiver.
         """
-        del quiet
+        del verbosity
         yield self._step
 
     def done(self, output: str, lines: Sequence[str]) -> None:
@@ -128,12 +135,6 @@ class JsonReporter:
             discard_output()
 
     def __enter__(self) -> "JsonReporter":
-        if (
-            threading.current_thread() is threading.main_thread()
-            and signal.getsignal(signal.SIGINT) == signal.SIG_IGN
-        ):
-            # Background programs pass on an ignored SIGINT, but here cancelling relies on it.
-            self._previous_handler = signal.signal(signal.SIGINT, signal.default_int_handler)
         if (descriptor := _standard_input()) is not None:
             threading.Thread(
                 target=self._watch, args=(descriptor,), name="isc-cancel", daemon=True
@@ -149,11 +150,10 @@ class JsonReporter:
     ) -> None:
         with self._lock:  # no interrupts from here on, so that the last event is written
             self._ended.set()
-        if self._previous_handler is not None:
-            signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def _watch(self, descriptor: int) -> None:
-        _await_cancel(descriptor)
+        if not _await_cancel(descriptor) and not self._cancel_at_eof:
+            return
         for grace in GRACE_SECONDS:
             with self._lock:
                 if self._ended.is_set():
@@ -171,16 +171,17 @@ def _standard_input() -> int | None:
         return None
 
 
-def _await_cancel(descriptor: int) -> None:
-    """Return after the line `cancel` or the end of the file; reads the descriptor directly, because
-    the lock of Python's buffer would outlive this thread.
+def _await_cancel(descriptor: int) -> bool:
+    """Return True after the line `cancel`, False at the end of the file; reads the descriptor
+    directly, because the lock of Python's buffer would outlive this thread.
     """
     text = b""
     while b"cancel" not in (line.strip() for line in text.split(b"\n")[:-1]):
         try:
             block = os.read(descriptor, 4096)
         except OSError:
-            return
+            return False
         if not block:
-            return
+            return False
         text = text.rpartition(b"\n")[2] + block
+    return True

@@ -1,22 +1,81 @@
-"""Terminal output and input: the progress bar, results, errors, and Ctrl-C."""
+"""Terminal output: the progress bar, results and errors.
+
+Colours are used on terminals only, and not where the environment has `NO_COLOR` (no-color.org) or
+`TERM=dumb`; `FORCE_COLOR` uses them anywhere.
+"""
 
 import contextlib
 import os
 import shutil
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType, TracebackType
+from enum import Enum
+from types import TracebackType
 from typing import TextIO
 
 from ...io.printable_names import readable
-from ...progress import Monitor, ProgressEvent
+from ...progress import ProgressEvent
 
 _BAR = 24
 _REDRAW_SECONDS = 0.08
+
+
+class Verbosity(Enum):
+    """How much is printed besides the result.
+
+    Attributes
+    ----------
+    QUIET
+        Nothing.
+    NORMAL
+        Progress.
+    VERBOSE
+        A line for each stage, with the time since the start.
+    """
+
+    QUIET = 0
+    NORMAL = 1
+    VERBOSE = 2
+
+
+class Style(Enum):
+    """The look of a word: a parameter of the terminal's escape sequence.
+
+    Attributes
+    ----------
+    ERROR
+        Bold red.
+    NOTE
+        Bold cyan.
+    """
+
+    ERROR = "1;31"
+    NOTE = "1;36"
+
+
+def styled(text: str, style: Style, stream: TextIO) -> str:
+    """Return a text as `stream` should show it.
+
+    Parameters
+    ----------
+    text : str
+    style : Style
+    stream : TextIO
+
+    Returns
+    -------
+    str
+        With escape sequences where the stream is a terminal that takes colours.
+    """
+    environment = os.environ
+    if environment.get("NO_COLOR"):
+        return text
+    capable = stream.isatty() and environment.get("TERM") != "dumb"
+    if not capable and not environment.get("FORCE_COLOR"):
+        return text
+    return f"\x1b[{style.value}m{text}\x1b[0m"
 
 
 def discard_output() -> None:
@@ -50,20 +109,20 @@ class TerminalReporter:
     """Reports to a user: results on standard output, everything else on standard error."""
 
     @contextmanager
-    def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
+    def progress(self, verbosity: Verbosity) -> Iterator[Callable[[ProgressEvent], None]]:
         """Provide the receiver of progress events for the duration of the work.
 
         Parameters
         ----------
-        quiet : bool
-            Show no progress.
+        verbosity : Verbosity
 
         Returns
         -------
         context manager of callable
             The receiver.
         """
-        with ProgressBar(sys.stderr, quiet=quiet) as bar:
+        quiet, verbose = verbosity is Verbosity.QUIET, verbosity is Verbosity.VERBOSE
+        with ProgressBar(sys.stderr, quiet=quiet, verbose=verbose) as bar:
             yield bar
 
     def __enter__(self) -> "TerminalReporter":
@@ -101,7 +160,7 @@ class TerminalReporter:
             Exit code; not printed.
         """
         del code
-        print(f"isc: error: {message}", file=sys.stderr)
+        print(f"isc: {styled('error:', Style.ERROR, sys.stderr)} {message}", file=sys.stderr)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
         """Print the violated bounds of a result.
@@ -115,7 +174,7 @@ class TerminalReporter:
         """
         del code
         for line in lines:
-            print(f"isc: rejected: {line}", file=sys.stderr)
+            print(f"isc: {styled('rejected:', Style.ERROR, sys.stderr)} {line}", file=sys.stderr)
 
     def cancelled(self) -> None:
         """Print that the command was cancelled."""
@@ -133,12 +192,15 @@ class ProgressBar:
         Usually standard error.
     quiet : bool
         Show nothing.
+    verbose : bool
+        Show a line for each new stage with the seconds since the start, also on a terminal.
     """
 
-    def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
+    def __init__(self, stream: TextIO, *, quiet: bool = False, verbose: bool = False) -> None:
         self._stream = stream
         self._quiet = quiet
-        self._terminal = stream.isatty()
+        self._started = time.monotonic() if verbose else None
+        self._terminal = stream.isatty() and not verbose
         self._stage = ""
         self._fraction = 0.0
         self._last_draw = float("-inf")
@@ -152,7 +214,9 @@ class ProgressBar:
         if self._terminal:
             self._draw(str(event), new)
         elif new:
-            print(f"isc: {event.stage}", file=self._stream, flush=True)
+            now = time.monotonic()
+            seconds = "" if self._started is None else f"{now - self._started:7.2f} s  "
+            print(f"isc: {seconds}{event.stage}", file=self._stream, flush=True)
 
     def _draw(self, text: str, new: bool) -> None:
         now = time.monotonic()
@@ -177,56 +241,3 @@ class ProgressBar:
             with contextlib.suppress(OSError):
                 self._stream.write("\r\x1b[K")
                 self._stream.flush()
-
-
-class Interrupts:
-    """Ctrl-C and SIGTERM as cancellation.
-
-    The first Ctrl-C asks the work to stop, a second one raises `KeyboardInterrupt`; SIGTERM ends
-    the process with 143. All three let the work clean up. Nothing changes outside the main thread,
-    and where Ctrl-C is ignored (`nohup`).
-    """
-
-    def __init__(self) -> None:
-        self._cancelled = False
-        self._previous: dict[int, object] = {}
-
-    def monitor(self, progress: Callable[[ProgressEvent], None]) -> Monitor:
-        """Return the monitor to work with.
-
-        Parameters
-        ----------
-        progress : callable
-            Receives `ProgressEvent`.
-
-        Returns
-        -------
-        Monitor
-            Cancelled by the first Ctrl-C.
-        """
-        return Monitor(progress, lambda: self._cancelled)
-
-    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
-        if self._cancelled:
-            raise KeyboardInterrupt
-        self._cancelled = True
-
-    def __enter__(self) -> "Interrupts":
-        if threading.current_thread() is threading.main_thread():
-            self._install(signal.SIGINT, self._on_interrupt)
-            self._install(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
-        return self
-
-    def _install(self, number: int, handler: Callable[[int, FrameType | None], object]) -> None:
-        if signal.getsignal(number) != signal.SIG_IGN:
-            self._previous[number] = signal.signal(number, handler)
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        value: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        for number, handler in self._previous.items():
-            # None: the handler was not installed from Python, and cannot be restored.
-            signal.signal(number, signal.SIG_DFL if handler is None else handler)  # type: ignore[arg-type]

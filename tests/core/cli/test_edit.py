@@ -50,7 +50,7 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 ACTIONS = [
     "light-direction",
-    "highlight --direction -0.5 0.6 -0.1 --color ff8000 --exponent 30",
+    "highlight --direction -0.5 0.6 -0.1 --colour ff8000 --exponent 30",
     "highlight --like specular --alpha 0.2 --strength 0.5 --replace",
     "gloss --look glossier",
     "gloss --look metallic --exponent 20 --gain 0.8",
@@ -58,12 +58,12 @@ ACTIONS = [
     "dichromatic --remove specular --diffuse-gamma 1.4",
     "dichromatic --specular-gain 2 --specular-sharpen 1.5 --specular-radius 4",
     "recolour --hue -40 --saturation 1.5 --region {}/region.png",
-    "recolour --color #2060c0 --match-brightness --cluster 2 --clusters 2",
+    "recolour --colour #2060c0 --match-brightness --cluster 2 --clusters 2",
     "relight --yaw 60 --pitch -20",
     "relight --light {}/light.json --roll 10",
     "relight --light {}/light.npy",
     "relight --light {}/sky.png --exponent 40",
-    "relight --direction -1 0 1 --ambient 0.3 --color ffe0c0 --highlights remove",
+    "relight --direction -1 0 1 --ambient 0.3 --colour ffe0c0 --highlights remove",
 ]
 
 
@@ -148,7 +148,7 @@ MISTAKES = {
     "gloss --exponent -5": "exponent",
     "highlight --direction 0 0 0": "no direction",
     "highlight --exponent 9 --alpha 0.2": "give one of them",
-    "highlight --color banana": "RRGGBB",
+    "highlight --colour banana": "RRGGBB",
     "highlight --strength -1": "strength",
     "dichromatic --diffuse-gain -1": "gain",
     "dichromatic --specular-gamma nan": "not a number",
@@ -160,7 +160,7 @@ MISTAKES = {
     "highlight --like specular --direction 0 0 1": "give one of them",
     "relight --highlights keep --exponent 30 --yaw 5": "give one of them",
     "relight --light {}/broken.exr": "infinite",
-    "recolour --color ١٢٣٤٥٦": "RRGGBB",
+    "recolour --colour ١٢٣٤٥٦": "RRGGBB",
     "recolour --cluster 9": "no cluster 9",
     "recolour --clusters 99": "clusters are not possible",
     "recolour --cluster 1 --region {}/region.png": "give one of them",

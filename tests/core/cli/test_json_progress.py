@@ -138,6 +138,7 @@ def test_a_cancelled_solve_leaves_nothing(tmp_path: Path, stop: Callable[[Proces
         "numpy",
         "-o",
         tmp_path / "new" / "out",
+        "--cancel-at-eof",
     )
     code, events, errors = followed(process, at("shape and light", stop))
     assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
@@ -166,10 +167,33 @@ def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool)
 
 def test_work_that_cannot_be_interrupted_ends_with_its_program(tmp_path: Path) -> None:
     process = started(
-        "mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "mask.png", before=STUBBORN
+        "mask",
+        "photo.png",
+        "--box",
+        "1,1,9,9",
+        "-o",
+        tmp_path / "mask.png",
+        "--cancel-at-eof",
+        before=STUBBORN,
     )
     code, events, _ = followed(process, at("sleeping", disappear))
     assert (code, events[-1]["event"]) == (130, "progress")
+
+
+def test_a_command_without_input_runs_on(tmp_path: Path) -> None:
+    """Cron and CI give an empty standard input: its end is no wish to cancel."""
+    words = ("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "out")
+    done = subprocess.run(
+        isc_command(*words, "--progress", "json"),
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert json.loads(done.stdout.splitlines()[-1])["event"] == "done"
 
 
 def test_words_that_are_not_the_word_mean_nothing(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ from ....photo import read_photo, read_raster
 from ....progress import Monitor
 from ....result_files.result_folder import load
 from ....scene.decomposition import Decomposition
-from ...interface.options import Commands, Parser, add_command, hints, limits_of
+from ...interface.options import limits_of
+from ...interface.parser import GENERAL, describe, hints
 from . import dichromatic, gloss, highlight, light_direction, recolour, relight
 from .action import ActionResult, EditAction
 from .options import add_common, plain
@@ -22,14 +23,14 @@ _EXAMPLES = """  isc edit cup light-direction -o light      the light's directio
   isc edit cup highlight --direction -0.5 0.6 0.6 -o glint      a new highlight
   isc edit cup gloss --look metallic -o metal
   isc edit cup dichromatic --remove specular --photo cup.png -o diffuse      in the photo itself
-  isc edit cup recolour --cluster 2 --color 2060c0 -o blue      clusters.png shows the clusters
+  isc edit cup recolour --cluster 2 --colour 2060c0 -o blue      clusters.png shows the clusters
   isc edit cup relight --yaw 60 -o turned
 
 Every action takes --photo, --mask, --transfer and -o.
 `isc edit RESULT ACTION --help` shows its other options."""
 
 
-_NOT_PARAMETERS = ("run", "act", "quiet", "progress", "output", "action", "usual", "max_pixels")
+_NOT_PARAMETERS = ("run", "act", "output", "action", "usual", "max_pixels", *GENERAL)
 
 
 ACTIONS: tuple[EditAction, ...] = (
@@ -42,29 +43,27 @@ ACTIONS: tuple[EditAction, ...] = (
 )
 
 
-def declare(commands: Commands) -> None:
-    """Add the command to the parser.
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
 
     Parameters
     ----------
-    commands : object
-        Returned by `add_subparsers`.
+    parser : argparse.ArgumentParser
+        Changed in place.
     """
-    parser = add_command(
-        commands,
-        "edit",
+    describe(
+        parser,
         run,
-        "another light, gloss or colour for a decomposed photo",
         "Edits a result of isc decompose. Writes a folder with the image (edited.png, "
         "edited.exr), before_after.png (start here) and edit.json. With --photo the edit "
         "is applied to the photo, at its size and in its encoding.",
-        _EXAMPLES,
+        examples=_EXAMPLES,
     )
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
     )
     actions = parser.add_subparsers(
-        title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser
+        title="actions", metavar="ACTION", required=True, dest="action"
     )
     for action in ACTIONS:
         added = actions.add_parser(

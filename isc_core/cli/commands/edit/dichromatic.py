@@ -5,7 +5,7 @@ import argparse
 from ....editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from ....errors import InputError
 from ....scene.decomposition import Decomposition
-from ...interface.options import finite
+from ...interface.values import finite
 from .action import ActionResult, EditAction
 
 

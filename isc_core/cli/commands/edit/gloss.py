@@ -5,7 +5,7 @@ import argparse
 from ....editing.blinn_phong_extension import METHODS, Gloss, change_gloss
 from ....errors import InputError
 from ....scene.decomposition import Decomposition
-from ...interface.options import finite
+from ...interface.values import finite
 from .action import ActionResult, EditAction
 
 _LOOKS = {

@@ -15,7 +15,7 @@ from ....lobe_fitting.light_direction import (
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight, toward
 from ....shading.lobe_rendering import Lobe
-from ...interface.options import finite
+from ...interface.values import finite
 from .action import ActionResult, EditAction
 from .options import add_direction, add_lobe, lobe_of, plain
 from .panels import sphere_panel

@@ -1,6 +1,7 @@
 """Options shared by the actions, and their types."""
 
 import argparse
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,15 +11,12 @@ from ....imaging.srgb import srgb_to_linear
 from ....io.printable_names import readable
 from ....photo import TRANSFERS
 from ....shading.lobe_rendering import DEFAULT_EXPONENT, Lobe
-from ...interface.options import (
-    add_limits,
-    add_output_options,
-    finite,
-)
+from ...interface.options import add_limits
+from ...interface.values import finite
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add the options of every action: the photo, the output and the progress.
+    """Add the options of every action: the photo and the output.
 
     Parameters
     ----------
@@ -47,7 +45,6 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="the folder to write; an earlier edit is replaced",
     )
-    add_output_options(parser, again=True)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
 
@@ -74,7 +71,7 @@ def add_lobe(parser: argparse.ArgumentParser) -> None:
 
 
 def add_direction(parser: argparse.ArgumentParser) -> None:
-    """Add --direction and --color.
+    """Add --direction and --colour.
 
     Parameters
     ----------
@@ -88,12 +85,28 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
         metavar=("X", "Y", "Z"),
         help="toward the light: right, up, toward the viewer; of any length",
     )
-    parser.add_argument(
-        "--color",
-        type=color,
-        metavar="RRGGBB",
-        help="colour of that light, sRGB in hexadecimal (default ffffff, the photo's white)",
+    add_colour(
+        parser, "colour of that light, sRGB in hexadecimal (default ffffff, the photo's white)"
     )
+
+
+def add_colour(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add --colour, and its former spelling --color, which is not shown.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    what : str
+        Its help.
+    """
+    parser.add_argument("--colour", dest="color", type=color, metavar="RRGGBB", help=what)
+    parser.add_argument("--color", type=_former_color, help=argparse.SUPPRESS)
+
+
+def _former_color(text: str) -> np.ndarray:
+    sys.stderr.write("isc: note: --color is now --colour\n")
+    return color(text)
 
 
 def lobe_of(options: argparse.Namespace) -> Lobe | None:

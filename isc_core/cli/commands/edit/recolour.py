@@ -11,13 +11,10 @@ from ....errors import InputError
 from ....io.limits import Limits
 from ....photo import read_raster
 from ....scene.decomposition import Decomposition
-from ...interface.options import (
-    count,
-    finite,
-    limits_of,
-)
+from ...interface.options import limits_of
+from ...interface.values import count, finite
 from .action import ActionResult, EditAction
-from .options import color, plain
+from .options import add_colour, plain
 
 
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
@@ -85,14 +82,9 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         metavar="F",
         help="factor of the brightness (default %(default)s)",
     )
+    add_colour(parser, "the new colour, sRGB in hexadecimal; brightness stays the object's")
     parser.add_argument(
-        "--color",
-        type=color,
-        metavar="RRGGBB",
-        help="the new colour, sRGB in hexadecimal; brightness stays the object's",
-    )
-    parser.add_argument(
-        "--match-brightness", action="store_true", help="use the brightness of --color too"
+        "--match-brightness", action="store_true", help="use the brightness of --colour too"
     )
     parser.add_argument(
         "--region",

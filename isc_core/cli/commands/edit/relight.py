@@ -13,10 +13,8 @@ from ....photo import read_linear
 from ....result_files.known_inputs import read_light
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight, toward, turn, turned_light
-from ...interface.options import (
-    finite,
-    limits_of,
-)
+from ...interface.options import limits_of
+from ...interface.values import finite
 from .action import ActionResult, EditAction
 from .options import add_direction, add_lobe, lobe_of, plain
 from .panels import recovered_light_panel, sphere_panel
@@ -52,7 +50,7 @@ def _new_light(
     if options.light is not None and options.direction is not None:
         raise InputError("--light and --direction both set the light: give one of them")
     if options.direction is None and (options.color is not None or options.ambient is not None):
-        raise InputError("--color and --ambient need --direction: give it too")
+        raise InputError("--colour and --ambient need --direction: give it too")
     if options.direction is not None:
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient

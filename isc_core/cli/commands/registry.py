@@ -1,0 +1,88 @@
+"""The list of the commands of `isc`.
+
+A command is known by its entry here; its module is imported when the command is chosen, so that
+`isc --help` and every other command start without it. The module has `declare(parser)`, which adds
+the options, and sets `run(options, monitor)`, which returns the lines to print and raises
+`InputError` and `Cancelled`.
+
+Packages that build on the core add commands: an entry point of the group `isc.commands` names a
+`CommandEntry` in a module that is cheap to import. A command whose module cannot be imported says
+what to install; the others work all the same.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+_GROUP = "isc.commands"
+
+
+@dataclass(frozen=True)
+class CommandEntry:
+    """A command that can be imported.
+
+    Attributes
+    ----------
+    name : str
+        As typed.
+    summary : str
+        One line of `isc --help`.
+    module : str
+        Full name of the module.
+    extra : str
+        The extra of the package that installs what the command needs.
+    """
+
+    name: str
+    summary: str
+    module: str
+    extra: str = ""
+
+
+def _core(name: str, summary: str, extra: str = "") -> CommandEntry:
+    return CommandEntry(name, summary, f"{__package__}.{name.replace('-', '_')}", extra)
+
+
+CORE = (
+    _core("decompose", "everything: layers, shape, light, shading, reflectance, mesh"),
+    _core("separate", "diffuse and specular light only"),
+    _core("mask", "segment the object inside a box"),
+    _core("edit", "another light, gloss or colour for a decomposed photo"),
+    _core("batch", "isc decompose for many photos, resumable", "batch"),
+    _core("arrays", "a result as plain NumPy arrays"),
+    _core("evaluate", "accuracy on a data set with ground truth"),
+    _core("fit-priors", "fit the priors of shape, reflectance and light"),
+    _core("completion", "completion of commands and options for a shell"),
+)
+
+
+def all_commands() -> Iterator[CommandEntry]:
+    """Iterate over the commands of the core, then those of other installed packages.
+
+    Yields
+    ------
+    CommandEntry
+    """
+    yield from CORE
+    # A tenth of a second: only where a command is not the core's.
+    from importlib.metadata import entry_points
+
+    for entry in entry_points(group=_GROUP):
+        try:
+            yield entry.load()
+        except ImportError as error:
+            yield CommandEntry(entry.name, f"not available: {error}", entry.module)
+
+
+def find_command(name: str) -> CommandEntry | None:
+    """Find a command by its name.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    CommandEntry or None
+        None if there is no such command.
+    """
+    return next((entry for entry in all_commands() if entry.name == name), None)

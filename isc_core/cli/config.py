@@ -1,0 +1,145 @@
+"""Defaults of options from a TOML file.
+
+`isc.toml` in the current folder, or the file of `--config`, has a table for each command, with the
+long names of its options:
+
+    [decompose]
+    model = "sirfs"
+    max-size = 384
+    full-size = true
+
+    [edit.gloss]
+    look = "metallic"
+
+What the command line gives wins. Paths are relative to the file. Values are checked as on the
+command line; `--no-config` ignores the file.
+"""
+
+import argparse
+import difflib
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..errors import InputError
+from .commands.registry import all_commands, find_command
+from .interface.parser import GENERAL, actions_of
+
+USUAL = Path("isc.toml")
+_MAX_BYTES = 1 << 20
+
+
+def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> Path | None:
+    """Make the values of a configuration file the defaults of a parser.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        That of `isc`; changed in place.
+    arguments : sequence of str
+        What will be parsed.
+
+    Returns
+    -------
+    Path or None
+        The file, if there is one.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or has a table, an option or a value that does not exist.
+    """
+    path = _find(arguments)
+    if path is None:
+        return None
+    inner = dict(actions_of(parser))
+    for name, table in _read(path).items():
+        if not isinstance(table, dict):
+            raise InputError(f"{path}: {name!r} is in no table: put it below [decompose]")
+        if name in inner and inner[name].get_default("run") is not None:
+            _apply(inner[name], table, path, name)
+        elif find_command(name) is None:
+            known = [entry.name for entry in all_commands()]
+            raise InputError(f"{path}: there is no command {name!r}: {_advice(name, known)}")
+    return path
+
+
+def _find(arguments: Sequence[str]) -> Path | None:
+    finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    finder.add_argument("--config", nargs="?", type=Path)
+    finder.add_argument("--no-config", action="store_true")
+    known, _ = finder.parse_known_args(arguments)
+    if known.config is not None:
+        return Path(known.config)
+    return None if known.no_config or not USUAL.is_file() else USUAL
+
+
+def _read(path: Path) -> dict[str, object]:
+    if not path.is_file():
+        raise InputError(f"{path}: no such file: give a TOML file with --config")
+    if path.stat().st_size > _MAX_BYTES:
+        raise InputError(f"{path} is larger than {_MAX_BYTES} bytes: is it a configuration file?")
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is not UTF-8: save it so") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path} is not valid TOML: {error}") from error
+
+
+def _apply(
+    parser: argparse.ArgumentParser, table: dict[str, object], path: Path, where: str
+) -> None:
+    inner, options = dict(actions_of(parser)), _options(parser)
+    for key, value in table.items():
+        if key in inner and isinstance(value, dict):
+            _apply(inner[key], value, path, f"{where}.{key}")
+        elif key in options:
+            parser.set_defaults(**{options[key].dest: _value(options[key], value, path, where)})
+            options[key].required = False
+        else:
+            known = [*options, *inner]
+            raise InputError(f"{path}: [{where}] has no option {key!r}: {_advice(key, known)}")
+
+
+def _options(parser: argparse.ArgumentParser) -> dict[str, argparse.Action]:
+    """The options that a file may set, by their long names."""
+    return {
+        option.removeprefix("--"): action
+        for action in parser._actions
+        for option in action.option_strings
+        if option.startswith("--") and action.dest not in (*GENERAL, "help", "output")
+    }
+
+
+def _advice(name: str, known: list[str]) -> str:
+    close = difflib.get_close_matches(name, known, 1)
+    return f"did you mean {close[0]}?" if close else f"choose one of {', '.join(sorted(known))}"
+
+
+def _value(action: argparse.Action, value: object, path: Path, where: str) -> object:
+    """The value as the option stores it."""
+    name = f"{path}: {action.option_strings[-1].removeprefix('--')} of [{where}]"
+    if action.nargs == 0:
+        if not isinstance(value, bool):
+            raise InputError(f"{name} is true or false, not {value!r}")
+        return value if isinstance(action.const, bool) else action.default
+    repeated = action.nargs is not None or isinstance(action, argparse._AppendAction)
+    if repeated != isinstance(value, list):
+        raise InputError(f"{name} is {'a list' if repeated else 'one value'}, not {value!r}")
+    if isinstance(value, list):
+        return [_converted(action, one, path, name) for one in value]
+    return _converted(action, value, path, name)
+
+
+def _converted(action: argparse.Action, value: object, path: Path, name: str) -> object:
+    if isinstance(value, bool) or not isinstance(value, str | int | float):
+        raise InputError(f"{name} is a text or a number, not {value!r}")
+    kind = action.type
+    try:
+        converted = kind(str(value)) if callable(kind) else str(value)
+    except (argparse.ArgumentTypeError, ValueError) as error:
+        raise InputError(f"{name}: {error}") from error
+    if action.choices is not None and converted not in action.choices:
+        raise InputError(f"{name}: unknown {value!r}: choose {', '.join(map(str, action.choices))}")
+    return path.parent / converted if isinstance(converted, Path) else converted

@@ -1,0 +1,182 @@
+"""Values on the command line: the types of options, with errors in one line."""
+
+import argparse
+import math
+import sys
+from collections.abc import Callable
+
+
+def current_name(setting: str) -> Callable[[str], str]:
+    """Make the type of an option whose values were renamed.
+
+    Parameters
+    ----------
+    setting : str
+        Field of `Settings`.
+
+    Returns
+    -------
+    callable
+        Replaces a value of an earlier version, and names the new one on stderr.
+    """
+
+    def read(text: str) -> str:
+        from ...decomposition.settings import renamed_value
+
+        current = renamed_value(setting, text)
+        if current is None:
+            return text
+        option = f"--{setting.replace('_', '-')}"
+        sys.stderr.write(f"isc: {option} {text} is now called {current}: use {option} {current}\n")
+        return str(current)
+
+    return read
+
+
+def count(text: str) -> int:
+    """Parse a whole number, 0 or more.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 0 or more")
+    return value
+
+
+def whole(text: str) -> int:
+    """Parse a whole number, 1 or more.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    value = count(text)
+    if value == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 1 or more")
+    return value
+
+
+def number(text: str) -> float:
+    """Parse a finite number other than 0.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    value = _finite_or_none(text)
+    if not value:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number other than 0")
+    return value
+
+
+def finite(text: str) -> float:
+    """Parse a finite number.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    value = _finite_or_none(text)
+    if value is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
+def _finite_or_none(text: str) -> float | None:
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def positive(text: str) -> float:
+    """Parse a finite number greater than 0.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    value = number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0")
+    return value
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Parse names separated by commas.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If there is no name.
+    """
+    parsed = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not parsed:
+        raise argparse.ArgumentTypeError("give at least one name")
+    return parsed

@@ -1,0 +1,89 @@
+"""Defaults of options from isc.toml."""
+
+from pathlib import Path
+
+import pytest
+
+from isc_core.cli.commands import build_parser
+from isc_core.cli.config import apply_config
+from isc_core.cli.main import main
+from isc_core.errors import InputError
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def parsed(text: str, *words: str, file: str = "isc.toml") -> dict[str, object]:
+    """The options of a command line beside a configuration file."""
+    Path(file).parent.mkdir(exist_ok=True)
+    Path(file).write_text(text)
+    arguments = list(words)
+    parser = build_parser(arguments)
+    apply_config(parser, arguments)
+    return vars(parser.parse_args(arguments))
+
+
+WORDS = ("decompose", "a.png", "-o", "out")
+
+
+def test_the_file_sets_defaults_and_the_command_line_wins() -> None:
+    text = '[decompose]\nmodel = "sirfs"\nmax-size = 300\nfull-size = true\n[batch]\nworkers = 2\n'
+    options = parsed(text, *WORDS, "--max-size", "200")
+    assert (options["model"], options["max_size"], options["full_size"]) == ("sirfs", 200, True)
+    assert parsed(text, *WORDS, "--no-config")["model"] == "joint"
+
+
+def test_a_file_elsewhere_is_named_and_its_paths_are_its_own() -> None:
+    text = '[decompose]\npriors = "mine.npz"\n'
+    options = parsed(text, *WORDS, "--config", "there/my.toml", file="there/my.toml")
+    assert options["priors"] == Path("there/mine.npz")
+
+
+def test_actions_have_tables_inside_their_command() -> None:
+    text = '[edit.gloss]\nlook = "metallic"\n[edit.highlight]\ndirection = [0, 0.5, 1]\n'
+    assert parsed(text, "edit", "cup", "gloss", "-o", "out")["look"] == "metallic"
+    light = parsed(text, "edit", "cup", "highlight", "-o", "out")
+    assert light["direction"] == [0, 0.5, 1]
+
+
+def test_lists_of_names_and_repeated_options() -> None:
+    options = parsed(
+        '[separate]\nset = ["a=1", "b=2"]\nmethod = "shen_2013"\n', "separate", "a.png", "-o", "out"
+    )
+    assert (options["changes"], options["method"]) == (["a=1", "b=2"], "shen_2013")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("[decompose]\nmodell = 'mdr'", "[decompose] has no option 'modell': did you mean model?"),
+        ("[decompos]\n", "there is no command 'decompos': did you mean decompose?"),
+        ("model = 'sirfs'", "'model' is in no table"),
+        ("[decompose]\nmax-size = -3", "max-size of [decompose]: '-3' is not a whole number"),
+        ("[decompose]\nmax-size = [3]", "is one value, not [3]"),
+        ('[decompose]\nfull-size = "yes"', "is true or false, not 'yes'"),
+        ('[decompose]\nillumination = "sun"', "unknown 'sun': choose natural, laboratory"),
+        ("[decompose]\noutput = 'x'", "has no option 'output'"),
+        ("[decompose\n", "is not valid TOML"),
+        ("[decompose]\nmodel = 1979-05-27", "is a text or a number"),
+    ],
+)
+def test_mistakes_name_the_file_and_the_option(text: str, message: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        parsed(text, *WORDS)
+    assert str(refusal.value).startswith("isc.toml")
+    assert message in str(refusal.value)
+
+
+def test_a_missing_file_is_one_error(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([*WORDS, "--config", "none.toml"]) == 2
+    assert capsys.readouterr().err.startswith("isc: error: none.toml: no such file")
+
+
+def test_a_file_that_is_not_text_is_one_error(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("isc.toml").write_bytes(b"\xff\xfe[decompose]")
+    assert main([*WORDS]) == 2
+    assert "is not UTF-8" in capsys.readouterr().err

@@ -1,0 +1,190 @@
+"""Several photos, a photo from standard input, PNG layers, --open, -v, and completion."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from isc_core.cli.main import main
+from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.result_files.result_folder import load
+from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, write_image
+
+NAIVE = ("--model", "naive")
+
+
+def isc(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+def two_photos(folder: Path) -> tuple[Path, Path]:
+    return ball_photo(folder), write_image(folder / "other ball.png", ball_codes(24.0))
+
+
+def test_several_photos_get_a_folder_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two_photos(tmp_path)
+    assert isc("decompose", first, second, *NAIVE, "-o", tmp_path / "out") == 0
+    printed = capsys.readouterr()
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["ball", "other_ball"]
+    assert load(tmp_path / "out" / "ball").provenance.input["name"] == "ball.png"
+    assert printed.out.count("see ") == 2 and "other ball.png: writing maps" in printed.err
+    assert isc("decompose", first, *NAIVE, "-q", "-o", tmp_path / "one") == 0
+    alone, together = (load(tmp_path / name) for name in ("one", "out/ball"))
+    assert np.array_equal(alone.reflectance, together.reflectance)
+
+
+def test_a_photo_that_fails_does_not_stop_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two_photos(tmp_path)
+    broken = tmp_path / "broken.png"
+    broken.write_bytes(first.read_bytes()[:200])
+    assert isc("decompose", first, broken, second, *NAIVE, "-q", "-o", tmp_path / "out") == 1
+    errors = capsys.readouterr().err.splitlines()
+    assert "broken.png" in errors[0] and errors[1].endswith("1 of 3 photos failed, see above")
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["ball", "other_ball"]
+
+
+def test_what_belongs_to_one_photo_is_refused_for_several(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    first, second = two_photos(tmp_path)
+    (tmp_path / "more").mkdir()
+    same = shutil.copy(first, tmp_path / "more" / "Ball.jpeg")
+    for words, message in (
+        ((first, second, "--mask", first), "--mask belongs to one photo"),
+        ((first, second, "--depth", first), "--depth belongs to one photo"),
+        ((first, same), "would both be written"),
+        ((first, "-"), "- is one photo from standard input"),
+    ):
+        assert isc("decompose", *words, "-o", tmp_path / "out") == 2
+        assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("decompose", "-", *NAIVE, "-o", "out"),
+        ("separate", "-", "--method", "none", "-o", "out"),
+        ("mask", "-", "--box", "2,2,48,44", "-o", "out.png"),
+    ],
+)
+def test_a_photo_from_standard_input(tmp_path: Path, words: tuple[str, ...]) -> None:
+    photo = ball_photo(tmp_path)
+    command = isc_command(*words[:-1], tmp_path / words[-1], "-q")
+    for data, code, message in (
+        (photo.read_bytes(), 0, ""),
+        (photo.read_bytes()[:99], 2, "isc: error: standard input: the PNG file is damaged"),
+        (b"", 2, "isc: error: standard input: the file is empty"),
+    ):
+        done = subprocess.run(command, cwd=ROOT, input=data, capture_output=True, check=False)
+        assert done.returncode == code, done.stderr
+        assert done.stderr.decode().startswith(message)
+    assert (tmp_path / words[-1]).exists()
+
+
+def test_standard_input_has_one_reader(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert isc("separate", "-", "--progress", "json", "-o", tmp_path / "out") == 2
+    assert "give a file, not -" in capsys.readouterr().out
+
+
+def test_png_layers_are_the_maps(tmp_path: Path) -> None:
+    photo, out = ball_photo(tmp_path), tmp_path / "out"
+    assert isc("decompose", photo, *NAIVE, "--png", "-q", "-o", out) == 0
+    d = load(out)
+    diffuse = np.asarray(Image.open(out / "maps" / "diffuse.png"))
+    expected = np.rint(255 * linear_to_srgb(np.clip(d.diffuse, 0, 1)))
+    assert np.array_equal(diffuse[..., :3], expected)
+    assert np.array_equal(diffuse[..., 3] > 0, d.mask)
+    normal = np.asarray(Image.open(out / "maps" / "normal.png"))[..., :3]
+    assert np.abs(normal / 127.5 - 1 - d.normal)[d.mask].max() < 0.01
+    height = np.asarray(Image.open(out / "maps" / "height.png"))
+    assert height.dtype == np.uint16 and height.shape == d.height.shape
+    # A result without them replaces it.
+    assert isc("decompose", photo, *NAIVE, "-q", "-o", out) == 0
+    assert not (out / "maps" / "diffuse.png").exists()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the viewer is called xdg-open on Linux")
+def test_open_shows_the_preview(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer = tmp_path / "bin" / "xdg-open"
+    viewer.parent.mkdir()
+    viewer.write_text(f'#!/bin/sh\necho "$1" > {tmp_path}/shown\n')
+    viewer.chmod(0o755)
+    photo, out = ball_photo(tmp_path), tmp_path / "out"
+    words = ("separate", photo, "--method", "none", "--open", "-o", out)
+    monkeypatch.setenv("PATH", f"{viewer.parent}{os.pathsep}{os.environ['PATH']}")
+    assert isc(*words) == 0
+    shown = tmp_path / "shown"
+    for _ in range(200):
+        if shown.exists() and shown.read_text():
+            break
+        subprocess.run(["sleep", "0.05"], check=True)
+    assert shown.read_text().strip() == str(out / "preview.png")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the viewer is called xdg-open on Linux")
+def test_a_machine_without_a_viewer_gets_a_note(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PATH", str(tmp_path))
+    words = ("separate", ball_photo(tmp_path), "--method", "none", "--open", "-o", tmp_path / "out")
+    assert isc(*words) == 0
+    assert "note: --open found no viewer" in capsys.readouterr().out
+
+
+def test_verbose_prints_each_stage_with_its_time(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert isc("decompose", ball_photo(tmp_path), *NAIVE, "-v", "-o", tmp_path / "out") == 0
+    lines = capsys.readouterr().err.splitlines()
+    times = [float(line.removeprefix("isc: ").split(" s  ")[0]) for line in lines]
+    assert len(times) > 3 and times == sorted(times)
+
+
+# --- completion -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion_knows_commands_and_options(
+    shell: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert isc("completion", shell) == 0
+    script = capsys.readouterr().out
+    for word in ("decompose", "light-direction", "max-size", "glossy-mit", "silhouette"):
+        assert word in script
+    if shutil.which(shell):
+        checked = subprocess.run([shell, "-n"], input=script, text=True, check=False)
+        assert checked.returncode == 0
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+def test_bash_completes(capsys: pytest.CaptureFixture[str]) -> None:
+    assert isc("completion", "bash") == 0
+    script = capsys.readouterr().out
+    for line, expected in (
+        ("isc dec", "decompose"),
+        ("isc decompose --max-s", "--max-size"),
+        ("isc decompose --illumination lab", "laboratory"),
+    ):
+        words = line.split()
+        ask = (
+            f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; COMP_LINE='{line}'\n"
+            f"COMP_POINT={len(line)}; _shtab_isc isc {words[-1]} {words[-2]}\n"
+            'echo "${COMPREPLY[@]}"'
+        )
+        done = subprocess.run(["bash", "-c", ask], capture_output=True, text=True, check=False)
+        assert done.stdout.split() == [expected], done.stderr
+
+
+def test_an_unknown_shell_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert isc("completion", "tcsh") == 2
+    assert "bash" in capsys.readouterr().err

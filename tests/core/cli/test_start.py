@@ -1,0 +1,192 @@
+"""The start of the command: what it imports, and Ctrl-C before the work begins."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from isc_core.cli.commands import build_parser
+from isc_core.cli.commands.registry import CORE, all_commands
+from isc_core.cli.interface.parser import actions_of
+from tests.core.command_line import ROOT, ball_photo, isc_command
+
+NUMERICAL = {"numpy", "scipy", "numba", "cv2", "OpenEXR", "trimesh", "PIL", "mitsuba", "matplotlib"}
+
+
+def loaded(*arguments: str) -> set[str]:
+    """The modules in memory after `isc ARGUMENTS`."""
+    code = (
+        "import sys; from isc_core.cli.main import main\n"
+        f"main({list(arguments)!r})\n"
+        "print('\\n' + ' '.join(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("--version",)])
+def test_the_help_imports_no_command(arguments: tuple[str, ...]) -> None:
+    modules = loaded(*arguments)
+    assert not modules & NUMERICAL
+    commands = {entry.module for entry in all_commands()}
+    assert not modules & commands
+
+
+def test_a_command_imports_no_other_command() -> None:
+    modules = loaded("mask", "--help")
+    others = {entry.module for entry in CORE if entry.name != "mask"}
+    assert not modules & others
+
+
+def test_a_command_of_the_core_looks_for_no_other_package() -> None:
+    """The search among installed packages takes a tenth of a second."""
+    code = (
+        "import importlib.metadata as m\n"
+        "def forbidden(**what): raise AssertionError\n"
+        "m.entry_points = forbidden\n"
+        "from isc_core.cli.commands import build_parser; build_parser(['mask', '--help'])"
+    )
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+def test_every_command_has_the_general_options_and_the_exit_codes() -> None:
+    commands = dict(actions_of(build_parser()))
+    assert set(commands) == {entry.name for entry in all_commands()}
+    for entry in all_commands():
+        text = commands[entry.name].format_help()
+        for words in ("-q, --quiet", "-v, --verbose", "--progress", "--config", "exit codes: 0"):
+            assert words in text, (entry.name, words)
+
+
+def test_the_help_of_decompose_has_a_line_for_each_model_and_method() -> None:
+    from isc_core.decomposition.settings import MODELS
+    from isc_core.separation import METHODS
+
+    text = dict(actions_of(build_parser(["decompose"])))["decompose"].format_help()
+    assert text.index("main options:") < text.index("model:") < text.index("known inputs:")
+    for name in (*MODELS, *METHODS):
+        assert re.search(rf"^  {name} +\S", text, re.MULTILINE), name
+
+
+# --- Ctrl-C ---------------------------------------------------------------------------------------
+
+
+def default_interrupt() -> None:
+    """Handle Ctrl-C as a terminal's program does, also where the tests run in the background."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def interrupted(command: list[str], seconds: float) -> tuple[int, str]:
+    """Exit code and standard error of a process that gets SIGINT after some time."""
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=default_interrupt,
+    ) as process:
+        time.sleep(seconds)
+        process.send_signal(signal.SIGINT)
+        _, errors = process.communicate(timeout=60)
+    return process.returncode, errors
+
+
+@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
+def test_an_interrupt_while_libraries_load_is_never_lost(tmp_path: Path, share: float) -> None:
+    """At shares of the time of a run that only starts: nothing is written, the code is 130."""
+    photo, output = ball_photo(tmp_path), tmp_path / "out"
+    command = isc_command("decompose", photo, "--model", "naive", "-o", output)
+    start = time.monotonic()
+    subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
+    lasted = time.monotonic() - start
+    for file in sorted(output.rglob("*"), reverse=True):
+        file.rmdir() if file.is_dir() else file.unlink()
+    output.rmdir()
+    code, errors = interrupted(command, max(0.1, share * lasted))
+    if code == 0:  # the machine was faster this time
+        assert output.is_dir()
+        return
+    assert (code, "Traceback" in errors) == (130, False), errors
+    assert errors.splitlines()[-1] == "isc: cancelled"
+    assert [path.name for path in tmp_path.iterdir() if path != output] == [photo.name]
+
+
+SWALLOW = """
+import sys, types
+class Greedy:
+    def find_spec(self, name, path=None, target=None):
+        if name == "isc_core.photo.grabcut" and not self.done:
+            self.done = True
+            import os, signal
+            try:
+                os.kill(os.getpid(), signal.SIGINT)
+                for _ in range(10**6): pass
+            except BaseException as error:
+                raise ImportError("wrapped") from error
+    done = False
+sys.meta_path.insert(0, Greedy())
+import signal; signal.signal(signal.SIGINT, signal.default_int_handler)
+"""
+
+
+def test_a_library_that_swallows_the_interrupt_does_not_keep_it(tmp_path: Path) -> None:
+    """Some libraries catch everything that is raised while they import others."""
+    command = isc_command(
+        "mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "m.png", before=SWALLOW
+    )
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "isc: cancelled\n")
+
+
+def test_the_handler_is_installed_before_anything_is_imported() -> None:
+    code = (
+        "import sys\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'isc_core.cli':\n"
+        "            import os, signal; os.kill(os.getpid(), signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "from isc_core.__main__ import start; start()"
+    )
+    for words, out, err in (
+        ([], "", "isc: cancelled\n"),
+        (["--progress=json"], '{"event": "cancelled"}\n', ""),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-c", code, *words],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stdout, done.stderr) == (130, out, err)
+
+
+# --- colours --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("variables", "coloured"),
+    [({}, False), ({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)],
+)
+def test_errors_have_colour_where_it_is_wanted(variables: dict[str, str], coloured: bool) -> None:
+    environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
+    done = subprocess.run(
+        isc_command("separate", "no-such.png", "-o", "out"),
+        cwd=ROOT,
+        env={**environment, **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert ("\x1b[" in done.stderr) == coloured
