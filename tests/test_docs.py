@@ -32,7 +32,8 @@ GUIDES = ("index.md", "quickstart", "how_to", "methods", "results.md", "concepts
 def pages() -> list[Path]:
     """Return the pages, without the single tables and figures of the thesis."""
     kept = [page for page in sorted(DOCS.rglob("*.md")) if page.parent != DOCS / "thesis"]
-    return [ROOT / "README.md", ROOT / "SECURITY.md", DOCS / "thesis" / "README.md", *kept]
+    root = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")]
+    return [*root, DOCS / "thesis" / "README.md", *kept]
 
 
 def guides() -> list[Path]:

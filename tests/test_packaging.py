@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import os
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -319,20 +320,25 @@ def check_the_commands(made: Environment) -> None:
     assert "pip install 'dask[distributed]>=" in made.refused("batch", ".", "-o", "catalogue")
     assert "pip install 'matplotlib>=" in made.refused("thesis", "list")
 
+    for shell in ("bash", "zsh", "fish"):
+        script = made.isc("completion", shell)
+        assert "decompose" in script and "--max-size" in script and "thesis" in script
+
     photo = ball_photo(made.work)
-    made.isc("decompose", photo, "--model", "naive", "-q", "-o", "naive")
+    cup = shutil.copy2(photo, made.work / "cup.png")
     made.isc("decompose", photo, "--max-size", 32, "-q", "-o", "small")
-    for folder in ("naive", "small"):
+    made.isc("decompose", photo, cup, "--model", "naive", "-q", "-o", "naive")
+    for folder in ("small", "naive/ball", "naive/cup"):
         assert {"preview.png", "mesh.glb", "maps.exr"} <= {
             path.name for path in (made.work / folder).iterdir()
         }
 
 
 def check_the_five_lines(made: Environment) -> None:
+    assert (made.work / "cup.png").is_file()
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     lines = re.search(r"^```python\n(.*?)^```", readme, re.DOTALL | re.MULTILINE)
     assert lines is not None
-    ball_photo(made.work).rename(made.work / "cup.png")
     done = made.python("-c", lines[1])
     assert done.returncode == 0, done.stderr
     assert (made.work / "cup" / "preview.png").is_file()
