@@ -1,3 +1,56 @@
-"""Intrinsic scene characteristics from one photo of a glossy object."""
+"""Intrinsic scene characteristics from one photo of a glossy object.
+
+`decompose`, `separate`, `save` and `load` are the Python interface; `Settings`, `KnownInputs` and
+`Monitor` are what they take, `Photo`, `Decomposition` and `Separation` what they work on, and
+`InputError` and `Cancelled` what they raise. Nothing is imported before it is used.
+"""
+
+from typing import TYPE_CHECKING
+
+from .lazy import exports
+
+if TYPE_CHECKING:
+    from .api import decompose, load, save, separate
+    from .decomposition.settings import Settings
+    from .errors import Cancelled, InputError
+    from .photo.photo import Photo
+    from .progress import Monitor, ProgressEvent
+    from .scene.decomposition import Decomposition, Separation
+    from .scene.known_inputs import KnownInputs
+else:
+    __getattr__ = exports(
+        __name__,
+        {
+            "Cancelled": ".errors",
+            "Decomposition": ".scene.decomposition",
+            "InputError": ".errors",
+            "KnownInputs": ".scene.known_inputs",
+            "Monitor": ".progress",
+            "Photo": ".photo.photo",
+            "ProgressEvent": ".progress",
+            "Separation": ".scene.decomposition",
+            "Settings": ".decomposition.settings",
+            "decompose": ".api",
+            "load": ".api",
+            "save": ".api",
+            "separate": ".api",
+        },
+    )
 
 __version__ = "0.1.0"
+__all__ = [
+    "Cancelled",
+    "Decomposition",
+    "InputError",
+    "KnownInputs",
+    "Monitor",
+    "Photo",
+    "ProgressEvent",
+    "Separation",
+    "Settings",
+    "__version__",
+    "decompose",
+    "load",
+    "save",
+    "separate",
+]

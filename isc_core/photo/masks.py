@@ -1,7 +1,5 @@
 """Finding the object's mask in a photo, and checking it."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 
@@ -9,8 +7,7 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
 from ..imaging.srgb import srgb_to_linear
-from ..io.decoders import MIN_SIDE, Raster, read_raster
-from ..io.limits import Limits
+from ..io.decoders import MIN_SIDE, Raster
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
@@ -62,47 +59,38 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
 
 
 def find_mask(
-    path: str | Path,
-    raster: Raster,
-    linear: np.ndarray,
-    mask_path: str | Path | None,
-    whole_frame: bool,
-    limits: Limits,
+    name: str, raster: Raster, linear: np.ndarray, whole_frame: bool
 ) -> tuple[np.ndarray, str]:
-    """Find the object's mask, and where it comes from.
+    """Find the object's mask in the photo itself, and where it comes from.
 
     Parameters
     ----------
-    path : str or Path
+    name : str
         The photo; opens the error message.
     raster : Raster
         Of the photo.
     linear : (H, W, 1 or 3) ndarray
         Its linear light.
-    mask_path : str or Path, optional
     whole_frame : bool
-        Take all pixels where there is no mask, no alpha channel and no black border.
-    limits : Limits
+        Take all pixels where there is no alpha channel and no black border.
 
     Returns
     -------
     mask : (H, W) bool ndarray
     source : str
-        "file", "alpha", "black border" or "whole frame".
+        "alpha", "black border" or "whole frame".
 
     Raises
     ------
     InputError
         If no mask is found.
     """
-    if mask_path is not None:
-        return _read_mask(mask_path, raster, limits), "file"
     if raster.transparency is not None:
         return raster.transparency >= 0.5, "alpha"
     light = finite_or_zero(largest(linear))
     if not (light > 0).any():
         raise InputError(
-            f"{path}: the image is black: there is nothing to recover; use another photo"
+            f"{name}: the image is black: there is nothing to recover; use another photo"
         )
     # A float file has no peak value: use its 99th percentile as white.
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
@@ -111,22 +99,43 @@ def find_mask(
         if whole_frame:
             return np.ones_like(bright), "whole frame"
         raise InputError(
-            f"{path}: there is no mask, no transparency and no black border: "
+            f"{name}: there is no mask, no transparency and no black border: "
             "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask"
         )
     if not bright.any():
         raise InputError(
-            f"{path}: the image is almost black: there is nothing to recover; use another photo"
+            f"{name}: the image is almost black: there is nothing to recover; use another photo"
         )
     return tidy_mask(bright), "black border"
 
 
-def _read_mask(mask_path: str | Path, photo: Raster, limits: Limits) -> np.ndarray:
-    raster = read_raster(mask_path, limits)
+def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
+    """Return the mask that an image shows.
+
+    Parameters
+    ----------
+    raster : Raster
+        Of the image.
+    name : str
+        Opens the error message.
+    photo : Raster
+        The photo.
+
+    Returns
+    -------
+    (H, W) bool ndarray
+        Where the alpha channel is at least 0.5; without one, where the values are above half of the
+        largest.
+
+    Raises
+    ------
+    InputError
+        If the sizes differ.
+    """
     if raster.values.shape[:2] != photo.values.shape[:2]:
         (h, w), (mask_h, mask_w) = photo.values.shape[:2], raster.values.shape[:2]
         raise InputError(
-            f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: use a "
+            f"{name}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: use a "
             "mask of the photo's size"
         )
     if raster.transparency is not None:

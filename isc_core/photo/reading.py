@@ -16,7 +16,7 @@ from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
-from .masks import check_mask, find_mask
+from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
 from .transfer import resolve_transfer, to_linear
 
@@ -61,15 +61,58 @@ def read_photo(
         If anything cannot be used; the message names the remedy.
     """
     raster = read_raster(path, limits)
+    mask = None if mask_path is None else read_raster(mask_path, limits)
+    return photo_from_raster(
+        raster, str(path), mask, str(mask_path), transfer=transfer, whole_frame=whole_frame
+    )
+
+
+def photo_from_raster(
+    raster: Raster,
+    name: str,
+    mask_raster: Raster | None = None,
+    mask_name: str = "",
+    *,
+    transfer: str = "auto",
+    whole_frame: bool = False,
+) -> Photo:
+    """Make a photo of decoded files.
+
+    Parameters
+    ----------
+    raster : Raster
+        The photo.
+    name : str
+        Opens the error messages.
+    mask_raster : Raster, optional
+        The mask.
+    mask_name : str
+        Opens the error messages about it.
+    transfer : {"auto", "srgb", "linear"}
+    whole_frame : bool
+        As for `read_photo`.
+
+    Returns
+    -------
+    Photo
+
+    Raises
+    ------
+    InputError
+        If anything cannot be used; the message names the remedy.
+    """
     used = resolve_transfer(transfer, raster)
-    _check_not_constant(raster.values, f"{path}: every pixel")
+    _check_not_constant(raster.values, f"{name}: every pixel")
     linear = to_linear(raster, used)
-    mask, mask_from = find_mask(path, raster, linear, mask_path, whole_frame, limits)
-    check_mask(mask, f"{path if mask_path is None else mask_path}: the mask")
-    _check_not_constant(raster.values[mask], f"{path}: every pixel inside the mask")
+    if mask_raster is None:
+        mask, mask_from = find_mask(name, raster, linear, whole_frame)
+    else:
+        mask, mask_from = mask_of(mask_raster, mask_name, raster), "file"
+    check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
+    _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
     height, width = mask.shape
     return Photo(
-        image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, path)),
+        image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name)),
         mask=mask,
         code_value=_code_value(raster, used, linear, mask),
         clipped=np.zeros_like(mask)

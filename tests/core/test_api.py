@@ -1,0 +1,118 @@
+"""The Python interface: files and arrays, masks, settings, saving and loading."""
+
+import importlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import isc_core
+from isc_core import InputError, Settings
+from isc_core.photo import read_photo
+from tests.core.command_line import ball_codes, ball_photo
+
+NAIVE = Settings(model="naive")
+
+
+@pytest.fixture(scope="module")
+def codes() -> np.ndarray:
+    """The ball's photo, (H, W, 3) uint16 sRGB codes."""
+    return ball_codes()
+
+
+def test_a_file_and_its_array_give_the_same_result(tmp_path: Path, codes: np.ndarray) -> None:
+    path = ball_photo(tmp_path)
+    from_file = isc_core.decompose(path, settings=NAIVE)
+    from_array = isc_core.decompose(codes, settings=NAIVE)
+    from_photo = isc_core.decompose(read_photo(path), settings=NAIVE)
+    for name in ("image", "reflectance", "shading", "normal", "height", "mask"):
+        expected = getattr(from_file, name)
+        assert np.array_equal(getattr(from_array, name), expected), name
+        assert np.array_equal(getattr(from_photo, name), expected), name
+    assert from_file.provenance.input["name"] == "ball.png"
+    assert from_array.identity_errors().broken() == ()
+
+
+def test_floats_are_linear_and_codes_are_srgb(codes: np.ndarray) -> None:
+    photo = isc_core.decompose(codes, settings=NAIVE)
+    linear = isc_core.decompose(photo.image, settings=NAIVE)
+    np.testing.assert_array_equal(linear.image, photo.image)
+    same = isc_core.decompose(codes.astype(np.float64) / 65535, settings=NAIVE, transfer="srgb")
+    np.testing.assert_allclose(same.image, photo.image, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", [bool, np.uint8, np.float32])
+def test_a_mask_is_an_array_or_a_file(tmp_path: Path, codes: np.ndarray, kind: type) -> None:
+    mask = np.zeros(codes.shape[:2], bool)
+    mask[14:34, 18:36] = True
+    Image.fromarray((255 * mask).astype(np.uint8)).save(tmp_path / "mask.png")
+    path = ball_photo(tmp_path)
+    for image in (codes, path):
+        from_array = isc_core.decompose(image, mask.astype(kind), settings=NAIVE)
+        from_file = isc_core.decompose(image, tmp_path / "mask.png", settings=NAIVE)
+        assert np.array_equal(from_array.mask, mask)
+        assert np.array_equal(from_file.mask, mask)
+
+
+def test_alpha_and_grey(codes: np.ndarray) -> None:
+    inside = codes.max(axis=2) > 0
+    rgba = np.dstack([codes >> 8, np.where(inside, 255, 0)]).astype(np.uint8)
+    assert np.array_equal(isc_core.decompose(rgba, settings=NAIVE).mask, inside)
+    grey = isc_core.decompose(codes[..., 1], settings=NAIVE)
+    assert np.array_equal(grey.image[..., 0], grey.image[..., 2])
+
+
+def test_results_survive_saving(tmp_path: Path, codes: np.ndarray) -> None:
+    result = isc_core.decompose(codes, settings=NAIVE)
+    isc_core.save(result, tmp_path / "ball")
+    loaded = isc_core.load(tmp_path / "ball")
+    assert np.array_equal(loaded.reflectance, result.reflectance)
+    assert loaded.provenance.settings["model"] == "naive"
+
+
+def test_layers_can_be_separated_and_saved(tmp_path: Path, codes: np.ndarray) -> None:
+    layers = isc_core.separate(codes)
+    image = layers.diffuse + layers.specular + layers.residual
+    np.testing.assert_allclose(image, read_photo(ball_photo(tmp_path)).image, atol=1e-6)
+    isc_core.save(layers, tmp_path / "layers")
+    assert (tmp_path / "layers" / "separation.exr").is_file()
+    patch = codes[18:30, 18:30]  # no border and no mask: all of it
+    whole = isc_core.separate(patch, method="none")
+    assert np.array_equal(whole.diffuse > 0, patch > 0)
+
+
+@pytest.mark.parametrize(
+    ("image", "mask", "message"),
+    [
+        (np.zeros((40, 40, 2), np.uint8), None, "shape (40, 40, 2)"),
+        (np.zeros((40, 40, 3), np.int64), None, "type int64"),
+        (np.zeros((40, 40, 3), np.uint8), None, "black"),
+        (np.zeros((4, 40, 3), np.uint8), None, "at least 8"),
+        ("codes", np.ones((3, 3), bool), "the mask"),
+        ("codes", np.ones((41, 40), bool), "mask of the photo's size"),
+        ("codes", "none.png", "none.png: there is no such file"),
+        ("none.png", None, "none.png: there is no such file"),
+    ],
+)
+def test_what_cannot_be_used_is_named(
+    codes: np.ndarray, image: np.ndarray | str, mask: np.ndarray | str | None, message: str
+) -> None:
+    given = codes if isinstance(image, str) and image == "codes" else image
+    with pytest.raises(InputError) as refusal:
+        isc_core.decompose(given, mask, settings=NAIVE)
+    assert message in str(refusal.value)
+
+
+def test_a_photo_has_its_own_mask(tmp_path: Path) -> None:
+    photo = read_photo(ball_photo(tmp_path))
+    with pytest.raises(InputError, match="mask of its own"):
+        isc_core.decompose(photo, photo.mask)
+
+
+def test_every_exported_name_exists() -> None:
+    assert all(hasattr(isc_core, name) for name in isc_core.__all__)
+    importlib.import_module("isc_core.decomposition.pipeline")
+    assert callable(isc_core.decompose)  # the package does not hide the function
+    with pytest.raises(AttributeError, match="no attribute 'recompose'"):
+        getattr(isc_core, "recompose")  # noqa: B009
