@@ -126,6 +126,7 @@ def drop_broken(folder: Path) -> None:
                 kept.unlink()
 
 
+@cache
 def ensure_cache_folder() -> None:
     """Give Numba a temporary cache folder if it can write to no other; it would refuse to work."""
     try:

@@ -1,8 +1,10 @@
 """The result folder: exactly what the contract names, read back bit by bit, whole or not at all."""
 
+import errno
 import json
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +16,9 @@ from PIL import Image
 from isc_core.errors import Cancelled, InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting import GivenLight, fit_lobe
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
+from isc_core.result_files import result_folder
+from isc_core.result_files.contact_sheet import contact_sheet
 from isc_core.result_files.result_folder import (
     DECOMPOSITION_FILES,
     SEPARATION_FILES,
@@ -271,6 +275,46 @@ def test_a_cancelled_save_leaves_nothing(tmp_path: Path, stage: str) -> None:
     with pytest.raises(Cancelled):
         save(ball((24, 30), 9.0, (12, 15)), tmp_path / "out", monitor=monitor)
     assert seen[-1] == stage
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_preview_that_cannot_be_written_is_one_clear_line_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is drawn on a thread of its own."""
+
+    def full(d: Decomposition) -> Image.Image:
+        raise OSError(errno.ENOSPC, "no space")
+
+    monkeypatch.setattr(result_folder, "contact_sheet", full)
+    with pytest.raises(InputError, match="no space is left on the disk"):
+        save(ball((24, 30), 9.0, (12, 15)), tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_cancelled_save_waits_for_its_preview(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The folder is removed only when nothing is written into it any more."""
+    cancelled, drawn = threading.Event(), threading.Event()
+
+    def slow(d: Decomposition) -> Image.Image:
+        assert cancelled.wait(10)
+        drawn.set()
+        return contact_sheet(d)
+
+    def report(event: ProgressEvent) -> None:
+        if event.stage == "building the mesh":
+            cancelled.set()
+
+    monkeypatch.setattr(result_folder, "contact_sheet", slow)
+    with pytest.raises(Cancelled):
+        save(
+            ball((24, 30), 9.0, (12, 15)),
+            tmp_path / "out",
+            monitor=Monitor(report, cancelled.is_set),
+        )
+    assert drawn.is_set()
     assert list(tmp_path.iterdir()) == []
 
 
