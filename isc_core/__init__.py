@@ -2,13 +2,11 @@
 
 `decompose`, `separate`, `save` and `load` are the Python interface; `Settings`, `KnownInputs` and
 `Monitor` are what they take, `Photo`, `Decomposition` and `Separation` what they work on, and
-`InputError` and `Cancelled` what they raise. Nothing is imported before it is used.
+`InputError` and `Cancelled` what they raise. Nothing is imported before it is used, not even
+`typing`: this module runs before the command can handle Ctrl-C.
 """
 
-from typing import TYPE_CHECKING
-
-from .lazy import exports
-
+TYPE_CHECKING = False  # type checkers know the name
 if TYPE_CHECKING:
     from .api import decompose, load, save, separate
     from .decomposition.settings import Settings
@@ -17,25 +15,29 @@ if TYPE_CHECKING:
     from .progress import Monitor, ProgressEvent
     from .scene.decomposition import Decomposition, Separation
     from .scene.known_inputs import KnownInputs
-else:
-    __getattr__ = exports(
-        __name__,
-        {
-            "Cancelled": ".errors",
-            "Decomposition": ".scene.decomposition",
-            "InputError": ".errors",
-            "KnownInputs": ".scene.known_inputs",
-            "Monitor": ".progress",
-            "Photo": ".photo.photo",
-            "ProgressEvent": ".progress",
-            "Separation": ".scene.decomposition",
-            "Settings": ".decomposition.settings",
-            "decompose": ".api",
-            "load": ".api",
-            "save": ".api",
-            "separate": ".api",
-        },
-    )
+
+_HOMES = {
+    "Cancelled": ".errors",
+    "Decomposition": ".scene.decomposition",
+    "InputError": ".errors",
+    "KnownInputs": ".scene.known_inputs",
+    "Monitor": ".progress",
+    "Photo": ".photo.photo",
+    "ProgressEvent": ".progress",
+    "Separation": ".scene.decomposition",
+    "Settings": ".decomposition.settings",
+    "decompose": ".api",
+    "load": ".api",
+    "save": ".api",
+    "separate": ".api",
+}
+
+
+def __getattr__(name: str) -> object:
+    from .lazy import exports
+
+    return exports(__name__, _HOMES)(name)
+
 
 __version__ = "0.1.0"
 __all__ = [

@@ -8,12 +8,11 @@ process at once. The handler is installed before anything else is imported.
 import os
 import signal
 import sys
-from types import FrameType
 
 _CANCELLED = 130
 
 
-def _end(number: int, frame: FrameType | None) -> None:
+def _end(number: int, frame: object) -> None:
     """End the process as `cli.main` ends a cancelled run."""
     if "json" in sys.argv or "--progress=json" in sys.argv:
         os.write(1, b'{"event": "cancelled"}\n')

@@ -5,8 +5,8 @@ of all installed packages, another distribution may use them too. setuptools can
 under another name, but does not change the imports.
 
 A wheel is therefore built from a copy of the tree in which folders, absolute imports and entry
-points have the names of `PACKAGES`. Editable installations and sdists are those of setuptools and
-keep the names of the repository.
+points have the names of `PACKAGES`. Editable installations and sdists keep the names of the
+repository.
 
 Limits: modules of a renamed package are imported by `from PACKAGE import ...`, at the start of a
 line or an indented line; other imports end the build. A name inside a string is found after `-m`
@@ -25,7 +25,6 @@ from pathlib import Path
 
 from setuptools import build_meta
 from setuptools.build_meta import (
-    build_editable,
     build_sdist,
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
@@ -63,6 +62,34 @@ LEFT_OUT = (
 _RENAMED = {folder: name for folder, name in PACKAGES.items() if folder != name}
 _PROGRAM = re.compile(rf"(?<=-m )({'|'.join(_RENAMED)})(?=\.)".encode())
 _Settings = Mapping[str, str | list[str] | None] | None
+
+
+def build_editable(
+    wheel_directory: str,
+    config_settings: _Settings = None,
+    metadata_directory: str | None = None,
+) -> str:
+    """Build the editable installation; see PEP 660.
+
+    It is a line in a .pth file. By default setuptools installs a finder, whose import at every
+    start of Python takes longer than the rest of the start, and cannot be interrupted cleanly.
+
+    Parameters
+    ----------
+    wheel_directory : str
+        Folder for the wheel.
+    config_settings : mapping, optional
+        Settings of the caller, for setuptools.
+    metadata_directory : str, optional
+        Result of `prepare_metadata_for_build_editable`.
+
+    Returns
+    -------
+    str
+        File name of the wheel.
+    """
+    settings = {"editable_mode": "compat", **(config_settings or {})}
+    return build_meta.build_editable(wheel_directory, settings, metadata_directory)
 
 
 def build_wheel(
