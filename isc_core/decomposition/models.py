@@ -56,7 +56,8 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     )
     if light_estimate is None or not task.options.check_assumptions:
         return estimate
-    return with_warnings(task.maps, estimate, light_estimate)
+    with task.clock.stage("check assumptions"):
+        return with_warnings(task.maps, estimate, light_estimate)
 
 
 def _solver(model: str) -> Callable[[DecompositionTask], SceneEstimate]:

@@ -152,9 +152,10 @@ def _recover(
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
-    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-    if settings.uses_predicted_light and task.light_estimate is not None:
-        priors = with_predicted_light(priors, task.light_estimate)
+    with task.clock.stage("shape and light"):
+        priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
+        if settings.uses_predicted_light and task.light_estimate is not None:
+            priors = with_predicted_light(priors, task.light_estimate)
     weights = isc_weights(
         settings.illumination, channels, normals_predicted=task.normal_estimate is not None
     )

@@ -22,8 +22,6 @@ import numpy as np
 from ..scene.decomposition import Decomposition
 from ..shading.brdf.ggx import F0
 from ..shading.brdf.roughness import alpha_from_blender
-from ..shading.environment_map import environment_from_shading, resampled
-from ..shading.lobe_rendering import Lobe, lobe_in_environment
 from .specular_level import SpecularFit, SpecularSource, fitted_specular
 
 _ROWS = 16  # of the environment map: the lobe of a smooth map is smooth
@@ -47,6 +45,8 @@ def bounded_specular(d: Decomposition) -> SpecularFit:
     gloss = fitted_specular(d)
     if not gloss.specular or gloss.roughness is None:
         return gloss
+    from ..shading.environment_map import environment_from_shading
+
     most = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, _ROWS))
     return (
         gloss
@@ -72,6 +72,9 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
     float
         1 is plastic; infinite under a black environment map.
     """
+    from ..shading.environment_map import resampled
+    from ..shading.lobe_rendering import Lobe, lobe_in_environment
+
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
     normal = d.normal[d.mask].astype(float)
     layer = lobe_in_environment(lobe, normal, resampled(environment, _ROWS))

@@ -10,15 +10,34 @@ down, right, toward the viewer. Shading is that of a Lambertian surface of albed
 albedo * shading.
 """
 
-from .lights import DirectionalLight
-from .radiance import DistantLights, sh_shading
-from .spherical_harmonics import (
-    light_from_reference,
-    light_to_reference,
-    normal_from_reference,
-    normal_to_reference,
-    real_sh,
-)
+from typing import TYPE_CHECKING
+
+from ..lazy import exports
+
+if TYPE_CHECKING:
+    from .lights import DirectionalLight
+    from .radiance import DistantLights, sh_shading
+    from .spherical_harmonics import (
+        light_from_reference,
+        light_to_reference,
+        normal_from_reference,
+        normal_to_reference,
+        real_sh,
+    )
+else:
+    __getattr__ = exports(
+        __name__,
+        {
+            "DirectionalLight": ".lights",
+            "DistantLights": ".radiance",
+            "light_from_reference": ".spherical_harmonics",
+            "light_to_reference": ".spherical_harmonics",
+            "normal_from_reference": ".spherical_harmonics",
+            "normal_to_reference": ".spherical_harmonics",
+            "real_sh": ".spherical_harmonics",
+            "sh_shading": ".radiance",
+        },
+    )
 
 __all__ = [
     "DirectionalLight",

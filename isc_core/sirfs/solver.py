@@ -26,7 +26,6 @@ from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
 from .illumination import stack, unstack
-from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
 from .settings import Start
@@ -172,6 +171,8 @@ class Backend:
         Engine
         """
         if not self.compiled:
+            from .numpy_engine import NumpyEngine
+
             return NumpyEngine(problem, self.dtype)
         from .numba_engine import NumbaEngine
 

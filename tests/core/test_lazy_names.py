@@ -15,7 +15,12 @@ from isc_core.lazy import exports
 from tests.core.ball_scene import ball
 
 ROOT = Path(__file__).resolve().parents[2]
-LAZY_PACKAGES = ("isc_core.decomposition", "isc_core.lobe_fitting", "isc_core.photo")
+LAZY_PACKAGES = (
+    "isc_core.decomposition",
+    "isc_core.lobe_fitting",
+    "isc_core.photo",
+    "isc_core.shading",
+)
 NUMERICAL = ("numpy", "scipy", "numba", "cv2", "OpenEXR", "PIL", "trimesh", "networkx")
 
 
