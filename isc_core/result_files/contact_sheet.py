@@ -335,7 +335,7 @@ class _Frame:
         soft = Image.fromarray(np.rint(255 * self._weight).astype(np.uint8))
         if zoom > 1:
             soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
-        return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
+        return np.clip((np.asarray(soft, np.float32) / 255 - 0.5) * zoom + 0.5, 0, 1)
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
         """A map, (H, W) or (H, W, C), scaled to the panel, (N, N) or (N, N, C); 0 outside the
@@ -359,7 +359,7 @@ class _Frame:
         # An empty border, so that the object's outline is soft all around.
         window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
         height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
-        panel = np.zeros((_PANEL, _PANEL))
+        panel = np.zeros((_PANEL, _PANEL), np.float32)
         top, left = (_PANEL - height) // 2, (_PANEL - width) // 2
         panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
             (width, height), Image.Resampling.BILINEAR
@@ -388,7 +388,8 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         1, 1 / np.maximum(distance, 1e-9)
     )  # outside the outline: its normal, for the pixels that it crosses
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
-    return np.exp(real_sh(normal) @ illumination), np.clip((1 - distance) * radius + 0.5, 0, 1)
+    color, coverage = np.exp(real_sh(normal) @ illumination), (1 - distance) * radius + 0.5
+    return color.astype(np.float32), np.clip(coverage, 0, 1).astype(np.float32)
 
 
 def _relief(d: Decomposition, frame: _Frame) -> Panel:
@@ -398,18 +399,24 @@ def _relief(d: Decomposition, frame: _Frame) -> Panel:
     spacing = _round_step((high - low) / 12)
     normal = frame.scaled(d.normal)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
-    light = np.array([-0.52, 0.58, 0.63])
+    light, low_tone, high_tone, key_tone, fill_tone = np.array(
+        [
+            [-0.52, 0.58, 0.63],
+            [0.36, 0.44, 0.52],
+            [0.86, 0.78, 0.66],
+            [1, 0.97, 0.9],
+            [0.75, 0.88, 1],
+        ],
+        np.float32,
+    )
     key, fill_light = (
         np.clip((normal @ light + 0.3) / 1.3, 0, 1) ** 1.5,
         0.6 + 0.4 * normal[..., 1],
     )  # an area light: a soft shadow edge
     height = frame.scaled(d.height)
     tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
-    base = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
-    color = base * (
-        0.95 * key[..., None] * np.array([1.0, 0.97, 0.9])
-        + 0.16 * fill_light[..., None] * np.array([0.75, 0.88, 1.0])
-    )
+    base = (1 - tint) * low_tone + tint * high_tone
+    color = base * (0.95 * key[..., None] * key_tone + 0.16 * fill_light[..., None] * fill_tone)
     color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
     return Panel(
         color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}"
