@@ -49,7 +49,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Decomposes many photos, one folder each in DIR. Writes summary.html (start here), "
         "summary.csv, summary.jsonl and "
         "failures.jsonl next to them.",
-        usage="[options] INPUT [INPUT ...] -o DIR",
         examples=_EXAMPLES,
         more=names_table(),
     )

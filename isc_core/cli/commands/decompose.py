@@ -61,7 +61,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Decomposes a photo of one glossy object into diffuse and specular light, shape, "
         "illumination, shading, reflectance. Writes a folder "
         "with preview.png (start here), maps.exr, mesh.glb and decomposition.json.",
-        usage="[options] PHOTO [PHOTO ...] -o DIR",
         examples=_EXAMPLES,
         more=names_table(),
     )

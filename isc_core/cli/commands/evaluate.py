@@ -43,63 +43,68 @@ def declare(parser: argparse.ArgumentParser) -> None:
         examples=_EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
-    parser.add_argument(
+    main = parser.add_argument_group("main options")
+    main.add_argument(
         "--dataset", choices=("mit-berkeley",), required=True, help="format of the data set"
     )
-    parser.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
-    parser.add_argument(
+    main.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
+    main.add_argument(
         "--input",
         choices=INPUTS,
         default="diffuse",
         help="images without highlights, or as photographed (default %(default)s)",
     )
-    parser.add_argument(
+    main.add_argument(
         "--illumination",
         choices=(*ILLUMINATIONS, "both"),
         help="default: both, or laboratory for --input original",
     )
-    parser.add_argument(
+    main.add_argument(
         "--model",
         metavar="NAME",
         help="as for isc decompose (default: sirfs, or joint for --input original)",
     )
-    parser.add_argument(
-        "--separator",
-        default=RunnerOptions().separator,
-        metavar="NAME",
-        help="separation method of joint, mdr, mbp (default %(default)s)",
-    )
-    parser.add_argument(
-        "--confidence-weights", action="store_true", help="for joint and mdr: as for isc decompose"
-    )
-    parser.add_argument(
-        "--light-prior",
-        type=current_name("light_prior"),
-        choices=LIGHT_PRIORS,
-        help=_PRIOR.format(LightPrior.DATASET),
-    )
-    parser.add_argument(
-        "--shape-prior",
-        type=current_name("shape_prior"),
-        choices=SHAPE_PRIORS,
-        help=_PRIOR.format(ShapePrior.SILHOUETTE),
-    )
-    parser.add_argument(
+    main.add_argument(
         "--protocol",
         choices=tuple(protocol.value for protocol in Protocol),
         default=Protocol.REFERENCE.value,
         help="reference: the published protocol, at the images' own scale on the data set's crop; "
         "users: the defaults of isc decompose (default %(default)s)",
     )
-    parser.add_argument(
+    main.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
+    )
+    _add_model(parser.add_argument_group("model"))
+    add_engine(parser.add_argument_group("computing"))
+
+
+def _add_model(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--separator",
+        default=RunnerOptions().separator,
+        metavar="NAME",
+        help="separation method of joint, mdr, mbp (default %(default)s)",
+    )
+    group.add_argument(
+        "--confidence-weights", action="store_true", help="for joint and mdr: as for isc decompose"
+    )
+    group.add_argument(
+        "--light-prior",
+        type=current_name("light_prior"),
+        choices=LIGHT_PRIORS,
+        help=_PRIOR.format(LightPrior.DATASET),
+    )
+    group.add_argument(
+        "--shape-prior",
+        type=current_name("shape_prior"),
+        choices=SHAPE_PRIORS,
+        help=_PRIOR.format(ShapePrior.SILHOUETTE),
+    )
+    group.add_argument(
         "--priors",
         type=Path,
         metavar="FILE",
         help="a file of isc fit-priors (default: those of the package)",
-    )
-    add_engine(parser)
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
     )
 
 

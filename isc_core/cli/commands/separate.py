@@ -47,7 +47,6 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
         "images of both. A photo without mask, "
         "transparency and black border is processed as a whole.",
-        usage="[options] PHOTO -o DIR",
         examples=_EXAMPLES,
         more=methods_table(),
     )

@@ -2,7 +2,7 @@
 
 import argparse
 import textwrap
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from ...errors import InputError
@@ -22,6 +22,26 @@ class _Help(argparse.RawDescriptionHelpFormatter):
     def __init__(self, prog: str, **options: Any) -> None:
         super().__init__(prog, max_help_position=26, **options)
         self._action_max_length = 20  # argparse forgets the indent of sub-commands
+
+    def add_usage(
+        self,
+        usage: str | None,
+        actions: Iterable[argparse.Action],
+        groups: Iterable[Any],
+        prefix: str | None = None,
+    ) -> None:
+        """Show what is required; the options are below. argparse calls it.
+
+        Parameters
+        ----------
+        usage, actions, groups, prefix
+            As in argparse; with an empty prefix the usage becomes the name of sub-commands.
+        """
+        if usage is None and prefix is None:
+            required = [a for a in actions if a.required or not a.option_strings]
+            parts = self._format_usage(None, required, [], "").removeprefix(self._prog).split()
+            usage = " ".join([self._prog, "[options]", *parts])
+        super().add_usage(usage, actions, groups, prefix)
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         keep = "\n" in text
@@ -60,7 +80,6 @@ def describe(
     run: Callable[..., list[str]],
     description: str,
     *,
-    usage: str = "",
     examples: str = "",
     more: str = "",
 ) -> None:
@@ -74,8 +93,6 @@ def describe(
         Called with the options and a `Monitor`; returns the lines to print.
     description : str
         Printed above the options.
-    usage : str
-        The arguments that matter; by default all.
     examples : str
         Lines of examples, each indented by two spaces; may end in remarks.
     more : str
@@ -83,7 +100,6 @@ def describe(
     """
     parser.set_defaults(run=run)
     parser.description = description
-    parser.usage = f"{parser.prog} {usage}" if usage else None
     parts = (more, f"examples:\n{examples}" if examples else "", EXIT_CODES)
     parser.epilog = "\n\n".join(part for part in parts if part)
 

@@ -11,7 +11,7 @@ from ....imaging.srgb import srgb_to_linear
 from ....io.printable_names import readable
 from ....photo import TRANSFERS
 from ....shading.lobe_rendering import DEFAULT_EXPONENT, Lobe
-from ...interface.options import add_limits
+from ...interface.options import add_limits, add_output
 from ...interface.values import finite
 
 
@@ -36,14 +36,9 @@ def add_common(parser: argparse.ArgumentParser) -> None:
     photo.add_argument(
         "--transfer", choices=TRANSFERS, help="its encoding (default: as isc decompose read it)"
     )
-    add_limits(parser)
-    parser.add_argument(
-        "-o",
-        "--output",
-        type=Path,
-        required=True,
-        metavar="DIR",
-        help="the folder to write; an earlier edit is replaced",
+    add_limits(photo)
+    add_output(
+        parser.add_argument_group("output"), "the folder to write; an earlier edit is replaced"
     )
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
