@@ -25,6 +25,7 @@ from pathlib import Path
 
 from setuptools import build_meta
 from setuptools.build_meta import (
+    build_editable,
     build_sdist,
     get_requires_for_build_editable,
     get_requires_for_build_sdist,
@@ -62,34 +63,6 @@ LEFT_OUT = (
 _RENAMED = {folder: name for folder, name in PACKAGES.items() if folder != name}
 _PROGRAM = re.compile(rf"(?<=-m )({'|'.join(_RENAMED)})(?=\.)".encode())
 _Settings = Mapping[str, str | list[str] | None] | None
-
-
-def build_editable(
-    wheel_directory: str,
-    config_settings: _Settings = None,
-    metadata_directory: str | None = None,
-) -> str:
-    """Build the editable installation; see PEP 660.
-
-    It is a line in a .pth file. By default setuptools installs a finder, whose import at every
-    start of Python takes longer than the rest of the start, and cannot be interrupted cleanly.
-
-    Parameters
-    ----------
-    wheel_directory : str
-        Folder for the wheel.
-    config_settings : mapping, optional
-        Settings of the caller, for setuptools.
-    metadata_directory : str, optional
-        Result of `prepare_metadata_for_build_editable`.
-
-    Returns
-    -------
-    str
-        File name of the wheel.
-    """
-    settings = {"editable_mode": "compat", **(config_settings or {})}
-    return build_meta.build_editable(wheel_directory, settings, metadata_directory)
 
 
 def build_wheel(
