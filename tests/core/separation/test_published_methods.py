@@ -258,7 +258,7 @@ def test_nothing_is_specular_where_everything_is_clipped(method: str) -> None:
 # --- progress and refusals -----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", set(PUBLISHED) - {"shen_2009", "shen_2013"})
+@pytest.mark.parametrize("method", sorted({*PUBLISHED} - {"shen_2009", "shen_2013"}))
 def test_progress_rises_and_a_cancel_stops_every_variant(method: str) -> None:
     image, _, mask = glossy_disc()
     heard: list[float] = []
