@@ -1,6 +1,10 @@
 """The Python interface: files and arrays, masks, settings, saving and loading."""
 
 import importlib
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +14,7 @@ from PIL import Image
 import isc_core
 from isc_core import InputError, Settings
 from isc_core.photo import read_photo
-from tests.core.command_line import ball_codes, ball_photo
+from tests.core.command_line import ROOT, ball_codes, ball_photo
 
 NAIVE = Settings(model="naive")
 
@@ -116,3 +120,19 @@ def test_every_exported_name_exists() -> None:
     assert callable(isc_core.decompose)  # the package does not hide the function
     with pytest.raises(AttributeError, match="no attribute 'recompose'"):
         getattr(isc_core, "recompose")  # noqa: B009
+
+
+def test_the_lines_of_the_readme_run_as_printed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```python\n(.*?)^```", readme, re.DOTALL | re.MULTILINE)
+    assert len(blocks) == 1
+    assert len([line for line in blocks[0].splitlines() if line]) == 5
+    shutil.move(ball_photo(tmp_path, 12.0), tmp_path / "cup.png")
+    monkeypatch.setenv("PYTHONPATH", str(ROOT))
+    done = subprocess.run(
+        [sys.executable, "-c", blocks[0]], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cup", "cup.png"]
