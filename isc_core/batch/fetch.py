@@ -6,7 +6,6 @@ the environment of the workers.
 """
 
 import hashlib
-import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +16,7 @@ from typing import Any
 from ..errors import InputError
 from ..extras import install_command
 from ..io.limits import Limits
+from ..io.regular_files import require_regular
 
 _BLOCK = 1 << 20
 
@@ -94,13 +94,14 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
         If the location cannot be read.
     """
     if not is_url(location):
-        yield _checked(Path(location), limits)
+        yield _checked(location, limits)
         return
     system, path = file_system(location)
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=folder) as folder_name:
         copy = Path(folder_name) / "file"
         try:
+            require_object(system, path)
             with system.open(path, "rb") as source, copy.open("wb") as target:
                 length = 0
                 while block := source.read(_BLOCK):
@@ -114,15 +115,35 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
         yield copy
 
 
-def _checked(path: Path, limits: Limits) -> Path:
+def require_object(system: Any, path: str) -> None:
+    """Check that a path of a file system is an object, not a pipe or a device of this machine.
+
+    Parameters
+    ----------
+    system : fsspec.AbstractFileSystem
+    path : str
+
+    Raises
+    ------
+    InputError
+        If it is a folder, pipe or device.
+    OSError
+        If it does not exist.
+    """
+    from fsspec.implementations.local import LocalFileSystem
+
+    if isinstance(system, LocalFileSystem):
+        require_regular(path, None)
+
+
+def _checked(location: str, limits: Limits) -> Path:
     try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path}: there is no such file") from error
-    if not stat.S_ISREG(status.st_mode):
-        raise InputError(f"{path} is not a regular file: give an image file")
-    _check_length(str(path), status.st_size, limits)
-    return path
+        require_regular(location, limits, "use an image file")
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(f"{location}: there is no such file") from error
+    except OSError as error:
+        raise InputError(f"{location}: cannot be read: {error.strerror}") from error
+    return Path(location)
 
 
 def _check_length(location: str, length: int, limits: Limits) -> None:

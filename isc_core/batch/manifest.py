@@ -19,7 +19,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from ..errors import InputError
-from .fetch import file_system, is_url
+from ..io.regular_files import require_regular
+from .fetch import file_system, is_url, require_object
 from .item import OPTIONS, BatchItem, ImageRecipe, Options, parse_options
 from .names import check_given
 
@@ -132,9 +133,12 @@ def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
     try:
         if is_url(location):
             system, path = file_system(location)
+            require_object(system, path)
             with system.open(path, "r", **mode) as file:
                 yield file, str(system.ukey(path))
         else:
+            # Streamed, so that its size needs no limit.
+            require_regular(location, None, "use a manifest")
             status = Path(location).stat()
             with Path(location).open(**mode) as file:
                 yield file, f"{status.st_size} {status.st_mtime_ns}"

@@ -22,6 +22,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..errors import InputError
+from ..io.regular_files import read_regular
 from .commands.registry import all_commands, find_command
 from .interface.parser import GENERAL, actions_of
 
@@ -75,12 +76,13 @@ def _find(arguments: Sequence[str]) -> Path | None:
 
 
 def _read(path: Path) -> dict[str, object]:
-    if not path.is_file():
-        raise InputError(f"{path}: no such file: give a TOML file with --config")
+    remedy = "give a TOML file with --config"
+    if not path.exists():
+        raise InputError(f"{path}: no such file: {remedy}")
     if path.stat().st_size > _MAX_BYTES:
         raise InputError(f"{path} is larger than {_MAX_BYTES} bytes: is it a configuration file?")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(read_regular(path, None, remedy).decode("utf-8"))
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8: save it so") from error
     except tomllib.TOMLDecodeError as error:

@@ -157,7 +157,7 @@ def require_writable(
     for input_path in inputs:
         if (
             input_path is not None
-            and target in (resolved := _resolved(input_path)).parents
+            and target in (resolved := _resolved(input_path, "read")).parents
             and resolved.exists()
         ):
             raise InputError(
@@ -295,7 +295,7 @@ def _try_writing(target: Path) -> None:
             pass
 
 
-def _resolved(path: Path | str) -> Path:
+def _resolved(path: Path | str, use: str = "written") -> Path:
     try:
         return Path(path).expanduser().resolve()
     except (
@@ -303,7 +303,7 @@ def _resolved(path: Path | str) -> Path:
         RuntimeError,
         ValueError,
     ) as error:  # a loop of links, an unknown user, a null byte
-        raise InputError(f"{str(path)!r} is not a path that can be written: {error}") from error
+        raise InputError(f"{str(path)!r} is not a path that can be {use}: {error}") from error
 
 
 # --- temporary siblings ---------------------------------------------------------------------------

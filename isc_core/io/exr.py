@@ -17,6 +17,7 @@ from ..errors import InputError
 from .exr_header import check_exr
 from .limits import USUAL, Limits
 from .native_io import memory_file, suppress_native_output
+from .regular_files import read_regular
 
 
 def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
@@ -62,10 +63,10 @@ def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     InputError
         If it is not a readable OpenEXR file.
     """
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"{path} does not exist")
     try:
-        data = path.read_bytes()
+        data = read_regular(path, None, "use an EXR file")
         check_exr(data, path, limits)
         with (
             suppress_native_output(),

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from .regular_files import read_regular
 
 MOST_BYTES = 1 << 28
 
@@ -35,7 +36,7 @@ def read_json(path: Path, remedy: str = "write it again") -> Any:
                 f"{path} has {size / 1e6:.0f} MB; the limit for JSON is {MOST_BYTES / 1e6:.0f} MB: "
                 "is it the right file?"
             )
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(read_regular(path, None, "use a JSON file").decode("utf-8"))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
     except InputError:

@@ -22,6 +22,7 @@ from scipy.io.matlab import MatReadError
 from ..errors import InputError
 from .limits import USUAL, Limits
 from .native_io import suppress_native_output
+from .regular_files import read_regular
 
 _HEADER = 128  # bytes
 _MATRIX, _DEFLATED = 14, 15
@@ -69,7 +70,7 @@ def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
         If the file is absent, damaged, too large, of another version, or holds no such numbers.
     """
     try:
-        data = path.read_bytes()
+        data = read_regular(path, limits, "use a MATLAB file")
     except OSError as error:
         raise InputError(
             f"cannot read {path} ({error.strerror}): is the data set complete?"

@@ -24,6 +24,7 @@ import numpy as np
 
 from ..errors import InputError
 from .limits import USUAL, Limits
+from .regular_files import read_regular
 
 ARRAY, ARCHIVE = b"\x93NUMPY", b"PK"
 KINDS = "fiub"
@@ -71,7 +72,7 @@ def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
     InputError
         If the file is absent, damaged, or holds no plain numbers.
     """
-    return parse_array(_bytes(path), str(path), limits=limits).copy()
+    return parse_array(_bytes(path, limits), str(path), limits=limits).copy()
 
 
 def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
@@ -92,7 +93,7 @@ def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     InputError
         If the file is absent, or as `parse_arrays`.
     """
-    return parse_arrays(_bytes(path), str(path), limits)
+    return parse_arrays(_bytes(path, None), str(path), limits)
 
 
 def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USUAL) -> np.ndarray:
@@ -231,8 +232,8 @@ def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
     return shape, by_columns, kind, stream.tell()
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(path: Path, limits: Limits | None) -> bytes:
     try:
-        return path.read_bytes()
+        return read_regular(path, limits, "use a file of numpy.save")
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error

@@ -11,6 +11,7 @@ from ..io.exr import read_channels
 from ..io.json_files import numbers, read_json
 from ..io.limits import USUAL, Limits
 from ..io.npy import read_array
+from ..io.regular_files import require_regular
 from ..photo import read_raster
 from .result_folder import load
 
@@ -95,6 +96,7 @@ def read_light(path: str | Path) -> np.ndarray:
 def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     """The map as stored, and its default unit in photo pixels."""
     try:
+        require_regular(path, limits, "use a height map")
         with path.open("rb") as file:
             start = file.read(8)
     except OSError as error:

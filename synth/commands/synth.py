@@ -9,6 +9,7 @@ from typing import get_args
 from isc_core.cli.interface.parser import describe, hints
 from isc_core.cli.interface.values import count, names, positive
 from isc_core.errors import InputError
+from isc_core.io.regular_files import require_regular
 from isc_core.progress import Monitor
 
 from ..albedos import ALBEDOS
@@ -255,9 +256,10 @@ def _together(
 
 def _sources(options: argparse.Namespace) -> Sources:
     files = (options.mesh, options.height, options.albedo_image)
-    for path in files:
-        if path is not None and not path.is_file():
+    for path in filter(None, files):
+        if not path.exists():
             raise InputError(f"{path} does not exist")
+        require_regular(path)
     return Sources(
         *files, options.natural_lights, () if options.hdr is None else _panoramas(options.hdr)
     )

@@ -3,6 +3,7 @@ the bounds.
 """
 
 import argparse
+import os
 import shlex
 from pathlib import Path
 
@@ -165,7 +166,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     require_writable_report(options.output)
     if options.update_bounds is not None:
         require_writable_file(options.update_bounds)
-    if options.output.resolve() == options.dataset.resolve():
+    if os.path.realpath(options.output) == os.path.realpath(options.dataset):
         raise InputError("the report cannot replace the data set: choose another folder for -o")
     outcome = validate(
         options.dataset, wanted, bounds, options.renders, _command(options), monitor.part(0, 0.9)

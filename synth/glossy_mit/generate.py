@@ -6,6 +6,7 @@ other settings, is refused. Objects, and the physical variant, may be added to a
 """
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,7 +88,7 @@ def make_glossy(
     for name in names:
         for illumination in ILLUMINATIONS:
             check_request(root, name, illumination, "diffuse")
-    if out.resolve().is_relative_to(root.resolve()):
+    if Path(os.path.realpath(out)).is_relative_to(os.path.realpath(root)):
         raise InputError(f"{out} is inside the data set: choose a folder outside of {root}")
     _require_this_run(out, settings)
     _write_json(out / RUN, {"kind": KIND, "settings": settings.to_json()})

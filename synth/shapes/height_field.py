@@ -23,6 +23,7 @@ from isc_core.errors import InputError
 from isc_core.io.exr import read_channels
 from isc_core.io.matlab import read_matrix
 from isc_core.io.npy import ARCHIVE, read_array
+from isc_core.io.regular_files import require_regular
 
 from ..scene.camera import LARGEST, SMALLEST, Camera
 from ..scene.meshes import Mesh
@@ -86,8 +87,9 @@ def read_height(path: str | Path) -> np.ndarray:
     path = Path(path)
     if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: heights are read from {', '.join(_READERS)} files")
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"{path} does not exist")
+    require_regular(path, remedy="use a height map")
     reader = {".mat": _read_mat, ".npy": _read_npy, ".exr": _read_exr}[path.suffix.lower()]
     return check_height(reader(path), str(path))
 

@@ -16,6 +16,7 @@ opened.
 import io
 import json
 import math
+import os
 import struct
 import zlib
 from dataclasses import dataclass, replace
@@ -32,6 +33,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.limits import USUAL
 from isc_core.io.native_io import suppress_native_output
+from isc_core.io.regular_files import read_regular
 
 from ..scene.materials import texture_at
 from ..scene.meshes import Mesh
@@ -113,7 +115,7 @@ class _Beside:
     def get(self, name: str) -> bytes:
         """Return the bytes of a file; `FileNotFoundError` if it is missing or elsewhere."""
         name = str(name).strip().replace("\\", "/")
-        place = (self.folder / name).resolve()
+        place = Path(os.path.realpath(self.folder / name))  # raises for no loop of links
         if name == _UNREADABLE:
             raise FileNotFoundError(name)
         if not place.is_relative_to(self.folder):
@@ -203,11 +205,11 @@ def _read_parts(path: Path) -> list[_Part]:
     kind = path.suffix.lower().lstrip(".")
     if kind not in KINDS:
         raise InputError(f"{path}: meshes are read from {', '.join(KINDS)} files")
-    if not path.is_file():
+    if not path.exists():
         raise InputError(f"{path} does not exist")
     if path.stat().st_size > _MOST_BYTES:
         raise InputError(f"{path} is larger than {_MOST_BYTES >> 20} MiB: simplify the mesh")
-    beside, data = _Beside(path), path.read_bytes()
+    beside, data = _Beside(path), read_regular(path, None, "use a mesh")
     try:
         if kind in ("glb", "gltf"):
             _check_claims(path, data)

@@ -14,6 +14,7 @@ from PIL import Image
 from ...errors import InputError
 from ..limits import USUAL, Limits
 from ..native_io import suppress_native_output
+from ..regular_files import read_regular
 from .bmp import read_bmp
 from .exr import read_exr
 from .hdr import read_hdr
@@ -75,15 +76,10 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
         If the file is missing, damaged, too large or of an unknown format.
     """
     path = Path(path)
-    if path.is_dir():
-        raise InputError(f"{path} is a folder: use an image file")
-    if not path.exists():
-        raise InputError(f"{path}: there is no such file")
-    if not path.is_file():
-        raise InputError(f"{path} is not a regular file: use an image file")
     try:
-        limits.check_stored(path, path.stat().st_size)
-        data = path.read_bytes()
+        data = read_regular(path, limits, "use an image file")
+    except (FileNotFoundError, NotADirectoryError) as error:
+        raise InputError(f"{path}: there is no such file") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if not data:

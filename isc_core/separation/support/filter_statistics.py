@@ -38,6 +38,7 @@ from ...errors import InputError
 from ...imaging.bounding_box import mask_slices
 from ...imaging.smoothing import masked_gaussian
 from ...io.npy import parse_arrays
+from ...io.regular_files import read_regular
 
 WIDTHS = (0.006, 0.015, 0.04)  # of the object's diagonal
 KINDS = ("slope", "curvature", "difference")
@@ -141,7 +142,7 @@ def read_table(path: str | Path) -> FilterTable:
         If the file holds none.
     """
     try:
-        data = Path(path).read_bytes()
+        data = read_regular(path, remedy="use a table of filter statistics")
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
     return _read(data, str(path))

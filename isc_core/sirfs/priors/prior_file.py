@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import InputError
 from ...io.atomic import new_file
 from ...io.npy import parse_arrays
+from ...io.regular_files import read_regular
 from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
 from .lights import Contrast, GaussianLight
@@ -59,13 +60,11 @@ def load_prior_set(path: str | Path) -> PriorSet:
     InputError
         If the file is missing, damaged, of another kind, or of a newer version.
     """
+    remedy = "give a file that 'isc fit-priors' wrote"
     try:
-        data = Path(path).read_bytes()
+        data = read_regular(path, remedy=remedy)
     except OSError as error:
-        raise InputError(
-            f"cannot read the priors {path} ({error.strerror}):"
-            " give a file that 'isc fit-priors' wrote"
-        ) from error
+        raise InputError(f"cannot read the priors {path} ({error.strerror}): {remedy}") from error
     return _parse(data, str(path))
 
 

@@ -137,7 +137,7 @@ def test_pickles_are_refused(prior_set: PriorSet, tmp_path: Path) -> None:
 def test_missing_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot read"):
         load_prior_set(tmp_path / "absent.npz")
-    with pytest.raises(InputError, match="cannot read"):
+    with pytest.raises(InputError, match="is a folder"):
         load_prior_set(tmp_path)
 
 
