@@ -74,10 +74,12 @@ def _run(job: ImageJob, work: Work) -> tuple[str, str]:
         return FAILED, f"exceeded --timeout {plan.timeout:g} s, in the stage: {stopped}"
     except InputError as error:
         return FAILED, str(error)
-    except MemoryError:
+    except MemoryError as error:
+        amount = f" ({error})" if str(error) else ""
         return (
             FAILED,
-            "not enough memory: use a smaller image, a smaller --max-size or fewer workers",
+            f"not enough memory{amount}: use a smaller image, a smaller --max-size or fewer "
+            "workers",
         )
     except OSError as error:
         return FAILED, f"{error.filename or job.image}: {error.strerror or error}"

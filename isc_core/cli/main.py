@@ -63,10 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         discard_output()
         return BROKEN_PIPE
-    except MemoryError:
+    except MemoryError as error:
+        # NumPy says how much: "Unable to allocate 7.45 GiB for an array with shape ...".
+        amount = f" ({error})" if str(error) else ""
         return _report_failure(
             reporter,
-            "not enough memory: use a smaller image or a smaller --max-size",
+            f"not enough memory{amount}: use a smaller image or a smaller --max-size",
         )
     except OSError as error:
         location = f"{error.filename}: " if error.filename else ""

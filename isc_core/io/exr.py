@@ -14,8 +14,9 @@ import numpy as np
 import OpenEXR
 
 from ..errors import InputError
-from .exr_header import check_exr
+from .exr_header import check_exr, unpacked_bytes
 from .limits import USUAL, Limits
+from .memory import is_exhausted, memory_error
 from .native_io import memory_file, suppress_native_output
 from .regular_files import read_regular
 
@@ -65,9 +66,10 @@ def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     """
     if not path.exists():
         raise InputError(f"{path} does not exist")
+    needed = 0
     try:
         data = read_regular(path, None, "use an EXR file")
-        check_exr(data, path, limits)
+        needed = unpacked_bytes(check_exr(data, path, limits))
         with (
             suppress_native_output(),
             memory_file(data) as file_path,
@@ -89,4 +91,6 @@ def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
         MemoryError,
         struct.error,
     ) as error:
+        if is_exhausted(error):
+            raise memory_error(f"{path}: its channels", needed, "reduce the image") from error
         raise InputError(f"{path} is not a readable OpenEXR file (damaged or cut short)") from error

@@ -63,6 +63,21 @@ def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
     return right - left + 1, bottom - top + 1
 
 
+def unpacked_bytes(parts: tuple[ExrPart, ...]) -> int:
+    """Return the memory that the channels of a file take as float32.
+
+    Parameters
+    ----------
+    parts : tuple of ExrPart
+
+    Returns
+    -------
+    int
+        In bytes.
+    """
+    return sum(4 * len(part.channels) * math.prod(size_of(part.data)) for part in parts)
+
+
 def check_exr(
     data: bytes, path: Path, limits: Limits, stored: int | None = None
 ) -> tuple[ExrPart, ...]:

@@ -21,6 +21,7 @@ from scipy.io.matlab import MatReadError
 
 from ..errors import InputError
 from .limits import USUAL, Limits
+from .memory import is_exhausted, memory_error
 from .native_io import suppress_native_output
 from .regular_files import read_regular
 
@@ -77,8 +78,9 @@ def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
         ) from error
     if data.startswith(b"MATLAB 7.3"):
         raise InputError(f"{path} is a MATLAB 7.3 file: save it with '-v7' and try again")
+    needed = len(data)
     try:
-        _check_elements(path, data, limits)
+        needed += 2 * _check_elements(path, data, limits)
         with suppress_native_output():
             variables = loadmat(
                 io.BytesIO(data), variable_names=keys[:1], mat_dtype=True, struct_as_record=True
@@ -87,6 +89,8 @@ def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
     except InputError:
         raise
     except _READ_ERRORS as error:
+        if is_exhausted(error):
+            raise memory_error(f"{path}: its matrices", needed, "save fewer of them") from error
         raise InputError(f"{path} is not a readable MATLAB file: fetch or save it again") from error
     if value is None:
         raise InputError(f"{path} has no '{'.'.join(keys)}': is it the file of the data set?")
@@ -107,22 +111,29 @@ def _field(value: object, keys: tuple[str, ...]) -> np.ndarray | None:
     return value
 
 
-def _check_elements(path: Path, data: bytes, limits: Limits) -> None:
-    """Reject elements that are unsafe for SciPy: of unknown type, truncated or too large."""
+def _check_elements(path: Path, data: bytes, limits: Limits) -> int:
+    """Reject elements that are unsafe for SciPy: of unknown type, truncated or too large.
+
+    Returns the unpacked size of all, in bytes.
+    """
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None:
         raise ValueError("no byte order mark")
+    unpacked = 0
     for kind, content in _elements(data[_HEADER:], order):
         if kind == _DEFLATED:
             stream = zlib.decompressobj()
             start = stream.decompress(content, 8)
             size = struct.unpack(f"{order}II", start)[1]
-            limits.check_unpacked(path, size, len(data))
+            unpacked += size
+            limits.check_unpacked(path, unpacked, len(data))
             inner = start + stream.decompress(stream.unconsumed_tail, size + 1)
             for inner_kind, inner_content in _elements(inner, order):
                 _check_matrix(inner_kind, inner_content, order, 0)
         else:
+            unpacked += len(content)
             _check_matrix(kind, content, order, 0)
+    return unpacked
 
 
 def _check_matrix(kind: int, content: bytes, order: str, depth: int) -> None:

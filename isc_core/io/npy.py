@@ -24,6 +24,7 @@ import numpy as np
 
 from ..errors import InputError
 from .limits import USUAL, Limits
+from .memory import is_exhausted, memory_error
 from .regular_files import read_regular
 
 ARRAY, ARCHIVE = b"\x93NUMPY", b"PK"
@@ -167,6 +168,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
     InputError
         If the bytes are damaged, hold something else, or unpack to more than `limits`.
     """
+    needed = len(data)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             members = archive.infolist()
@@ -178,13 +180,16 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
                 for m in members
             ):
                 raise ValueError("not an archive of arrays")
-            limits.check_unpacked(name, sum(member.file_size for member in members), len(data))
+            needed += 2 * sum(member.file_size for member in members)
+            limits.check_unpacked(name, needed // 2, len(data))
             unpacked = {
                 member.filename.removesuffix(".npy"): archive.read(member) for member in members
             }
     except InputError:
         raise
     except _UNPACKING_ERRORS as error:
+        if is_exhausted(error):
+            raise memory_error(f"{name}: its arrays", needed, "write smaller ones") from error
         raise InputError(
             f"{name} is damaged or not an archive of NumPy arrays: write it again"
         ) from error

@@ -16,6 +16,7 @@ from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
+from ..io.memory import READING, enough_memory
 from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
 from .transfer import resolve_transfer, to_linear
@@ -101,6 +102,21 @@ def photo_from_raster(
     InputError
         If anything cannot be used; the message names the remedy.
     """
+    height, width = raster.values.shape[:2]
+    with enough_memory(
+        f"{name}: {width} x {height} pixels", READING * width * height, "reduce the image"
+    ):
+        return _photo(raster, name, mask_raster, mask_name, transfer, whole_frame)
+
+
+def _photo(
+    raster: Raster,
+    name: str,
+    mask_raster: Raster | None,
+    mask_name: str,
+    transfer: str,
+    whole_frame: bool,
+) -> Photo:
     used = resolve_transfer(transfer, raster)
     _check_not_constant(raster.values, f"{name}: every pixel")
     linear = to_linear(raster, used)

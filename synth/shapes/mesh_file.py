@@ -31,7 +31,9 @@ from scipy.sparse.csgraph import connected_components
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.io.decoders.jpeg import check_scans
 from isc_core.io.limits import USUAL
+from isc_core.io.memory import is_exhausted, memory_error
 from isc_core.io.native_io import suppress_native_output
 from isc_core.io.regular_files import read_regular
 
@@ -44,6 +46,7 @@ CREASE = 40.0  # degrees between the normals of neighbouring faces; above it the
 MOST_FACES = 3_000_000
 _MOST_BYTES = 1 << 29
 _MOST_NUMBERS = 4 * MOST_FACES  # entries of all tables of a glTF file
+_LOADING = 20  # bytes of memory a byte of a file, at most
 _PICTURES = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")  # of textures; others may run programs
 _DEEPEST, _FARTHEST = 10_000, 1e6  # relative to the width; of texture coordinates
 _UNREADABLE = "model.gltf"  # what trimesh requests where a glTF file is not JSON
@@ -226,6 +229,9 @@ def _read_parts(path: Path) -> list[_Part]:
     except InputError:
         raise
     except _ERRORS as error:
+        if is_exhausted(error):
+            needed = _LOADING * len(data)
+            raise memory_error(f"{path}: its triangles", needed, "simplify the mesh") from error
         _check_references(path, beside)
         raise InputError(
             f"{path} is not a readable {kind.upper()} file: export the mesh again"
@@ -265,6 +271,8 @@ def _is_image(data: bytes) -> bool:
     try:
         with suppress_native_output(), Image.open(io.BytesIO(data), formats=_PICTURES) as image:
             USUAL.check_pixels("a texture", *image.size)
+            if image.format == "JPEG":
+                check_scans(data, "a texture")
             image.load()
     except _ERRORS:
         return False

@@ -1,10 +1,11 @@
 """Image files to arrays: one format per file, recognised by the first bytes, not by the name."""
 
 import hashlib
+import math
 import struct
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -13,6 +14,7 @@ from PIL import Image
 
 from ...errors import InputError
 from ..limits import USUAL, Limits
+from ..memory import READING, is_available, is_exhausted, memory_error
 from ..native_io import suppress_native_output
 from ..regular_files import read_regular
 from .bmp import read_bmp
@@ -35,7 +37,6 @@ _DECODING_ERRORS = (
     RuntimeError,
     EOFError,
     OverflowError,
-    MemoryError,
     struct.error,
     zlib.error,
     cv2.error,
@@ -56,6 +57,17 @@ _READERS: tuple[tuple[bytes, str, Callable[[bytes, Path, Limits], Raster]], ...]
     (b"\x93NUMPY", "NPY", read_npy),
     *((b"P%d" % n, "PPM", read_pnm) for n in range(1, 7)),
 )
+
+
+@dataclass(frozen=True)
+class _RecordingLimits(Limits):
+    """Limits that remember the sizes they were asked about."""
+
+    sizes: list[tuple[int, int]] = field(default_factory=list)
+
+    def check_pixels(self, path: Path | str, width: int, height: int) -> None:
+        super().check_pixels(path, width, height)
+        self.sizes.append((width, height))
 
 
 def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
@@ -92,17 +104,24 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
             f"{path}: not an image of a known format (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, "
             "NPY): convert it to PNG"
         )
+    checked = _RecordingLimits(limits.max_pixels, limits.max_bytes, limits.max_ratio)
     try:
         with suppress_native_output():
-            raster = reader(data, path, limits)
+            raster = reader(data, path, checked)
+            values = np.ascontiguousarray(raster.values)
     except InputError:
         raise
-    except _DECODING_ERRORS as error:
+    except (MemoryError, *_DECODING_ERRORS) as error:
+        width, height = max(checked.sizes, key=math.prod, default=(0, 0))
+        needed = len(data) + READING * width * height
+        if is_exhausted(error) or not is_available(needed):
+            raise memory_error(
+                f"{path}: {width} x {height} pixels", needed, "reduce the image"
+            ) from error
         raise InputError(
             f"{path}: the {kind} file is damaged, incomplete or of an unsupported kind: save it "
             "again as a plain PNG"
         ) from error
-    values = np.ascontiguousarray(raster.values)
     return replace(raster, values=values, sha256=hashlib.sha256(data).hexdigest())
 
 

@@ -1,5 +1,6 @@
 """OpenEXR files as photos: the RGB or Y channels of one layer, in the display window."""
 
+import math
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,10 +9,14 @@ import numpy as np
 import OpenEXR
 
 from ...errors import InputError
-from ..exr_header import check_exr, size_of
+from ..exr_header import ExrPart, check_exr, size_of
 from ..limits import Limits
 from ..native_io import memory_file
 from .raster import Raster, check_size, raster_of_codes
+
+# The frame around the data may be blank, and costs as much as data: up to so many pixels, or so
+# many times the data's.
+_FRAME_PIXELS, _FRAME_RATIO = 1 << 24, 16
 
 
 def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
@@ -39,6 +44,7 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     for claimed in check_exr(data, path, limits):
         for window in (claimed.data, claimed.display):
             check_size(path, limits, *size_of(window))
+        _check_frame(path, claimed)
     with memory_file(data) as file:
         parts = OpenEXR.File(str(file), separate_channels=True).parts
     if not parts:
@@ -59,6 +65,16 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     return replace(
         raster_of_codes(np.stack(planes, axis=2), 0, premultiplied=True), bit_depth=depth
     )
+
+
+def _check_frame(path: Path, claimed: ExrPart) -> None:
+    """Raise `InputError` for a little data in a huge display window."""
+    data, frame = (math.prod(size_of(window)) for window in (claimed.data, claimed.display))
+    if frame > max(_FRAME_PIXELS, _FRAME_RATIO * data):
+        raise InputError(
+            f"{path}: a display window of {frame / 1e6:.0f} megapixels around {data / 1e6:.2g} of "
+            "data: crop the display window to the data"
+        )
 
 
 def _exr_channels(names: list[str], path: Path) -> list[str]:

@@ -7,6 +7,8 @@ from ..limits import Limits
 from .opencv import decode_opencv
 from .raster import Raster, check_size, raster_of_codes
 
+_HEADER_BYTES = 1 << 14
+
 
 def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a Radiance HDR.
@@ -28,9 +30,9 @@ def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
     InputError
         If the size is not supported.
     ValueError
-        If the header has no upright resolution line, or OpenCV cannot decode the file.
+        If 16 KiB hold no upright resolution line, or OpenCV cannot decode the file.
     """
-    size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data)
+    size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data[:_HEADER_BYTES])
     if size is None:
         raise ValueError("no upright resolution line")
     check_size(path, limits, int(size[2]), int(size[1]))

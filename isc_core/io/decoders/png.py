@@ -15,6 +15,9 @@ from .opencv import decode_opencv
 from .pillow import decode_pillow, exif_orientation
 from .raster import Raster, as_rgb, check_size, raster_of_codes
 
+# Writers split the pixels into chunks of 4 KiB or more.
+_CHUNKS, _CHUNK_BYTES = 1000, 512
+
 
 def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a PNG.
@@ -51,10 +54,10 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
 def _plain_png(data: bytes) -> bytes:
     """The PNG reduced to pixels, transparency and EXIF.
 
-    Raises ValueError for a wrong checksum or a missing end.
+    Raises ValueError for a wrong checksum, a missing end, or far more chunks than pixels take.
     """
     kept, at = [data[:8]], 8
-    while True:
+    for _ in range(_CHUNKS + len(data) // _CHUNK_BYTES):
         (length,) = struct.unpack(">I", data[at : at + 4])
         chunk = data[at : at + 12 + length]
         kind = chunk[4:8]
@@ -68,6 +71,7 @@ def _plain_png(data: bytes) -> bytes:
         if kind == b"IEND":
             return b"".join(kept)
         at += 12 + length
+    raise ValueError("too many PNG chunks")
 
 
 def write_png(path: Path, raster: Raster) -> None:

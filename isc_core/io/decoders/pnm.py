@@ -11,6 +11,13 @@ from ..limits import Limits
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
 
+# Magic number, width, height and, but for bitmaps, the largest code. Possessive: what is blank is
+# never tried again.
+_GAP = rb"(?:\s|#[^\n]*+\n)++"
+_BITMAP = re.compile(rb"P[14]" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)\s")
+_MAP = re.compile(rb"P([2356])" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)\s")
+_HEADER_BYTES = 1 << 14
+
 
 def read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a PPM or PGM.
@@ -32,11 +39,13 @@ def read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
     InputError
         If the size or the colour mode is not supported.
     ValueError
-        If codes exceed the stated maximum, or the maximum exceeds 65535.
+        If there is no header within 16 KiB, codes exceed the stated maximum, or the maximum exceeds
+        65535.
     """
-    gap = rb"(?:\s|#[^\n]*\n)+"
-    header = re.match(rb"P([56])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
-    if header is None or int(header[4]) < 256:
+    header = _MAP.match(data[:_HEADER_BYTES])
+    if header is None and not _BITMAP.match(data[:_HEADER_BYTES]):
+        raise ValueError("no header")
+    if header is None or header[1] in b"23" or int(header[4]) < 256:
         return decode_pillow(PpmImagePlugin.PpmImageFile(io.BytesIO(data)), path, limits)
     width, height, peak = int(header[2]), int(header[3]), int(header[4])
     check_size(path, limits, width, height)
