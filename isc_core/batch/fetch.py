@@ -19,6 +19,7 @@ from ..io.limits import Limits
 from ..io.regular_files import require_regular
 
 _BLOCK = 1 << 20
+_REMEDY = "use an image file"
 
 
 def is_url(location: str) -> bool:
@@ -101,7 +102,7 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
     with tempfile.TemporaryDirectory(dir=folder) as folder_name:
         copy = Path(folder_name) / "file"
         try:
-            require_object(system, path)
+            require_object(system, path, _REMEDY)
             with system.open(path, "rb") as source, copy.open("wb") as target:
                 length = 0
                 while block := source.read(_BLOCK):
@@ -115,13 +116,15 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
         yield copy
 
 
-def require_object(system: Any, path: str) -> None:
+def require_object(system: Any, path: str, remedy: str) -> None:
     """Check that a path of a file system is an object, not a pipe or a device of this machine.
 
     Parameters
     ----------
     system : fsspec.AbstractFileSystem
     path : str
+    remedy : str
+        Ends the error message.
 
     Raises
     ------
@@ -133,12 +136,12 @@ def require_object(system: Any, path: str) -> None:
     from fsspec.implementations.local import LocalFileSystem
 
     if isinstance(system, LocalFileSystem):
-        require_regular(path, None)
+        require_regular(path, None, remedy)
 
 
 def _checked(location: str, limits: Limits) -> Path:
     try:
-        require_regular(location, limits, "use an image file")
+        require_regular(location, limits, _REMEDY)
     except (FileNotFoundError, NotADirectoryError) as error:
         raise InputError(f"{location}: there is no such file") from error
     except OSError as error:

@@ -27,6 +27,7 @@ from .names import check_given
 SUFFIXES = (".csv", ".jsonl", ".ndjson")
 _MAX_LINE = 1 << 20  # characters
 _COLUMNS = ("image", "mask", "name", "options")
+_REMEDY = "use a .csv or .jsonl file"
 
 
 class Manifest:
@@ -133,12 +134,12 @@ def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
     try:
         if is_url(location):
             system, path = file_system(location)
-            require_object(system, path)
+            require_object(system, path, _REMEDY)
             with system.open(path, "r", **mode) as file:
                 yield file, str(system.ukey(path))
         else:
             # Streamed, so that its size needs no limit.
-            require_regular(location, None, "use a manifest")
+            require_regular(location, None, _REMEDY)
             status = Path(location).stat()
             with Path(location).open(**mode) as file:
                 yield file, f"{status.st_size} {status.st_mtime_ns}"

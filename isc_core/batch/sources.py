@@ -107,7 +107,7 @@ def _listed_remote(url: str) -> list[str]:
 
 
 def _files(folder: str) -> list[str]:
-    """Names of the files in a folder, sorted; empty if the folder does not exist."""
+    """Names in a folder that are no folders, sorted; empty if the folder does not exist."""
     if is_url(folder):
         system, path = file_system(folder)
         try:
@@ -120,9 +120,19 @@ def _files(folder: str) -> list[str]:
             return []
     try:
         with os.scandir(folder or ".") as entries:
-            return sorted(entry.name for entry in entries if entry.is_file())
+            return sorted(entry.name for entry in entries if not _is_folder(entry))
     except (FileNotFoundError, NotADirectoryError):
         return []
+    except OSError as error:
+        raise InputError(f"{folder} cannot be listed: {error.strerror}") from error
+
+
+def _is_folder(entry: os.DirEntry[str]) -> bool:
+    """Whether an entry is a folder; a broken link is none, and fails as an image."""
+    try:
+        return entry.is_dir()
+    except OSError:  # a loop of links
+        return False
 
 
 def _by_stem(folder: str) -> dict[str, str]:
