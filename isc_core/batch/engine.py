@@ -23,6 +23,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from importlib.util import find_spec
 from multiprocessing import resource_tracker
 from typing import Any
 
@@ -209,8 +210,8 @@ def _without_interrupts() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def dashboard(client: Client) -> str:
-    """Return the address of Dask's dashboard.
+def dashboard(client: Client) -> tuple[str, ...]:
+    """Return a note with the address of Dask's dashboard.
 
     Parameters
     ----------
@@ -218,10 +219,11 @@ def dashboard(client: Client) -> str:
 
     Returns
     -------
-    str
-        "" without a dashboard.
+    tuple of str
+        Empty where none is served: its pages need Bokeh.
     """
-    return str(client.dashboard_link or "")
+    link = client.dashboard_link if find_spec("bokeh") else None
+    return (f"Dask's dashboard: {link}",) if link else ()
 
 
 def run_jobs(

@@ -108,7 +108,7 @@ def run_batch(
             try:
                 monitor.report("starting workers", 0.0)
                 with connected(crew) as client:
-                    announce(f"{names.count} images; Dask's dashboard: {dashboard(client)}")
+                    announce("; ".join([_counted(names.count), *dashboard(client)]))
                     progress = _Progress(journal, monitor)
                     for job, outcome in run_jobs(
                         client, _jobs(inputs, names, recipe, plan, journal), progress.tick, task
@@ -120,6 +120,10 @@ def run_batch(
             finally:
                 write_summary(folder, journal)
         return journal.counts
+
+
+def _counted(number: int) -> str:
+    return f"{number} image{'s' * (number != 1)}"
 
 
 def _plan(batch: Batch) -> RunPlan:

@@ -17,7 +17,7 @@ from isc_core.batch.item import DONE, FAILED
 from isc_core.batch.run_batch import run_batch
 from tests.batch.conftest import batch, rows
 from tests.batch.tasks import obedient
-from tests.core.command_line import isc_command, run_isc
+from tests.core.command_line import isc_command, run_isc, through_terminal
 
 
 def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
@@ -62,12 +62,18 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all of them
     told = run.communicate(timeout=300)[1]
     assert run.returncode in (130, 1), told  # 1: it was faster
-    assert "dashboard: http://127.0.0.1:" in told
+    assert "isc: 4 images" in told
     assert "Traceback" not in told
     done = run_isc(*words)
     assert done.returncode == 1, done.stderr
     assert "1 of 4 images failed" in done.stderr
     assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
+
+
+def test_notes_and_progress_share_a_terminal(photos: Path, tmp_path: Path) -> None:
+    words = ("batch", photos / "bad.png", "-o", tmp_path / "out", "--workers", "1", "--memory", "0")
+    text = through_terminal(*isc_command(*words))
+    assert "starting workers\r\x1b[Kisc: 1 image\r\n" in text
 
 
 def test_a_worker_that_is_lost_while_it_starts_is_started_again(

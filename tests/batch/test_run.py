@@ -5,6 +5,7 @@ contents of the output folder.
 import csv
 import itertools
 import json
+import re
 from collections import Counter
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 from filelock import FileLock
 from markupsafe import escape
 
+from isc_core.batch import engine
 from isc_core.batch import run_batch as run_module
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageJob, ImageRecipe
@@ -202,6 +204,18 @@ def test_inputs_of_an_object_store(photos: Path, tmp_path: Path) -> None:
     ) == Counter({FAILED: 1})
     assert "too large" in str(rows(tmp_path / "small" / "failures.jsonl")[0]["reason"])
     store.rm("/catalogue", recursive=True)
+
+
+@pytest.mark.parametrize("served", [False, True])
+def test_the_dashboard_is_named_where_it_is_served(
+    photos: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, served: bool
+) -> None:
+    """Its pages need Bokeh."""
+    monkeypatch.setattr(engine, "find_spec", lambda name: name if served else None)
+    told: list[str] = []
+    run_batch(batch(photos / "bad.png", output=tmp_path / "out"), announce=told.append)
+    assert len(told) == 1
+    assert re.fullmatch(r"1 image; Dask's dashboard: http://\S+" if served else "1 image", told[0])
 
 
 def test_more_pixels_than_allowed(photos: Path, tmp_path: Path) -> None:

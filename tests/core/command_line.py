@@ -1,5 +1,7 @@
 """Helpers of the tests of the command: photos of a synthetic ball, and running a command."""
 
+import os
+import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -53,3 +55,24 @@ def isc_command(*arguments: object, before: str = "") -> list[str]:
         "-c",
         f"{before}\nimport sys\nfrom isc_core.cli.main import main\nsys.exit(main({words!r}))",
     ]
+
+
+def through_terminal(*command: str) -> str:
+    """What a command writes when its standard error is a terminal."""
+    parent, child = pty.openpty()
+    with subprocess.Popen(
+        command, cwd=ROOT, stderr=child, env={**os.environ, "COLUMNS": "80"}
+    ) as process:
+        os.close(child)
+        written = b""
+        while True:
+            try:
+                block = os.read(parent, 4096)
+            except OSError:  # Linux: the other end of the terminal is closed
+                break
+            if not block:
+                break
+            written += block
+        process.wait(timeout=60)
+    os.close(parent)
+    return written.decode()

@@ -1,7 +1,6 @@
 """`isc batch`: many photos, on all cores of this machine or on a cluster."""
 
 import argparse
-import importlib.util
 import sys
 from dataclasses import fields
 
@@ -22,6 +21,7 @@ from ..interface.options import (
     names_table,
 )
 from ..interface.parser import describe, hints
+from ..interface.terminal import print_note
 from ..interface.values import count, positive
 
 _EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
@@ -129,10 +129,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )  # fmt: skip
 
     def announce(line: str) -> None:
-        missing = "" if importlib.util.find_spec("bokeh") else " (requires `pip install bokeh`)"
-        print(f"isc: {line}{missing}", file=sys.stderr)
+        if not options.quiet:
+            print_note(line, sys.stderr)
 
-    counts = run_batch(batch, monitor, (lambda line: None) if options.quiet else announce)
+    counts = run_batch(batch, monitor, announce)
     where = f"see {options.output / 'summary.html'}"
     if counts[FAILED]:
         raise Rejected(

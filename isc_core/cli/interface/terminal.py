@@ -20,6 +20,7 @@ from ...progress import ProgressEvent
 
 _BAR = 24
 _REDRAW_SECONDS = 0.08
+_WIPE = "\r\x1b[K"  # to the start of the line, and erase it
 
 
 class Verbosity(Enum):
@@ -103,6 +104,21 @@ def printable(text: str, stream: TextIO) -> str:
         .encode(encoding, "backslashreplace")
         .decode(encoding)
     )
+
+
+def print_note(line: str, stream: TextIO) -> None:
+    """Print a line while the work goes on.
+
+    On a terminal it takes the place of the progress bar, which the next event draws again below.
+
+    Parameters
+    ----------
+    line : str
+    stream : TextIO
+        Usually standard error.
+    """
+    wipe = _WIPE if stream.isatty() else ""
+    print(f"{wipe}isc: {printable(line, stream)}", file=stream, flush=True)
 
 
 class TerminalReporter:
@@ -225,7 +241,7 @@ class ProgressBar:
         self._last_draw = now
         full = round(_BAR * self._fraction)
         line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._fraction:3.0f} %  {text}"
-        self._stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
+        self._stream.write(f"{_WIPE}{line[: shutil.get_terminal_size().columns - 1]}")
         self._stream.flush()
 
     def __enter__(self) -> "ProgressBar":
@@ -239,5 +255,5 @@ class ProgressBar:
     ) -> None:
         if self._last_draw > 0:
             with contextlib.suppress(OSError):
-                self._stream.write("\r\x1b[K")
+                self._stream.write(_WIPE)
                 self._stream.flush()

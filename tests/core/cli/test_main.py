@@ -2,7 +2,6 @@
 
 import json
 import os
-import pty
 import re
 import signal
 import subprocess
@@ -32,7 +31,15 @@ from isc_core.result_files.result_folder import load
 from isc_core.separation import BEST, separate
 from isc_core.sirfs.priors.prior_file import load_prior_set, shipped_prior_set
 from tests.core.ball_scene import LIGHT
-from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
+from tests.core.command_line import (
+    ROOT,
+    ball_codes,
+    ball_photo,
+    isc_command,
+    run_isc,
+    through_terminal,
+    write_image,
+)
 from tests.core.separation.scenes import glossy_disc
 
 COMMANDS = ("decompose", "separate", "mask", "evaluate", "fit-priors")
@@ -637,34 +644,15 @@ def test_trouble_with_the_machine_is_one_line(
 # --- the terminal ---------------------------------------------------------------------------------
 
 
-def through_terminal(script: str) -> str:
-    """What a Python script writes when its standard error is a terminal."""
-    parent, child = pty.openpty()
-    with subprocess.Popen(
-        [sys.executable, "-c", script], cwd=ROOT, stderr=child, env={**os.environ, "COLUMNS": "80"}
-    ) as process:
-        os.close(child)
-        written = b""
-        while True:
-            try:
-                block = os.read(parent, 4096)
-            except OSError:  # Linux: the other end of the terminal is closed
-                break
-            if not block:
-                break
-            written += block
-        process.wait(timeout=60)
-    os.close(parent)
-    return written.decode()
-
-
 def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
     text = through_terminal(
+        sys.executable,
+        "-c",
         "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
         "from isc_core.progress import ProgressEvent as E\n"
         "with ProgressBar(sys.stderr) as bar:\n"
         "    bar(E('separating', 0.25)); bar(E('shape and light', 0.5, 'loss 46.100'))\n"
-        "    bar(E('maps ' + 99 * '.', 0.4))\n"
+        "    bar(E('maps ' + 99 * '.', 0.4))\n",
     )
     assert "\n" not in text
     frames = text.split("\r\x1b[K")[1:]
@@ -677,12 +665,30 @@ def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
 def test_a_terminal_is_not_redrawn_for_every_step() -> None:
     start = time.monotonic()
     text = through_terminal(
+        sys.executable,
+        "-c",
         "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
         "from isc_core.progress import ProgressEvent as E\n"
         "with ProgressBar(sys.stderr) as bar:\n"
-        "    for k in range(20000): bar(E('shape and light', k / 20000, f'loss {k}'))\n"
+        "    for k in range(20000): bar(E('shape and light', k / 20000, f'loss {k}'))\n",
     )
     assert 2 <= text.count("\r") <= 3 + (time.monotonic() - start) / 0.08
+
+
+def test_a_note_takes_the_place_of_the_progress_bar() -> None:
+    text = through_terminal(
+        sys.executable,
+        "-c",
+        "import sys; from isc_core.cli.interface.terminal import ProgressBar, print_note\n"
+        "from isc_core.progress import ProgressEvent as E\n"
+        "with ProgressBar(sys.stderr) as bar:\n"
+        "    bar(E('starting workers', 0.0)); print_note('6 images', sys.stderr)\n"
+        "    bar(E('images', 0.5))\n",
+    )
+    frames = text.split("\r\x1b[K")[1:]
+    assert frames[0].endswith("  0 %  starting workers")
+    assert frames[1] == "isc: 6 images\r\n"
+    assert frames[2].endswith(" 50 %  images")
 
 
 def test_a_file_gets_a_line_for_each_stage(tmp_path: Path) -> None:
