@@ -90,6 +90,37 @@ def test_programs_exist() -> None:
     assert not missing, "\n".join(missing)
 
 
+def broken_rows(text: str) -> list[str]:
+    """Return the rows of Markdown tables that a page would show as text or with shifted cells."""
+    broken: list[str] = []
+    cells, above = 0, ""
+    lines = text.splitlines()
+    for line, below in zip(lines, [*lines[1:], ""], strict=True):
+        found = len(re.findall(r"(?<!\\)\|", line)) if line.startswith("|") else 0
+        if found and not cells:  # the header
+            if above or not re.fullmatch(r"\|(?: *:?-+:? *\|)+", below):
+                broken.append(line)
+        elif found != cells and found:
+            broken.append(line)
+        cells, above = (cells or found) if found else 0, line
+    return broken
+
+
+def test_tables_are_whole() -> None:
+    table = "| a | b |\n|---|--:|\n| 1 | `x \\| y` |\n"
+    assert not broken_rows(table)
+    assert broken_rows(table + "| 1 |\n") == ["| 1 |"]
+    assert broken_rows(table + "| 1 | `x | y` |\n") == ["| 1 | `x | y` |"]
+    assert broken_rows(table + "\n| 3 | stray |\n") == ["| 3 | stray |"]
+    assert broken_rows("text\n" + table) == ["| a | b |"]
+    broken = [
+        f"{page.relative_to(ROOT)}: {row}"
+        for page in [*pages(), *(DOCS / "thesis").glob("*.md"), ROOT / "CHANGELOG.md"]
+        for row in broken_rows(prose(page))
+    ]
+    assert not broken, "\n".join(broken)
+
+
 def test_paths_exist() -> None:
     packages = "isc_core|synth|training|blender_addon|benchmarks|tests|tools"
     pattern = re.compile(rf"`((?:{packages})/[\w./-]+)`")
