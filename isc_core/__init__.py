@@ -41,18 +41,18 @@ def __getattr__(name: str) -> object:
 
 __version__ = "0.1.0"
 __all__ = [
-    "Cancelled",
-    "Decomposition",
-    "InputError",
+    "decompose",
+    "separate",
+    "save",
+    "load",
+    "Settings",
     "KnownInputs",
     "Monitor",
-    "Photo",
     "ProgressEvent",
+    "Photo",
+    "Decomposition",
     "Separation",
-    "Settings",
+    "InputError",
+    "Cancelled",
     "__version__",
-    "decompose",
-    "load",
-    "save",
-    "separate",
 ]
