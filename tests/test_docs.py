@@ -17,6 +17,8 @@ import numpy as np
 import pytest
 
 from isc_core import separation
+from isc_core.cli.commands import build_parser
+from isc_core.cli.config import apply_config
 from isc_core.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -24,7 +26,7 @@ DOCS = ROOT / "docs"
 PICTURES = {".png", ".jpg"}
 MOST_PICTURE_BYTES = 2_000_000
 # Pages that tools/docs_site.py makes.
-GENERATED = {"changelog.md", "security.md", "reference/command_line.md"}
+GENERATED = {"changelog.md", "contributing.md", "security.md", "reference/command_line.md"}
 # Commands on these pages are checked; the log keeps the commands of its time.
 GUIDES = ("index.md", "quickstart", "how_to", "methods", "results.md", "concepts.md", "reference")
 
@@ -174,6 +176,39 @@ def test_commands_and_options_exist() -> None:
                 ]
     assert {("decompose",), ("separate",), ("validate",)} <= set(known)
     assert not wrong, "\n".join(wrong)
+
+
+def test_the_configuration_of_the_guide_is_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = (DOCS / "how_to" / "command_line.md").read_text(encoding="utf-8")
+    file = re.search(r"^```toml\n(.*?)^```", page, re.DOTALL | re.M)
+    assert file is not None
+    (tmp_path / "isc.toml").write_text(file.group(1), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    for command, option, value in (
+        ("decompose cup.png", "max_size", 384),
+        ("separate cup.png", "changes", ["ratio_quantile=0.4"]),
+        ("edit cup relight", "ambient", 0.3),
+    ):
+        arguments = [*command.split(), "-o", "out"]
+        parser = build_parser(arguments)
+        apply_config(parser, arguments)
+        assert getattr(parser.parse_args(arguments), option) == value
+
+
+def test_the_notebook_is_a_page_with_its_outputs() -> None:
+    pytest.importorskip("mkdocs")
+    notebook = DOCS / "quickstart" / "first_decomposition.ipynb"
+    name = notebook.relative_to(DOCS)
+    files = importlib.import_module("tools.docs_site")._notebook_page(notebook, name)
+    page = files.pop("quickstart/first_decomposition.md")
+    assert page.startswith("# First decomposition\n")
+    assert len(files) == 4
+    for picture, content in files.items():
+        assert f"]({Path(picture).name})" in page
+        assert content.startswith(b"\x89PNG")
+    assert "mean error of the normals" in page
 
 
 def test_the_guide_to_add_a_method_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
