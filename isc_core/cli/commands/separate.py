@@ -120,11 +120,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     limits = limits_of(options)
     with photo_file(options.photo, options) as file:
         photo = read_photo(file, options.mask, options.transfer, whole_frame=True, limits=limits)
-    prior = (
-        None
-        if options.prior is None
-        else _read_prior(options.prior, photo.mask.shape, limits)
-    )
+    prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits)
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
         options.method, photo.image, photo.mask, photo.clipped,

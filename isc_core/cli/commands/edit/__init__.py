@@ -62,9 +62,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
     )
-    actions = parser.add_subparsers(
-        title="actions", metavar="ACTION", required=True, dest="action"
-    )
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
     for action in ACTIONS:
         added = actions.add_parser(
             action.name,
