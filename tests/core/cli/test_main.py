@@ -8,7 +8,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -536,15 +535,11 @@ def test_priors_are_fitted_to_the_chosen_objects(
 
 # --- stopping -------------------------------------------------------------------------------------
 
-CTRL_C_WORKS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
-
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_during_the_solve_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
     photo = ball_photo(tmp_path, 110.0)
-    command = isc_command(
-        "decompose", photo, "--engine", "numpy", "-o", tmp_path / "new" / "out", before=CTRL_C_WORKS
-    )
+    command = isc_command("decompose", photo, "--engine", "numpy", "-o", tmp_path / "new" / "out")
     with subprocess.Popen(
         command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -561,15 +556,6 @@ def test_a_stop_during_the_solve_leaves_nothing(tmp_path: Path, number: signal.S
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
 
 
-@pytest.fixture
-def interruptible() -> Iterator[None]:
-    """Ctrl-C as in a terminal, even where the tests themselves run in the background."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-@pytest.mark.usefixtures("interruptible")
 def test_the_first_interrupt_asks_and_the_second_insists() -> None:
     interrupts = Interrupts()
     monitor = interrupts.monitor(lambda event: None)

@@ -79,20 +79,10 @@ def test_the_help_of_decompose_has_a_line_for_each_model_and_method() -> None:
 # --- Ctrl-C ---------------------------------------------------------------------------------------
 
 
-def default_interrupt() -> None:
-    """Handle Ctrl-C as a terminal's program does, also where the tests run in the background."""
-    signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
 def interrupted(command: list[str], seconds: float) -> tuple[int, str]:
     """Exit code and standard error of a process that gets SIGINT after some time."""
     with subprocess.Popen(
-        command,
-        cwd=ROOT,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=default_interrupt,
+        command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     ) as process:
         time.sleep(seconds)
         process.send_signal(signal.SIGINT)
@@ -149,7 +139,6 @@ class Greedy:
                 raise ImportError("wrapped") from error
     done = False
 sys.meta_path.insert(0, Greedy())
-import signal; signal.signal(signal.SIGINT, signal.default_int_handler)
 """
 
 
@@ -170,7 +159,6 @@ def test_the_handler_is_installed_before_anything_is_imported() -> None:
         "        if name == 'isc_core.cli':\n"
         "            import os, signal; os.kill(os.getpid(), signal.SIGINT)\n"
         "sys.meta_path.insert(0, Stop())\n"
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "from isc_core.__main__ import start; start()"
     )
     for words, out, err in (

@@ -182,8 +182,6 @@ def test_ctrl_c_in_a_real_process_leaves_nothing(tmp_path: Path) -> None:
     script = (
         "import os, signal, sys\n"
         "from isc_core.io.atomic import new_folder\n"
-        # A job in the background of a script inherits that interrupts are ignored.
-        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "with new_folder(sys.argv[1], ('mark.json',)) as partial:\n"
         "    (partial / 'mark.json').write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
