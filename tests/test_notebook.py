@@ -101,8 +101,10 @@ def test_its_cells_run_and_show_what_is_stored(tmp_path: Path) -> None:
     from tools.run_notebook import executed
 
     notebook = json.loads(json.dumps(executed(PATH, tmp_path)))
-    assert printed(notebook) == printed(stored())
+    # Other processors round differently, and the solver amplifies it.
+    degrees = re.compile(r"\d+(?= degrees)")
+    assert degrees.sub("", printed(notebook)) == degrees.sub("", printed(stored()))
+    assert all(int(found) < 20 for found in degrees.findall(printed(notebook)))
     for new, old in zip(pictures(notebook), pictures(stored()), strict=True):
-        # Other processors round differently, and the solver amplifies it.
         assert np.abs(new.astype(int) - old).mean() < 10
     assert list(tmp_path.iterdir()) == []
