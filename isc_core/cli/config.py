@@ -11,7 +11,8 @@ long names of its options:
     [edit.gloss]
     look = "metallic"
 
-What the command line gives wins. Paths are relative to the file. Values are checked as on the
+What the command line gives wins. A file that nobody named must not make `isc` connect anywhere:
+`scheduler` needs `--config`. Paths are relative to the file. Values are checked as on the
 command line; `--no-config` ignores the file.
 """
 
@@ -27,6 +28,7 @@ from .commands.registry import all_commands, find_command
 from .interface.parser import GENERAL, actions_of
 
 USUAL = Path("isc.toml")
+_ONLY_IF_NAMED = frozenset({"scheduler"})
 _MAX_BYTES = 1 << 20
 
 
@@ -48,9 +50,10 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     Raises
     ------
     InputError
-        If the file cannot be read, or has a table, an option or a value that does not exist.
+        If the file cannot be read, or has a table, an option or a value that does not exist or
+        that only a named file may have.
     """
-    path = _find(arguments)
+    path, named = _find(arguments)
     if path is None:
         return None
     inner = dict(actions_of(parser))
@@ -58,6 +61,11 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
         if not isinstance(table, dict):
             raise InputError(f"{path}: {name!r} is in no table: put it below [decompose]")
         if name in inner and inner[name].get_default("run") is not None:
+            if not named and (barred := _ONLY_IF_NAMED & table.keys()):
+                raise InputError(
+                    f"{path}: {min(barred)} of [{name}] is accepted only from a file that is "
+                    f"named: use --config {path} if you trust it"
+                )
             _apply(inner[name], table, path, name)
         elif find_command(name) is None:
             known = [entry.name for entry in all_commands()]
@@ -65,14 +73,15 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     return path
 
 
-def _find(arguments: Sequence[str]) -> Path | None:
+def _find(arguments: Sequence[str]) -> tuple[Path | None, bool]:
+    """The file, and whether the command line names it."""
     finder = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
     finder.add_argument("--config", nargs="?", type=Path)
     finder.add_argument("--no-config", action="store_true")
     known, _ = finder.parse_known_args(arguments)
     if known.config is not None:
-        return Path(known.config)
-    return None if known.no_config or not USUAL.is_file() else USUAL
+        return Path(known.config), True
+    return (None if known.no_config or not USUAL.is_file() else USUAL), False
 
 
 def _read(path: Path) -> dict[str, object]:

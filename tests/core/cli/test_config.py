@@ -87,3 +87,13 @@ def test_a_file_that_is_not_text_is_one_error(capsys: pytest.CaptureFixture[str]
     Path("isc.toml").write_bytes(b"\xff\xfe[decompose]")
     assert main([*WORDS]) == 2
     assert "is not UTF-8" in capsys.readouterr().err
+
+
+def test_a_file_that_nobody_named_chooses_no_scheduler() -> None:
+    text = '[batch]\nscheduler = "tcp://192.0.2.1:8786"\n'
+    words = ("batch", "photos", "-o", "out")
+    with pytest.raises(InputError, match="isc.toml: scheduler of .batch. is accepted only from"):
+        parsed(text, *words)
+    options = parsed(text, *words, "--config", "isc.toml")
+    assert options["scheduler"] == "tcp://192.0.2.1:8786"
+    assert parsed(text, *words, "--no-config")["scheduler"] is None
