@@ -96,4 +96,4 @@ def test_a_file_that_nobody_named_chooses_no_scheduler() -> None:
         parsed(text, *words)
     options = parsed(text, *words, "--config", "isc.toml")
     assert options["scheduler"] == "tcp://192.0.2.1:8786"
-    assert parsed(text, *words, "--no-config")["scheduler"] is None
+    assert parsed(text, *words, "--no-config")["scheduler"] == ""
