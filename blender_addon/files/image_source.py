@@ -221,6 +221,8 @@ def _unchanged_file(image: Any) -> ImageSource | None:
             return None
         return ImageSource(image.name_full, data=data, transfer=transfer)
     path = Path(image.filepath_from_user())
+    if not path.is_file():  # opening a pipe would wait for its writer
+        return None
     try:
         with (
             path.open("rb") as file,
