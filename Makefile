@@ -1,5 +1,6 @@
 # make demo   renders one glossy object, decomposes it, says where the pictures are
-# make test   linter, type checker and tests
+# make test   linter, type checker and tests, within minutes
+# make test-all   the same and the slow tests (test-slow: these alone)
 # make docs   the documentation site, in build/site (open build/site/index.html)
 # make extension   Blender's add-on: one zip a platform and Python in dist/; TARGET=here builds only this machine's
 # The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
@@ -7,7 +8,7 @@
 BIN := .venv/bin
 INPUTS := pyproject.toml constraints.txt tools/setup.sh
 
-.PHONY: demo test lint docs extension clean
+.PHONY: demo test test-slow test-all lint docs extension clean
 .DEFAULT_GOAL := demo
 
 demo: .venv/.ready-demo
@@ -19,8 +20,17 @@ demo: .venv/.ready-demo
 	@echo "What came out:    demo/result/preview.png (look at this first)"
 	@echo "The textured mesh: demo/result/mesh.glb"
 
+# One process a core. A worker takes the next file, so that a file's fixtures are made once.
+PYTEST = $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+
 test: lint
-	$(BIN)/python -m pytest
+	$(PYTEST)
+
+test-slow: .venv/.ready-dev
+	$(PYTEST) -m slow
+
+test-all: test
+	$(PYTEST) -m slow
 
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .

@@ -225,6 +225,7 @@ def test_the_guide_to_add_a_method_works(tmp_path: Path, monkeypatch: pytest.Mon
     np.testing.assert_allclose(split.specular[..., 0], image.min(axis=2) / 4, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_site_builds_without_warnings_and_works_offline(tmp_path: Path) -> None:
     if importlib.util.find_spec("mkdocs") is None:
         pytest.skip("needs the extra docs")

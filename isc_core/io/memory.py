@@ -8,10 +8,9 @@ Limits: the amounts are estimates for the usual path, within about a third. Linu
 than there is, and ends a process that uses it; no process can report that.
 """
 
+import mmap
 from collections.abc import Iterator
 from contextlib import contextmanager
-
-import numpy as np
 
 from ..errors import InputError
 
@@ -54,8 +53,8 @@ def is_available(needed: int) -> bool:
     bool
     """
     try:
-        np.empty(needed, np.uint8)
-    except MemoryError:
+        mmap.mmap(-1, max(needed, 1)).close()  # reserved, not touched
+    except OSError:
         return False
     return True
 

@@ -33,6 +33,7 @@ def result_of_photo(folder: Path) -> Path:
     )
 
 
+@pytest.mark.slow
 def test_the_zip_installs_works_and_uninstalls_completely(tmp_path: Path) -> None:
     """Without wheels, as this environment has the packages: so no network is needed."""
     try:

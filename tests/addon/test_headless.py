@@ -120,6 +120,7 @@ def test_a_result_becomes_a_blend_file_and_a_matching_render(tmp_path: Path) -> 
     assert sorted(path.name for path in (tmp_path / "scene").iterdir()) == ["out.blend", "out.png"]
 
 
+@pytest.mark.slow
 def test_a_folder_becomes_one_file_with_several_scenes_or_several_files(
     tmp_path: Path,
 ) -> None:
@@ -162,6 +163,7 @@ def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree
     assert (kept / "bump" / "arrays.npz").is_file()
 
 
+@pytest.mark.slow
 def test_warnings_of_a_photo_are_printed(tmp_path: Path) -> None:
     image, mask = under_lights((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
     np.save(tmp_path / "ball.npy", image)

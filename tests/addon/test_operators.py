@@ -72,6 +72,7 @@ def census(blender: Any) -> dict[str, list[str]]:
 # --- from photo to object -------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_photo_becomes_an_object_and_is_decomposed_again_at_another_size(addon: Any) -> None:
     """One real run, of a painted photo with a name that is no file name."""
     addon.data.scenes[0].name = "Mine"

@@ -85,6 +85,15 @@ def until(true: Callable[[], object], seconds: float = 20.0) -> None:
         time.sleep(0.02)
 
 
+def has_ended(process: str) -> bool:
+    """Whether a process is gone, or waits for the system to take note of its end."""
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+    except (FileNotFoundError, ProcessLookupError):
+        return True
+    return state == "Z"
+
+
 def test_a_run_ends_by_importing_its_result(folder: Path) -> None:
     run = WorkerRun("Decompose cup", script(2, folder), take, folder)
     assert [run.step().state for _ in range(4)] == ["running", "running", "ready", "ready"]
@@ -493,4 +502,4 @@ while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exist
     )
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "run").exists()
-    until(lambda: not Path(f"/proc/{(tmp_path / 'pid').read_text()}").exists())
+    until(lambda: has_ended((tmp_path / "pid").read_text()), 60.0)

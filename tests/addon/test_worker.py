@@ -138,6 +138,7 @@ def others(folder: Path, *expected: str) -> list[str]:
 # --- real work ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_arrays_are_decomposed_into_a_result_with_arrays(
     tmp_path: Path, real: WorkerEnvironment
 ) -> None:
@@ -168,6 +169,7 @@ def test_invalid_input_is_reported_in_one_line(tmp_path: Path, real: WorkerEnvir
     assert others(tmp_path) == []
 
 
+@pytest.mark.slow
 def test_masks_edits_and_arrays_are_made_by_workers_too(
     tmp_path: Path, real: WorkerEnvironment
 ) -> None:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
+import pytest
 
 from isc_core.batch.attempts import MAX_CRASHES
 from isc_core.batch.engine import Crew
@@ -20,6 +21,7 @@ from tests.batch.tasks import obedient
 from tests.core.command_line import isc_command, run_isc, through_terminal
 
 
+@pytest.mark.slow
 def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
     tmp_path: Path,
 ) -> None:
@@ -76,6 +78,7 @@ def test_notes_and_progress_share_a_terminal(photos: Path, tmp_path: Path) -> No
     assert "starting workers\r\x1b[Kisc: 1 image\r\n" in text
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_lost_while_it_starts_is_started_again(
     photos: Path, tmp_path: Path
 ) -> None:
@@ -108,6 +111,7 @@ def test_a_worker_that_is_lost_while_it_starts_is_started_again(
     assert (tmp_path / "out" / "one" / "mesh.glb").is_file()
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) -> None:
     """Found before any worker starts."""
     without = "import sys; sys.modules['dask'] = None"

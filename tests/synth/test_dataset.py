@@ -60,6 +60,7 @@ def contents(root: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_the_folders_are_those_of_the_plan_and_hold_all_files(made: Path) -> None:
     planned = plan(RUN)
     assert {scene.split for scene in planned} == {"train", "test_materials", "test_lights", "test"}
@@ -226,6 +227,7 @@ def test_the_same_seed_gives_the_same_bytes(
     )
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on(
     root: Path, made: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -205,6 +205,7 @@ def pictures(root: Path, name: str = OBJECT) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.slow
 def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, dataset: Path) -> None:
     theirs = load_object(dataset, OBJECT, "laboratory", "diffuse")
     for name in root_names(GlossySettings()):
@@ -329,6 +330,7 @@ def stopping_after(count: int) -> Monitor:
     return Monitor(cancelled=lambda: next(calls) >= count)
 
 
+@pytest.mark.slow
 def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_path: Path) -> None:
     settings = {"levels": (25.0,)}
     for name, seed in (("a", 4), ("b", 4), ("c", 5)):
@@ -340,6 +342,7 @@ def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_p
     assert a[f"level-25_natural-area/{png}"] != c[f"level-25_natural-area/{png}"]
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
     small: Path, tmp_path: Path
 ) -> None:
@@ -364,6 +367,7 @@ def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
     ).stat().st_mtime_ns == lately
 
 
+@pytest.mark.slow
 def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     settings = GlossySettings(levels=(25.0,), samples=16, physical=True)

@@ -107,6 +107,7 @@ class Page(HTMLParser):
         self.words += data
 
 
+@pytest.mark.slow
 def test_a_whole_report(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "report"
     assert validate(dataset, out, "--scenes", "1", "--bounds", "none", "--renders", "1") == 0

@@ -444,6 +444,7 @@ def test_identities_hold_and_one_wrong_pixel_is_found() -> None:
     assert [check.passed for check in check_identities("s", truth)] == [False, True]
 
 
+@pytest.mark.slow
 def test_the_chain_runs_every_combination_and_reuses_the_stage_by_itself() -> None:
     found = measure_scene(
         facts("s"), sphere(), all_stages(), StageOptions(separator="none"), Monitor()

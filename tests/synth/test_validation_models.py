@@ -308,6 +308,7 @@ def test_tables_have_a_row_for_every_model_and_material_and_escape_names() -> No
     assert "By material:" in summary(outcome)
 
 
+@pytest.mark.slow
 def test_the_command_compares_models_by_material(dataset: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     more = (

@@ -20,6 +20,7 @@ def _few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(rendered_scenes, "SAMPLES", 4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SceneKind)
 def test_a_scene_is_reproducible_and_black_around_the_object(kind: SceneKind) -> None:
     scene, again = make_scene(kind, 3), make_scene(kind, 3)

@@ -127,6 +127,7 @@ def labels(figure: Figure) -> Iterator[tuple[float, float, float, float]]:
             yield axes.title.get_window_extent(canvas.get_renderer()).extents
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [name for name in ITEMS if name.startswith("figure") and ITEMS[name].make is not None]
 )
@@ -253,6 +254,7 @@ def test_chance_is_told_from_difference() -> None:
     assert np.allclose(filters.holm_correction(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
 
 
+@pytest.mark.slow
 def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
     for direction in (toward(-0.6, 0.6, 1.0), toward(0.9, -0.4, 0.8)):
         found = applications.estimate_directions(applications.render_ball(direction, 40))

@@ -315,6 +315,7 @@ def test_the_other_commands_need_no_matplotlib() -> None:
     assert done.returncode == 0
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_with_130_and_the_same_command_goes_on(tmp_path: Path) -> None:
     arguments = ("thesis", "table", "4.2", "--quick", "-o", tmp_path / "out")
     process = subprocess.Popen(

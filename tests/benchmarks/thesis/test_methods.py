@@ -113,6 +113,7 @@ def test_the_truth_scores_perfectly(context: Context, kind: str) -> None:
     assert layer_tables.decibels(0) == np.inf
 
 
+@pytest.mark.slow
 def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Context) -> None:
     for items in (segmentation, removal, sparse_coding):
         for item in items.ITEMS:
@@ -227,6 +228,7 @@ def rows(context: Context) -> list[framework_runs.FrameworkErrors]:
     return framework_runs.score_frameworks(context, subjects, (SIRFS, AFTER[-1], BOUND))
 
 
+@pytest.mark.slow
 def test_sirfs_is_what_all_are_relative_to(rows: list[framework_runs.FrameworkErrors]) -> None:
     table = characteristics.relative_error_table(rows, "balls", 0)
     assert table.rows[0] == ("SIRFS", *["1"] * len(framework_runs.METRICS))

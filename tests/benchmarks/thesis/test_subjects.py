@@ -76,6 +76,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> Context:
     return Context(tmp_path_factory.mktemp("thesis"), quick=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_without_data_everything_is_rendered(rendered: Context, kind: str) -> None:
     subjects = rendered.subjects(kind)

@@ -82,6 +82,7 @@ def test_runs_are_kept_differ_by_seed_and_never_beat_the_optimum(context: Contex
     assert len(set(found["PSO", "camera", 5].values.tolist())) > 1, "every run started alike"
 
 
+@pytest.mark.slow
 def test_tables_of_runs_fit_the_runs(context: Context) -> None:
     objectives, thresholds, times = (
         made(context, "table", number) for number in ("4.2", "4.3", "4.4")

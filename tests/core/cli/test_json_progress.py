@@ -100,6 +100,7 @@ def test_a_refusal_is_told_as_the_last_event(tmp_path: Path, words: list[str]) -
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_other_commands_speak_so_too(tmp_path: Path) -> None:
     photo = ball_photo(tmp_path)
     save(ball((40, 50), 16.0, (20, 25)), tmp_path / "result")
@@ -129,6 +130,7 @@ def at(stage: str, stop: Callable[[Process], None]) -> Callable[[Event, Process]
     return react
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stop", [cancel, disappear])
 def test_a_cancelled_solve_leaves_nothing(tmp_path: Path, stop: Callable[[Process], None]) -> None:
     process = started(

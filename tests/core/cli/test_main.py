@@ -121,6 +121,7 @@ def test_decompose_passes_the_reference_check(result: Path, shared: Path) -> Non
     assert done.returncode == 0, done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_options_reach_the_result(tmp_path: Path) -> None:
     options = [
         "--model",
@@ -264,6 +265,7 @@ def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_pat
     np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_measured_depth_bends_the_shape_towards_it(result: Path, tmp_path: Path) -> None:
     mask = load(result / "result").mask
     rows, columns = np.indices(mask.shape)
@@ -392,6 +394,7 @@ def test_a_photo_that_is_left_alone_is_said_to_be(
     assert "nothing was taken" not in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
     photo = grey_ball(tmp_path)
     assert isc("decompose", photo, "--quiet", "-o", tmp_path / "joint") == 0
@@ -486,6 +489,7 @@ def test_evaluate_scores_and_writes(
     assert f"{average:.5f}" in capfd.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("model", "light", "input"),
     [("sirfs", "natural", "diffuse"), ("mdr", "laboratory", "original")],
@@ -507,6 +511,7 @@ def test_what_is_evaluated_explains_the_image(
     assert answer.normal[truth.valid][:, 2].min() < 0.5
 
 
+@pytest.mark.slow
 def test_priors_are_fitted_to_the_chosen_objects(
     shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -536,6 +541,7 @@ def test_priors_are_fitted_to_the_chosen_objects(
 # --- stopping -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_during_the_solve_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
     photo = ball_photo(tmp_path, 110.0)

@@ -116,6 +116,7 @@ def test_layers_that_are_known_already_are_taken_along() -> None:
     np.testing.assert_allclose(found.diffuse, split.diffuse, atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["joint", "mbp"])
 def test_the_identities_hold_in_the_end(model: str) -> None:
     d = decompose(

@@ -28,6 +28,7 @@ def error(d: Decomposition) -> float:
     return float(np.degrees(np.arccos(np.clip((d.normal * normal).sum(-1)[mask], -1, 1))).mean())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grey", [False, True])
 def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
     toward = (-0.7, 0.2, 0.6)
@@ -44,6 +45,7 @@ def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
     assert seen.provenance.diagnostics.light_counts == usual.provenance.diagnostics.light_counts
 
 
+@pytest.mark.slow
 def test_the_laboratory_s_light_is_known() -> None:
     one, other = (
         found((0.5, 0.5, 0.7), illumination="laboratory", light_prior=prior)

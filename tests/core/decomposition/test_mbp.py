@@ -82,6 +82,7 @@ def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     assert brdf.model.startswith("ggx" if model == "mdr" else "blinn_phong")
 
 
+@pytest.mark.slow
 def test_the_whole_chain_keeps_the_identities() -> None:
     """Shape and light unknown: SIRFS is really solved."""
     d = glossy((52, 60), 23.0)
@@ -135,6 +136,7 @@ def test_an_overexposed_object_is_not_called_matt() -> None:
     assert WarningKind.CLIPPED in kinds
 
 
+@pytest.mark.slow
 def test_the_exposure_of_a_float_file_does_not_matter() -> None:
     d = glossy((52, 60), 23.0)
     found = []

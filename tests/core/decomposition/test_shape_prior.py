@@ -25,6 +25,7 @@ def error(d: Decomposition) -> float:
     return float(np.degrees(np.arccos(np.clip((d.normal * normal).sum(-1)[mask], -1, 1))).mean())
 
 
+@pytest.mark.slow
 def test_a_ball_is_rounder_as_it_was_seen() -> None:
     seen, outline = found(), found(shape_prior="silhouette")
     assert seen.identity_errors().broken() == ()
@@ -35,6 +36,7 @@ def test_a_ball_is_rounder_as_it_was_seen() -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
     normal, _ = ball()
     evidence = KnownInputs(depth=67.5 * normal[..., 2])
@@ -42,11 +44,13 @@ def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
     np.testing.assert_array_equal(one.height, other.height)
 
 
+@pytest.mark.slow
 def test_what_the_frame_cuts_was_not_seen_whole() -> None:
     one, other = (found(cut=60, shape_prior=prior) for prior in ("predicted", "silhouette"))
     np.testing.assert_array_equal(one.height, other.height)
 
 
+@pytest.mark.slow
 def test_in_the_laboratory_the_outline_is_enough() -> None:
     one, other = (
         found(illumination="laboratory", shape_prior=prior) for prior in ("predicted", "silhouette")

@@ -328,6 +328,7 @@ def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decompo
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lobe", ["fitted", "none"])
 def test_the_smallest_change_of_light_changes_least(scene: Decomposition, lobe: str) -> None:
     d = fitted(scene, lobe == "fitted")
@@ -355,6 +356,7 @@ def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> 
     assert centres[0] + 3 < centres[1] < centres[2] - 3
 
 
+@pytest.mark.slow
 def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Decomposition) -> None:
     light = NewLight(coefficients=scene.illumination)
     removed, rendered = (

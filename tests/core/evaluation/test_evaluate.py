@@ -119,6 +119,7 @@ def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(
     np.testing.assert_array_equal(other.reflectance, plain.reflectance)
 
 
+@pytest.mark.slow
 def test_the_users_protocol_measures_decompose_itself(root: Path) -> None:
     truth = load_object(root, "ball", "natural")
     options = RunnerOptions("sirfs", threads=1, protocol=Protocol.USERS)
@@ -152,6 +153,7 @@ def test_old_names_of_priors_are_still_read(root: Path) -> None:
     assert Settings(light_prior="seen", shape_prior="seen") == new
 
 
+@pytest.mark.slow
 def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
     def height(illumination: str, **priors: str) -> np.ndarray:
         options = RunnerOptions(threads=1, **priors)  # type: ignore[arg-type]

@@ -83,6 +83,7 @@ def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
     assert np.isfinite(found).all() and found.sum() == pytest.approx(1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", ENVIRONMENTS)
 def test_mirrors_look_like_mirrors(place: str) -> None:
     found = [

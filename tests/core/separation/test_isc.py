@@ -188,6 +188,7 @@ def test_which_channel_is_which_does_not_matter() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [(1280, 1280), (1303, 1297)])
 def test_large_photos_are_judged_alike(size: tuple[int, int]) -> None:
     """On averages of blocks, whether or not they fit the photo: what is found there is what the
@@ -507,6 +508,7 @@ def answers(shared: Path) -> dict[str, Answer]:
     return {t.name: Answer(t, separate("isc", t.image, t.mask, t.clipped)) for t in truths}
 
 
+@pytest.mark.slow
 def test_layers_hold_on_photos(answers: dict[str, Answer]) -> None:
     for answer in answers.values():
         assert_layers_hold(answer.split, answer.truth.image, answer.truth.mask)

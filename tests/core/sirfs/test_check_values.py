@@ -95,6 +95,7 @@ def test_sizes(shared: Path, illumination: str) -> None:
     assert (int(problem.valid.sum()), pairs, len(problem.contour.rows)) == COUNTS[illumination]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["numpy", "numba"])
 @pytest.mark.parametrize(("illumination", "state"), CHECKS)
 def test_every_term_and_gradient(shared: Path, illumination: str, state: int, engine: str) -> None:

@@ -58,6 +58,7 @@ def test_the_field_is_in_the_reference_s_frame_and_goes_on_beyond_what_was_seen(
     assert field.dome[75, 75] > 40  # of about 67
 
 
+@pytest.mark.slow
 def test_sirfs_takes_the_shape_that_was_seen() -> None:
     image, mask = under_lights((-0.7, 0.2, 0.6))
     normal, _ = ball()

@@ -83,6 +83,7 @@ def test_solving_improves_on_flat() -> None:
     assert angle_error(result.height, scene) < 0.6 * angle_error(np.zeros(scene.mask.shape), scene)
 
 
+@pytest.mark.slow
 @needs_numba
 def test_the_engines_find_the_same_optimum() -> None:
     problem = make_problem(blob((48, 52)))
