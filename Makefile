@@ -20,6 +20,9 @@ demo: .venv/.ready-demo
 	@echo "What came out:    demo/result/preview.png (look at this first)"
 	@echo "The textured mesh: demo/result/mesh.glb"
 
+# Tests start hundreds of processes: bytecode is kept, also where the environment says not to.
+test test-slow test-all: export PYTHONDONTWRITEBYTECODE =
+
 # One process a core. A worker takes the next file, so that a file's fixtures are made once.
 PYTEST = $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 

@@ -9,11 +9,14 @@ import sys
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+from isc_core.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("isc_core", "synth", "blender_addon", "training", "benchmarks")
@@ -44,6 +47,7 @@ def sources(*packages: str) -> list[Path]:
     return sorted(path for package in packages for path in (ROOT / package).rglob("*.py"))
 
 
+@cache
 def parsed(path: Path) -> ast.Module:
     return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
 
@@ -458,22 +462,16 @@ def plain(name: str) -> str:
     return re.sub(r"[-_.]+", "-", name).lower()
 
 
-def test_the_readme_names_commands_and_options_that_exist() -> None:
+def test_the_readme_names_commands_and_options_that_exist(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Every `isc COMMAND` of the README starts, and knows the options of its section."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     commands = sorted(set(re.findall(r"\bisc ([a-z][a-z-]+)\b", readme)))
-    start = "import sys; from isc_core.cli.main import main; sys.exit(main())"
     known = {}
     for command in commands:
-        done = subprocess.run(
-            [sys.executable, "-c", start, command, "--help"],
-            cwd=ROOT,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert done.returncode == 0, f"isc {command}: {done.stderr}"
-        known[command] = set(re.findall(r"--[a-z][a-z-]+", done.stdout))
+        assert main([command, "--help"]) == 0, f"isc {command}"
+        known[command] = set(re.findall(r"--[a-z][a-z-]+", capsys.readouterr().out))
     assert {"decompose", "separate", "mask", "evaluate", "fit-priors"} <= set(commands)
     for command in commands:
         section = re.search(rf"### `isc {command}`\n(.*?)(?=\n##)", readme, re.DOTALL)

@@ -95,10 +95,12 @@ def defines(folder: Path, module: tuple[str, ...]) -> bool:
     return parent.with_suffix(".py").is_file() or (parent / "__init__.py").is_file()
 
 
+@pytest.mark.slow
 def test_packages_of_the_wheel_collide_with_no_others(staged: Path) -> None:
     assert {path.name for path in staged.iterdir() if path.is_dir()} == INSTALLED
 
 
+@pytest.mark.slow
 def test_every_import_is_in_the_wheel(staged: Path) -> None:
     wrong = [
         f"{path.relative_to(staged)}: {'.'.join(name)}"
@@ -109,6 +111,7 @@ def test_every_import_is_in_the_wheel(staged: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.slow
 def test_no_string_names_a_module_of_the_repository(staged: Path) -> None:
     """Such a module would not be found in an installed wheel."""
     pattern = re.compile(rf"({'|'.join(sorted(COMMON - {'tests', 'training'}))})(\.[a-z_]+)+(:|$)")
@@ -160,6 +163,7 @@ def test_an_import_that_cannot_be_renamed_ends_the_build(backend: ModuleType, so
         backend.renamed_source(f"\n{source}".encode(), "module.py")
 
 
+@pytest.mark.slow
 def test_the_wheel_has_the_licence_the_data_and_the_types(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {f"{package}/py.typed" for package in INSTALLED} <= names

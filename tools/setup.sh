@@ -63,6 +63,8 @@ pip() {
 printf 'setup: installing isc3d[%s] (once; it takes a few minutes)\n' "$extras"
 pip install --quiet -c constraints.txt setuptools
 pip install --quiet -c constraints.txt --no-build-isolation -e ".[$extras]"
+# As pip does for what it installs: commands start faster, also where Python may not keep bytecode.
+.venv/bin/python -m compileall -q isc_core synth benchmarks blender_addon
 
 # Mitsuba compiles its kernels with the system's libLLVM, 19 or later; without one it renders all the same, more slowly.
 case $extras in

@@ -20,6 +20,7 @@ def result(bump_folder: Path, blender: Any) -> ResultArrays:
     return read_result(bump_folder)
 
 
+@pytest.mark.slow
 def test_renders_match_the_recovered_maps(result: ResultArrays, tmp_path: Path) -> None:
     renders = closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES)
     row = closed_loop.loop_row("bump", renders)

@@ -142,6 +142,7 @@ def test_the_zip_contains_the_addon_and_the_core_but_no_tools() -> None:
     ]
 
 
+@pytest.mark.slow
 def test_every_module_in_the_zip_is_python_that_names_no_package_of_the_source_tree() -> None:
     for name, content in contents(LINUX, []).items():
         if not name.endswith(".py"):
@@ -205,6 +206,7 @@ def test_a_wheel_that_is_not_the_locked_one_stops_the_build(tmp_path: Path) -> N
         wheels_for(LINUX, tmp_path, offline=True)
 
 
+@pytest.mark.slow
 @needs_bpy
 def test_blender_validates_the_zip_and_a_rejection_is_reported(tmp_path: Path) -> None:
     path = build(LINUX, tmp_path, None)

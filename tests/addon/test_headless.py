@@ -191,6 +191,7 @@ OLD_STATUS = {  # of schema 1
 }
 
 
+@pytest.mark.slow
 def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
     """Invalid entries of the status are ignored."""
     result, odd = write_result(tmp_path / "all" / "cup"), write_result(tmp_path / "all" / "odd")
@@ -238,6 +239,7 @@ def test_invalid_arguments_are_refused_in_one_line_before_any_work(
     assert [path.name for path in tmp_path.iterdir()] == ["RESULT"]
 
 
+@pytest.mark.slow
 def test_a_failed_source_does_not_stop_the_others(tmp_path: Path) -> None:
     for name in ("cup", "jug"):
         write_result(tmp_path / "all" / name)
@@ -249,6 +251,7 @@ def test_a_failed_source_does_not_stop_the_others(tmp_path: Path) -> None:
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["jug.blend"]
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
     call = command(photo(tmp_path), "-o", tmp_path / "out.blend")
     with subprocess.Popen(

@@ -115,6 +115,7 @@ def test_a_photo_becomes_an_object_and_is_decomposed_again_at_another_size(addon
     ].default_value == pytest.approx(0.1)
 
 
+@pytest.mark.slow
 def test_a_box_is_cut_out_as_the_mask(addon: Any) -> None:
     d = bump()
     settings = addon.context.scene.isc
@@ -370,6 +371,7 @@ def test_shadows_are_as_chosen(
     assert (made.visible_shadow, made.visible_diffuse) == (cast, cast)
 
 
+@pytest.mark.slow
 def test_missing_arrays_are_added_to_a_folder(addon: Any, tmp_path: Path) -> None:
     from isc_core.result_files.result_folder import save
 
@@ -421,6 +423,7 @@ def test_photos_of_one_name_become_separate_objects(
     assert sum(thing.type == "MESH" for thing in addon.data.objects) == 2
 
 
+@pytest.mark.slow
 def test_the_request_is_appended_with_the_object(addon: Any, tmp_path: Path) -> None:
     addon.context.scene.isc.image = photo()
     request = request_from_settings(addon.context.scene)

@@ -285,6 +285,7 @@ def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject
 # --- files ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_files_of_the_result_folder_are_copied(addon: Any, tmp_path: Path) -> None:
     from isc_core.result_files.arrays_file import write_arrays
     from isc_core.result_files.mesh import build_mesh

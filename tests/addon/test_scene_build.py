@@ -79,6 +79,7 @@ def test_changed_options_leave_nothing_behind(blender: Any, result: ResultArrays
     assert set(changed) <= {"node_groups"}, "a group without users goes when the file is saved"
 
 
+@pytest.mark.slow
 def test_another_resolution_updates_the_same_object(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:

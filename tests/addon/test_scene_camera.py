@@ -18,6 +18,7 @@ def build(result: ResultArrays, photo: Any = None, **options: Any) -> Any:
     return build_object(result, BuildOptions(**options), photo=photo)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("rows", "columns", "centre"),
     [(64, 88, (27.0, 38.0)), (88, 64, (50.0, 30.0)), (51, 51, (24.0, 25.0))],

@@ -36,6 +36,7 @@ def lit(
     return render(built.scene, folder, samples)["Diffuse Direct"][mask], mask
 
 
+@pytest.mark.slow
 def test_the_world_gives_the_recovered_shading(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
@@ -97,6 +98,7 @@ def expected(result: ResultArrays, where: np.ndarray) -> np.ndarray:
     return result.sun_strength / np.pi * facing + result.sun_ambient
 
 
+@pytest.mark.slow
 def test_sun_and_uniform_light_give_the_shading_of_the_dominant_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:

@@ -90,6 +90,7 @@ def test_the_closed_body_is_closed(blender: Any, bump_folder: Path) -> None:
     assert places[:, 1].max() > -result.vertices[:, 2].min()
 
 
+@pytest.mark.slow
 def test_parts_that_meet_in_a_vertex_are_closed_too(blender: Any, tmp_path: Path) -> None:
     mask = np.zeros((64, 88), bool)
     mask[5:20, 10:31] = mask[19:40, 30:50] = (

@@ -162,6 +162,7 @@ def test_arrays_are_decomposed_into_a_result_with_arrays(
     assert worker.poll() == final
 
 
+@pytest.mark.slow
 def test_invalid_input_is_reported_in_one_line(tmp_path: Path, real: WorkerEnvironment) -> None:
     final = ended(start_decompose(job(tmp_path / "nowhere.png", tmp_path / "result"), real))
     assert (final.state, final.log) == ("failed", "")
@@ -199,6 +200,7 @@ def test_masks_edits_and_arrays_are_made_by_workers_too(
         start_edit(tmp_path / "result", ["recolour", "-o"], real)
 
 
+@pytest.mark.slow
 def test_cancelled_while_it_compiles(tmp_path: Path, real: WorkerEnvironment) -> None:
     """With an empty cache the first solve compiles for long: the worker is cancelled midway and
     cleans up.
@@ -212,6 +214,7 @@ def test_cancelled_while_it_compiles(tmp_path: Path, real: WorkerEnvironment) ->
     assert others(tmp_path, "photo.npy", "mask.npy") == []
 
 
+@pytest.mark.slow
 @posix
 def test_the_worker_ends_when_its_program_does(tmp_path: Path, cache: Path) -> None:
     """Blender's crash, played by a program that leaves without a word in the midst of the work."""
@@ -252,6 +255,7 @@ def alive(pid: int) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_the_core_runs_as_a_part_of_an_extension(tmp_path: Path, cache: Path) -> None:
     """As it is shipped: a folder within the extension's, which alone is on the path, beside the
     packages of the wheels.
@@ -333,6 +337,7 @@ def test_the_job_reaches_the_command_line(
     }
 
 
+@pytest.mark.slow
 @posix
 @pytest.mark.parametrize("how", ["cancel", "kill"])
 def test_an_unresponsive_worker_is_killed_with_its_children(

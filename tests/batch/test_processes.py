@@ -43,6 +43,7 @@ def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
     assert (tmp_path / "out" / "kill_once" / "made").exists()
 
 
+@pytest.mark.slow
 def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     words = [
         "batch",
@@ -72,6 +73,7 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
 
 
+@pytest.mark.slow
 def test_notes_and_progress_share_a_terminal(photos: Path, tmp_path: Path) -> None:
     words = ("batch", photos / "bad.png", "-o", tmp_path / "out", "--workers", "1", "--memory", "0")
     text = through_terminal(*isc_command(*words))

@@ -39,6 +39,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in names}
 
 
+@pytest.mark.slow
 def test_good_images_are_made_and_the_bad_one_is_told(
     made: Path, first_run: Path, tmp_path: Path
 ) -> None:
@@ -92,6 +93,7 @@ def test_what_is_finished_is_skipped_and_what_changed_is_made_again(
     assert [name for name in before if before[name] == after[name]] == ["one"]
 
 
+@pytest.mark.slow
 def test_a_mask_settings_and_priors_count_and_threads_do_not(made: Path, photos: Path) -> None:
     (photos / "bad.png").unlink()
     crew = Crew(workers=2, threads=2, memory="0", processes=False)
@@ -134,6 +136,7 @@ def test_nobodys_files_are_replaced(photos: Path, tmp_path: Path) -> None:
         run_batch(batch(photos, output=tmp_path / "other"))
 
 
+@pytest.mark.slow
 def test_a_manifest_gives_names_masks_and_options(photos: Path, tmp_path: Path) -> None:
     lines = [
         {"image": "photos/one.png", "name": "small", "options": {"max_size": 16}},
@@ -250,6 +253,7 @@ def test_a_step_that_looks_at_the_clock_is_stopped(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_cancelled_run_keeps_what_is_complete(photos: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     asked = Monitor(cancelled=lambda: (output / "one").exists())

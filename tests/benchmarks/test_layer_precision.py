@@ -22,6 +22,7 @@ def answer() -> tuple[Estimate, np.ndarray]:
     ), mask
 
 
+@pytest.mark.slow
 def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
     plain, mask = answer()
     layer = np.zeros((*mask.shape, 3))

@@ -65,6 +65,7 @@ def test_a_missing_name_is_an_error_of_attributes_as_in_any_module() -> None:
         lookup("nonsense")
 
 
+@pytest.mark.slow
 def test_a_decomposition_imports_only_what_it_uses(tmp_path: Path) -> None:
     """Some libraries take a tenth of a second; a photo without highlights needs none of them."""
     light = np.where(ball((40, 50), 15.0, (20, 25)).mask, np.linspace(0.2, 0.6, 50), 0)

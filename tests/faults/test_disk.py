@@ -87,6 +87,7 @@ def breaker() -> Breaker:
     return Breaker()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "each"), STEPS, ids=lambda value: getattr(value, "name", ""))
 @pytest.mark.parametrize("earlier", [False, True], ids=["nothing there", "earlier output"])
 def test_every_writing_step_may_fail(

@@ -58,6 +58,7 @@ def ran(capfd: pytest.CaptureFixture[str], *words: object) -> str:
     return out
 
 
+@pytest.mark.slow
 @named
 def test_photo_mask_and_output(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
@@ -109,6 +110,7 @@ def test_refusal_takes_one_line(
     assert out == "" and err.count("\n") == 1 and "no such file" in err
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="names are text there")
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_terminal_of_any_encoding(tmp_path: Path, encoding: str) -> None:

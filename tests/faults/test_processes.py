@@ -45,6 +45,7 @@ KILLS = list(product(COMMANDS, range(20)) if CAMPAIGN else product([SEPARATE], r
 kinds = pytest.mark.parametrize("kind", ["png", "exr", "npy"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("command", "seed"), KILLS)
 def test_kill(trial: Trials, command: Command, seed: int) -> None:
     """At a random moment; every second time while it writes, every third over an earlier output."""

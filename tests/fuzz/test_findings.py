@@ -339,6 +339,7 @@ def huge_number(text: bytes, key: bytes) -> bytes:
     return re.sub(rb'("' + key + rb'"[^0-9]*)[0-9.]+', rb"\g<1>" + b"9" * 400, text, count=1)
 
 
+@pytest.mark.slow
 def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -> None:
     result, scene = result_files(), scene_files()["scene.json"]
     beside = {

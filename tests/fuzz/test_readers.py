@@ -100,6 +100,7 @@ def reader(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Reader]:
     made.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
 def test_reader_raises_nothing_but_its_own_error(reader: Reader, name: str) -> None:
     answers = campaign(reader, TARGETS[name], INPUTS)
@@ -155,6 +156,7 @@ def test_every_kind_of_fault_is_found(tmp_path: Path, kind: str, message: str) -
     assert reader.close() == 0
 
 
+@pytest.mark.slow
 @settings(max_examples=200, derandomize=True, database=None)
 @given(edits((b"word",)))
 def test_damage_stays_small(changes: list[Edit]) -> None:

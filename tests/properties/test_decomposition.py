@@ -12,6 +12,7 @@ from typing import Any
 from unittest import mock
 
 import numpy as np
+import pytest
 from hypothesis import strategies as st
 
 from isc_core.decomposition.pipeline import MODELS, Settings, decompose
@@ -142,6 +143,7 @@ def test_solver_accepts_no_larger_loss(case: DecompositionCase) -> None:
         assert after <= before + 0.06 + 1e-3 * abs(before), f"loss rises: {before} to {after}"
 
 
+@pytest.mark.slow
 @law(cases(photos(12, 28, USUAL_KINDS, USUAL_MASKS)), seconds=0.7)
 def test_number_of_threads_does_not_matter(case: DecompositionCase) -> None:
     with threads(1):
@@ -179,6 +181,7 @@ def median_angle(a: np.ndarray, b: np.ndarray, mask: np.ndarray) -> float:
     return float(np.degrees(np.median(np.arccos(cosines))))
 
 
+@pytest.mark.slow
 @law(cases(ordinary()), seconds=1.0)
 def test_flips_and_turns_change_little(case: DecompositionCase) -> None:
     """A flip negates x; a rotation to the left maps (x, y) to (-y, x)."""
@@ -196,6 +199,7 @@ def test_flips_and_turns_change_little(case: DecompositionCase) -> None:
         at_most(TURN_SHARE, share, f"{name} {case.model}: share of the light")
 
 
+@pytest.mark.slow
 @law(cases(ordinary()), seconds=1.0)
 def test_exposure_changes_little(case: DecompositionCase) -> None:
     photo = case.made.photo()

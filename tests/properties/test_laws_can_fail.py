@@ -54,6 +54,7 @@ FAULTS: list[tuple[Any, str, str, Breaks]] = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("module", "word", "function", "breaks"), FAULTS)
 def test_a_fault_is_detected(
     monkeypatch: pytest.MonkeyPatch, module: Any, word: str, function: str, breaks: Breaks

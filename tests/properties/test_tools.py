@@ -126,6 +126,7 @@ def apply_edit(d: Decomposition, case: OptionsCase, kind: str) -> Edited:
     return EDITS[kind](d, case)
 
 
+@pytest.mark.slow
 @law(st.tuples(with_options(photos(3, 28)), st.sampled_from(tuple(EDITS))), seconds=0.05)
 def test_edits(case: tuple[OptionsCase, str]) -> None:
     options, kind = case
@@ -140,6 +141,7 @@ def test_edits(case: tuple[OptionsCase, str]) -> None:
         assert np.array_equal(edit.image, d.image), "an edit of nothing changes the image"
 
 
+@pytest.mark.slow
 @law(photos(6, 28), seconds=0.1)
 def test_light_directions_and_colour(made: MadePhoto) -> None:
     d = bump(made)

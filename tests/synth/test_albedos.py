@@ -58,6 +58,7 @@ def test_uniform_is_one_colour() -> None:
         assert np.ptp(made("uniform", seed), axis=(0, 1)).max() == 0
 
 
+@pytest.mark.slow
 def test_patches_are_two_to_six_colours_with_soft_edges() -> None:
     for seed in SEEDS:
         albedo = made("patches", seed, 256).reshape(-1, 3)

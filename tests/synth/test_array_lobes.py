@@ -165,6 +165,7 @@ def test_lobes_under_an_environment_match_quadrature(sphere: Seen, name: str) ->
         assert test.accepted, test.text()
 
 
+@pytest.mark.slow
 def test_the_gloss_of_a_panel_is_that_of_quadrature(sphere: Seen) -> None:
     panel = panel_toward_origin((-1.5, 1.5, 2.0), (1.5, 1.0), (5, 4, 3))
     result = lit(sphere, materials()["ggx"], panel, samples=256)
@@ -329,6 +330,7 @@ def test_few_samples_have_a_variance_too(waisted: Seen, samples: int) -> None:
         assert (variance.max(1) > 0).mean() > share
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", ["panel", "environment"])
 def test_the_variance_is_that_of_repeated_renders(waisted: Seen, light: str) -> None:
     runs = [

@@ -18,6 +18,7 @@ def truth() -> GroundTruth:
     return demo_object(64, 32)
 
 
+@pytest.mark.slow
 def test_the_photo_shows_highlights_and_is_exposed(truth: GroundTruth) -> None:
     share = truth.specular[truth.mask].max(-1) / truth.image[truth.mask].max(-1)
     assert (share > 0.5).mean() > 0.01
@@ -42,6 +43,7 @@ def test_the_environment_is_positive_and_brighter_above() -> None:
     assert sky[:8].mean() > 1.5 * sky[-8:].mean()
 
 
+@pytest.mark.slow
 def test_the_command_writes_both_files_and_replaces_its_own(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     for _ in range(2):

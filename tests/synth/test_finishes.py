@@ -94,6 +94,7 @@ def test_varying_gloss_is_broader_where_it_is_weaker(model: str) -> None:
     assert np.median(spans) < 0.8
 
 
+@pytest.mark.slow
 def test_gloss_varies_one_time_in_four_by_default() -> None:
     varied = np.mean([np.ndim(material.gloss) == 2 for material in drawn("ggx", 600)])
     assert abs(varied - 0.25) < 4 * np.sqrt(0.25 * 0.75 / 600)

@@ -128,6 +128,7 @@ def test_a_uniform_environment_seen_head_on_gives_the_lobes_energy() -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
     panel = panel_toward_origin((300.0, 400.0, 600.0), (300.0, 400.0), (1.0, 2.0, 3.0))
     normal = facing(200)
@@ -177,6 +178,7 @@ def test_the_surface_is_where_the_mesh_of_its_heights_is(bump: Source) -> None:
     )
 
 
+@pytest.mark.slow
 def test_shading_is_the_sets_own_and_a_panel_adds_to_both_layers(bump: Source) -> None:
     layers = make_layers(bump, GlossySettings(), Monitor())
     assert tuple(layers) == LIGHTS
@@ -233,6 +235,7 @@ def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, datase
         np.testing.assert_allclose(natural.light, diffuse.light)
 
 
+@pytest.mark.slow
 def test_the_frame_and_the_crop_are_the_sets_own(made: Path, dataset: Path) -> None:
     ours, theirs = (
         made / "level-25_natural" / "laboratory" / OBJECT,
@@ -400,6 +403,7 @@ def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path
 # --- bad input ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -> None:
     settings = GlossySettings(levels=(25.0,))
     foreign, file = tmp_path / "foreign", tmp_path / "file"
@@ -483,6 +487,7 @@ def parsed(*words: str) -> argparse.Namespace:
     return parser.parse_args(["glossy-mit", *words])
 
 
+@pytest.mark.slow
 def test_the_command_makes_the_sets_and_prints_how_to_evaluate_on_them(
     small: Path, tmp_path: Path
 ) -> None:

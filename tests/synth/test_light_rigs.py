@@ -129,6 +129,7 @@ def test_light_comes_from_the_viewers_side(name: str) -> None:
         ).sum() >= -1e-6
 
 
+@pytest.mark.slow
 def test_natural_lights_give_the_shading_of_the_file(shared: Path) -> None:
     folder = shared / "data" / "mit_berkeley_train"
     lights = load_natural_lights(folder)

@@ -180,6 +180,7 @@ def test_a_panel_is_the_quadrature_of_the_models(name: str) -> None:
         accept(part - expected, variance, 512, tolerance=2e-3 * max(expected.max(), 1e-9))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["blinn_phong 20", "blinn_phong 2000", "ggx .05", "ggx .5"])
 def test_a_white_environment_shows_the_energy_of_the_lobe(name: str) -> None:
     material, _, gloss = MATERIALS[name]
@@ -199,6 +200,7 @@ def test_a_white_environment_shows_the_energy_of_the_lobe(name: str) -> None:
     np.testing.assert_allclose(found.shading, 1.0, rtol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["oren_nayar", "blinn_phong 20", "ggx .5"])
 def test_an_environment_matches_quadrature_of_the_models(name: str) -> None:
     material, body, gloss = MATERIALS[name]
@@ -388,6 +390,7 @@ def test_it_stops_when_asked_to() -> None:
         )
 
 
+@pytest.mark.slow
 def test_shading_without_shadows_is_the_integral_over_pixels_of_constant_radiance() -> None:
     picture = sky().radiance
     normal = np.random.default_rng(1).normal(size=(300, 3))
@@ -397,6 +400,7 @@ def test_shading_without_shadows_is_the_integral_over_pixels_of_constant_radianc
     assert unoccluded_shading(picture, normal[:0]).shape == (0, 3)
 
 
+@pytest.mark.slow
 def test_a_panel_without_shadows_is_its_quadrature_also_where_the_horizon_cuts_it() -> None:
     random = np.random.default_rng(2)
     position, normal = random.uniform(-1, 1, size=(2, 200, 3))

@@ -33,6 +33,7 @@ def verdict(difference: np.ndarray, variance: np.ndarray, **options: float) -> P
     return pixel_test(difference, variance, PixelTestOptions(**options))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [4, 64])
 def test_right_images_are_rejected_no_more_often_than_stated(samples: int) -> None:
     rng = np.random.default_rng(1)

@@ -137,6 +137,7 @@ def test_a_camera_sees_all_of_a_mesh_that_comes_near() -> None:
     assert near.pixels_per_unit < camera_around(mesh, 64, 0.9).pixels_per_unit * 1.2
 
 
+@pytest.mark.slow
 def test_the_same_recipe_gives_the_same_truth_well_exposed() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     _, one = photograph(RECIPE)
@@ -153,6 +154,7 @@ def test_the_same_recipe_gives_the_same_truth_well_exposed() -> None:
     ), "the lights are those of the maps"
 
 
+@pytest.mark.slow
 def test_an_object_that_mirrors_more_than_it_scatters_is_not_burnt_out() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     dark = replace(
@@ -168,6 +170,7 @@ def test_an_object_that_mirrors_more_than_it_scatters_is_not_burnt_out() -> None
     assert 0.09 < (truth.image[truth.mask] > 1).mean() < 0.11, "a tenth, to a pixel"
 
 
+@pytest.mark.slow
 def test_the_sensor_works_on_the_scene_of_the_seed() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     noisy = replace(RECIPE, picture=replace(SMALL, exposure=2.0, sensor=Sensor(noise=0.01, bits=8)))
@@ -177,6 +180,7 @@ def test_the_sensor_works_on_the_scene_of_the_seed() -> None:
     assert not np.array_equal(truth.residual, other.residual)
 
 
+@pytest.mark.slow
 def test_what_is_held_out_is_never_in_train(names: dict[str, dict[str, set[str]]]) -> None:
     own = {
         "test_objects": {"shape"},
@@ -290,6 +294,7 @@ def test_impossible_pictures_are_refused(wrong: dict[str, float]) -> None:
         PictureSettings(**wrong)
 
 
+@pytest.mark.slow
 def test_natural_lights_differ_by_their_number(shared: Path) -> None:
     sources = Sources(natural_lights=shared / "data" / "mit_berkeley_train")
     lights = make_pools(Choices(lights=("natural",)), sources).light

@@ -61,6 +61,7 @@ def assert_closed(mesh: Mesh) -> None:
     assert solid.volume > 0.01
 
 
+@pytest.mark.slow
 @every
 def test_surfaces_are_closed_and_fine(name: str) -> None:
     for seed in range(2):
@@ -69,6 +70,7 @@ def test_surfaces_are_closed_and_fine(name: str) -> None:
         assert_closed(mesh)
 
 
+@pytest.mark.slow
 @every
 def test_normals_are_unit_and_those_of_the_faces(name: str) -> None:
     for seed in SEEDS:

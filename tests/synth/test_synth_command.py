@@ -55,6 +55,7 @@ def isolated(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_help_needs_no_mitsuba_and_running_prints_what_to_install(tmp_path: Path) -> None:
     start = "from isc_core.cli.main import main; sys.exit(main(sys.argv[1:]))"
     shown = isolated(start, "synth", "--help")
@@ -71,6 +72,7 @@ def test_help_needs_no_mitsuba_and_running_prints_what_to_install(tmp_path: Path
     assert not (tmp_path / "set").exists()
 
 
+@pytest.mark.slow
 def test_the_parser_loads_no_renderer() -> None:
     code = (
         "import sys; from isc_core.cli.commands import build_parser; build_parser(); "
@@ -190,6 +192,7 @@ def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFi
     assert picture["sensor"] == {"clip": True, "noise": 0.01, "bits": 8}, "codes imply clipping"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quiet", [False, True])
 def test_slow_rendering_is_explained_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, quiet: bool
@@ -204,6 +207,7 @@ def test_slow_rendering_is_explained_in_one_line(
     )
 
 
+@pytest.mark.slow
 def test_the_command_in_the_readme_makes_the_same_scenes(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     assert (
@@ -272,6 +276,7 @@ def test_a_textured_mesh_keeps_its_albedo(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_interrupting_ends_with_130(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     code = "import sys; from isc_core.cli.main import main; sys.exit(main(sys.argv[1:]))"

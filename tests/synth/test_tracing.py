@@ -92,6 +92,7 @@ def test_no_rays_are_no_error(sphere: Tracer) -> None:
     assert sphere.blocked(none, none, np.inf).shape == (0,)
 
 
+@pytest.mark.slow
 def test_a_waist_hides_itself() -> None:
     tracer = Tracer(skittle())
     below, up = np.array([[0.0, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]])

@@ -74,6 +74,7 @@ def compared(
     )
 
 
+@pytest.mark.slow
 @needs_llvm
 @pytest.mark.parametrize("light", lights())
 @pytest.mark.parametrize("material", materials())
@@ -89,6 +90,7 @@ def test_arrays_and_kernels_agree(waisted: Seen, material: str, light: str, tmp_
         assert result.accepted, f"{layer}: {result.text()}; see {tmp_path / layer}"
 
 
+@pytest.mark.slow
 @needs_llvm
 @pytest.mark.parametrize("light", ["directional", "environment"])
 def test_arrays_and_kernels_agree_on_light_that_bounces(waisted: Seen, light: str) -> None:

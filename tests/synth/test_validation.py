@@ -206,6 +206,7 @@ def test_with_all_truths_nothing_is_solved_and_only_the_pixel_grid_errs() -> Non
     assert scores.normal < 0.05 and chain_value(scores, "images") < 2e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grey", [False, True])
 def test_what_is_given_is_kept(grey: bool) -> None:
     truth = sphere(grey=grey)

@@ -55,11 +55,13 @@ def test_the_roughness_of_a_ball_in_the_sun_is_found(material: Material) -> None
     assert found.explained > 0.8
 
 
+@pytest.mark.slow
 def test_nothing_is_determined_on_a_diffuse_ball_or_under_a_smooth_environment() -> None:
     assert scores(rendered(Material(RED, "lambert"), SUN)) == LobeScores(invented=0.0)
     assert scores(rendered(Material(RED, "ggx", 0.2, 1.0), SKY)) == LobeScores(determined=0.0)
 
 
+@pytest.mark.slow
 def test_what_it_shows_and_keeps() -> None:
     truth = rendered(Material(RED, "ggx", 0.2, 1.0), SUN)
     answer = run_lobe(stage_inputs(truth, LOBE.needs), StageOptions(), Monitor())

@@ -156,6 +156,7 @@ def test_every_model_that_separates_has_its_place() -> None:
     assert {field.name for field in fields(Variants)} == {PLAIN, TRUE_DIFFUSE, *SEPARATING_MODELS}
 
 
+@pytest.mark.slow
 def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     truth = sphere(share=0.8)
     energies: list[tuple[float, float]] = []
@@ -193,6 +194,7 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     assert energies[0] == pytest.approx(energies[1], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_the_photo_is_separated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
 
@@ -359,6 +361,7 @@ def _figures(content: dict[str, Any], kind: str, value: str) -> dict[str, Any]:
     return {figure["metric"]["name"]: figure["interval"] for figure in own}
 
 
+@pytest.mark.slow
 def test_without_models_there_is_no_such_stage(dataset: Path, tmp_path: Path) -> None:
     more = (
         "--stages",
@@ -396,6 +399,7 @@ def test_an_unknown_model_is_refused(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stage", ["models", CHAIN])
 def test_evidence_of_a_broken_bound_is_kept(dataset: Path, tmp_path: Path, stage: str) -> None:
     settings = StageOptions(models=("mdr",))

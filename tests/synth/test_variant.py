@@ -35,6 +35,7 @@ def test_without_mitsuba_the_message_says_what_to_install(monkeypatch: pytest.Mo
         load_mitsuba()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("found", [-1, 15])
 def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package(
     found: int,

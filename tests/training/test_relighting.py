@@ -32,6 +32,7 @@ def traced(tmp_path_factory: pytest.TempPathFactory) -> TracedObject:
     return next(objects_in(folder))
 
 
+@pytest.mark.slow
 def test_an_object_is_reproducible(traced: TracedObject) -> None:
     again = make_object(3)
     np.testing.assert_array_equal(again["normals"], traced.normals)
@@ -80,6 +81,7 @@ def test_pixels_facing_the_light_are_brighter(traced: TracedObject) -> None:
         assert np.corrcoef(np.maximum(facing, 0) * seen, lit.shading)[0, 1] > 0.8
 
 
+@pytest.mark.slow
 def test_objects_are_read_by_name(tmp_path: Path) -> None:
     for number in (5, 4):
         np.savez_compressed(tmp_path / f"{number:06d}.npz", **make_object(number))  # type: ignore[arg-type]
@@ -112,6 +114,7 @@ def test_a_linear_map_keeps_the_signs_of_cosines(traced: TracedObject) -> None:
     np.testing.assert_allclose(deep, np.array([[0.6, 0, 0.4]]) / np.hypot(0.6, 0.4), rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_group_is_reproducible_and_its_normals_face_the_viewer() -> None:
     one, again = make_group(1), make_group(1)
     assert str(one["shape"]) == GROUP

@@ -32,6 +32,7 @@ def test_a_scene_is_reproducible_and_black_around_the_object(kind: SceneKind) ->
     np.testing.assert_array_equal(again["layers"], scene["layers"])
 
 
+@pytest.mark.slow
 def test_a_mesh_file_replaces_the_shape(tmp_path: Path) -> None:
     mesh: Mesh = make_shape("superquadric", np.random.default_rng(0))
     write_ply(tmp_path / "thing.ply", mesh)
@@ -58,6 +59,7 @@ def test_scenes_are_read_under_new_and_former_names(
     assert scene.layers.dtype == np.float32
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_environments_are_lit_and_differ(name: str) -> None:
     one, other = (make_environment(name, np.random.default_rng(k)) for k in (0, 1))

@@ -132,6 +132,7 @@ def test_rows_come_back_from_disk(tmp_path: Path) -> None:
     assert read_rows(tmp_path / "rows.csv") == {} == read_rows(tmp_path / "nothing.csv")
 
 
+@pytest.mark.slow
 def test_a_run_is_taken_up_where_it_was_left(
     shared: Path,
     tmp_path: Path,

@@ -159,6 +159,7 @@ def test_what_cannot_be_made_again_says_why() -> None:
         assert len(ITEMS[name].reason) > 20
 
 
+@pytest.mark.slow
 def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
     found = {name: catalogue.check_constraints(model).obeyed for name, model in catalogue.MODELS}
     assert all(positive for positive, _, _ in found.values())
@@ -181,6 +182,7 @@ def test_characteristics_are_those_of_a_saved_result(
     assert any("image" in said for said in missing), "a field that nobody lists is noticed"
 
 
+@pytest.mark.slow
 def test_tables_of_documentation_are_made(context: Context) -> None:
     assert "NOT" not in made("table-2.3", context).text
     left = column(made("table-2.2", context), "residual highlight (%), mean")

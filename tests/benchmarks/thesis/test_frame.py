@@ -149,6 +149,7 @@ def test_rows_are_not_begun_once_somebody_cancelled(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.jsonl"))
 
 
+@pytest.mark.slow
 def test_a_failing_item_does_not_stop_the_others_and_is_named(tmp_path: Path) -> None:
     def fails(context: Context) -> ItemContent:
         raise InputError("no data for this one")

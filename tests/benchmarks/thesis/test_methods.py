@@ -240,6 +240,7 @@ def test_sirfs_is_what_all_are_relative_to(rows: list[framework_runs.FrameworkEr
     assert all(row.seconds > 0 and row.evaluations > 0 for row in rows)
 
 
+@pytest.mark.slow
 def test_a_separation_afterwards_changes_reflectance_alone(
     rows: list[framework_runs.FrameworkErrors],
 ) -> None:

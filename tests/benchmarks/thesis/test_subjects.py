@@ -93,6 +93,7 @@ def test_without_data_everything_is_rendered(rendered: Context, kind: str) -> No
         assert np.allclose(diffuse[subject.mask], explained[subject.mask], atol=2e-3)
 
 
+@pytest.mark.slow
 def test_what_is_rendered_is_kept_and_the_same(rendered: Context) -> None:
     first = rendered.subjects("synthetic")
     before = {path: path.stat().st_mtime_ns for path in rendered.output.rglob("*.npz")}
@@ -103,6 +104,7 @@ def test_what_is_rendered_is_kept_and_the_same(rendered: Context) -> None:
     assert all(np.array_equal(a.image, b.image) for a, b in zip(first, second, strict=True))
 
 
+@pytest.mark.slow
 def test_stand_ins_for_photos_tell_no_truth(rendered: Context) -> None:
     assert all(
         s.truth is None and s.diffuse is None and s.specular is None for s in rendered.photos()
@@ -116,6 +118,7 @@ def test_rendering_stops_when_asked(tmp_path: Path) -> None:
     assert not list(tmp_path.rglob("*.npz"))
 
 
+@pytest.mark.slow
 def test_public_data_in_each_layout(shared: Path, tmp_path: Path) -> None:
     data = shared / "data"
     (tmp_path / "MIT-Berkeley-Laboratory").symlink_to(data / "mit_berkeley_train" / "laboratory")

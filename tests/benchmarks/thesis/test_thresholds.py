@@ -64,6 +64,7 @@ def test_the_exact_table_has_every_image_and_its_known_optimum(context: Context)
     assert all(known[name, 3] < known[name, 4] < known[name, 5] for name in IMAGES[:3])
 
 
+@pytest.mark.slow
 def test_runs_are_kept_differ_by_seed_and_never_beat_the_optimum(context: Context) -> None:
     found = run_searches(context, ("PSO", "CS"))
     for (_, image, count), each in found.items():

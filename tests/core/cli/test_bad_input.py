@@ -263,6 +263,7 @@ def test_a_full_disk(
     assert not list(place.iterdir())
 
 
+@pytest.mark.slow
 def test_a_disk_that_fills_up_while_writing(tmp_path: Path) -> None:
     """A limit on the size of files fails in the same place as a disk that fills up, and needs no
     rights.

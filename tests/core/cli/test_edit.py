@@ -67,6 +67,7 @@ ACTIONS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("action", ACTIONS)
 def test_every_action_writes_its_pictures(
     work: Path, tmp_path: Path, action: str, capsys: pytest.CaptureFixture[str]
@@ -114,6 +115,7 @@ def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path:
     assert not np.array_equal(after[mask], before[mask])
 
 
+@pytest.mark.slow
 def test_an_edit_of_nothing_is_the_photo(work: Path, tmp_path: Path) -> None:
     for words in (
         "dichromatic",

@@ -89,6 +89,7 @@ def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
     load(output)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", [["nowhere.png"], ["nowhere.png", "--no-such-option"]])
 def test_a_refusal_is_told_as_the_last_event(tmp_path: Path, words: list[str]) -> None:
     code, events, errors = followed(started("separate", *words, "-o", tmp_path / "out"))
@@ -154,6 +155,7 @@ def test_a_start_can_be_cancelled(tmp_path: Path) -> None:
     assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ignored", [False, True])
 def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool) -> None:
     """Also where the program inherits that Ctrl-C is ignored."""
@@ -167,6 +169,7 @@ def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool)
     assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
 
 
+@pytest.mark.slow
 def test_work_that_cannot_be_interrupted_ends_with_its_program(tmp_path: Path) -> None:
     process = started(
         "mask",
@@ -182,6 +185,7 @@ def test_work_that_cannot_be_interrupted_ends_with_its_program(tmp_path: Path) -
     assert (code, events[-1]["event"]) == (130, "progress")
 
 
+@pytest.mark.slow
 def test_a_command_without_input_runs_on(tmp_path: Path) -> None:
     """Cron and CI give an empty standard input: its end is no wish to cancel."""
     words = ("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "out")
@@ -198,6 +202,7 @@ def test_a_command_without_input_runs_on(tmp_path: Path) -> None:
     assert json.loads(done.stdout.splitlines()[-1])["event"] == "done"
 
 
+@pytest.mark.slow
 def test_words_that_are_not_the_word_mean_nothing(tmp_path: Path) -> None:
     process = started("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "out")
     assert process.stdin is not None
@@ -206,6 +211,7 @@ def test_words_that_are_not_the_word_mean_nothing(tmp_path: Path) -> None:
     assert followed(process)[1][-1]["event"] == "done"
 
 
+@pytest.mark.slow
 def test_a_listener_that_goes_deaf_does_not_stop_the_work(tmp_path: Path) -> None:
     process = started("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "out")
     assert process.stdout is not None and process.stderr is not None

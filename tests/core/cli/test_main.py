@@ -110,6 +110,7 @@ def test_decompose_writes_a_whole_result(result: Path) -> None:
     assert sorted(entry.name for entry in result.iterdir()) == ["ball.png", "result"]
 
 
+@pytest.mark.slow
 def test_decompose_passes_the_reference_check(result: Path, shared: Path) -> None:
     checker = shared / "tools" / "check_result.py"
     done = subprocess.run(
@@ -244,6 +245,7 @@ def test_a_known_shape_goes_on_beyond_its_rim(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_path: Path) -> None:
     folder = result / "result"
     assert (
@@ -408,6 +410,7 @@ def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
     assert not found.specular[unclipped].any() and found.confidence[found.mask].max() < 1
 
 
+@pytest.mark.slow
 def test_a_prior_says_where_highlights_can_be(tmp_path: Path) -> None:
     """Black: nowhere; middle grey: nothing is said; the left half black: on the right alone."""
     photo = disc_photo(tmp_path)

@@ -79,6 +79,7 @@ def error(d: Decomposition, answer: SceneEstimate) -> float:
     return float(np.square(answer.split.diffuse - d.diffuse)[d.mask].mean())
 
 
+@pytest.mark.slow
 def test_a_highlight_on_grey_paint_is_taken_off(
     glossy: tuple[Decomposition, SceneEstimate],
 ) -> None:
@@ -100,6 +101,7 @@ def test_the_layers_sum_up_and_are_not_negative(
     assert not (split.diffuse[~d.mask].any() or split.specular[~d.mask].any())
 
 
+@pytest.mark.slow
 def test_the_same_again(glossy: tuple[Decomposition, SceneEstimate]) -> None:
     d, answer = glossy
     again = joint(task_of(d))
@@ -115,6 +117,7 @@ def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
     assert found.diagnostics.joint == JointOutcome.UNCHANGED
 
 
+@pytest.mark.slow
 def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
     d = grey_ball(10)
     start = detect_residual_highlights(d.image, mdr(task_of(d)).split.diffuse, d.mask)

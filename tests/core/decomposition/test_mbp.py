@@ -52,6 +52,7 @@ def truth_of(d: Decomposition) -> KnownInputs:
     return KnownInputs(height=d.height.astype(float), light=d.illumination)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 @pytest.mark.parametrize("full_size", [False, True])
 def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_size: bool) -> None:
@@ -70,6 +71,7 @@ def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_siz
         assert np.abs(found.specular - d.specular)[inner].mean() < 0.5 * d.specular[inner].mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     d = glossy()

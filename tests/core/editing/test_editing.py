@@ -53,6 +53,7 @@ def test_edits_that_ask_for_nothing_return_the_image_bit_by_bit(scene: Decomposi
         assert np.array_equal(edit.specular, scene.specular)
 
 
+@pytest.mark.slow
 def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposition) -> None:
     before = scene.image.copy()
     sun = DirectionalLight(toward(-1, 1, 1), ambient=np.full(3, 0.2))
@@ -265,6 +266,7 @@ def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(
     )
 
 
+@pytest.mark.slow
 def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) -> None:
     light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
     kept, scaled, removed = (
@@ -295,6 +297,7 @@ def fitted(scene: Decomposition, determined: bool) -> Decomposition:
     )
 
 
+@pytest.mark.slow
 def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decomposition) -> None:
     light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
     by_fit = relight(fitted(scene, True), light)
@@ -342,6 +345,7 @@ def test_the_smallest_change_of_light_changes_least(scene: Decomposition, lobe: 
         )
 
 
+@pytest.mark.slow
 def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> None:
     d, centres = fitted(scene, True), []
     columns = np.indices(d.mask.shape)[1]
@@ -441,6 +445,7 @@ def test_a_wider_lobe_does_not_lift_the_edge_at_which_a_highlight_was_cut_off() 
     assert wider[(full > 0.5) & (full < 0.6)].min() > 0.6 * wider.max()
 
 
+@pytest.mark.slow
 def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(
     scene: Decomposition,
 ) -> None:

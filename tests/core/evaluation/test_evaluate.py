@@ -103,6 +103,7 @@ def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "joint"])
 def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(
     root: Path, model: str

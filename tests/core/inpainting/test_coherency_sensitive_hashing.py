@@ -53,6 +53,7 @@ def exhaustive(source: Patches, target: Patches, which: np.ndarray) -> np.ndarra
     return np.sqrt(np.maximum(squares.min(axis=1), 0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["later view", "other half"])
 def test_mean_distance_is_near_the_exhaustive_optimum(case: str) -> None:
     image = texture(140, 200, seed=1)

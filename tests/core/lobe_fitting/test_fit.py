@@ -130,6 +130,7 @@ def test_a_known_direction_is_kept() -> None:
     assert fit.alpha == pytest.approx(0.2, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_the_intervals_grow_with_the_noise_and_hold_the_truth() -> None:
     specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR))
     inside, widths = [], []
@@ -156,6 +157,7 @@ def test_the_intervals_grow_with_the_noise_and_hold_the_truth() -> None:
     assert 0.45 <= np.mean(inside) <= 0.9
 
 
+@pytest.mark.slow
 def test_wrong_normals_widen_the_intervals_when_said_so() -> None:
     scene = seen(Ggx(0.2), directional(KEY, COLOUR))
     sure, unsure = fit_lobe(*scene), fit_lobe(*scene, options=LobeFitOptions(normal_error=15))
@@ -164,6 +166,7 @@ def test_wrong_normals_widen_the_intervals_when_said_so() -> None:
     assert unsure.alpha_interval.low < 0.18 and unsure.alpha_interval.high > 0.22
 
 
+@pytest.mark.slow
 def test_pixels_without_confidence_and_clipped_ones_do_not_spoil_the_fit() -> None:
     specular, normal, mask = seen(Ggx(0.15), directional(KEY, COLOUR))
     clip = 0.3 * specular.max()
@@ -187,6 +190,7 @@ def test_without_specular_light_nothing_is_invented() -> None:
         assert fit.alpha is None and fit.lights == () and not fit.predicted.any()
 
 
+@pytest.mark.slow
 def test_a_smooth_light_leaves_alpha_undetermined() -> None:
     normal, mask = ball()
     towards, solid = directions(16), solid_angles(16)
@@ -218,6 +222,7 @@ def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
         np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
 
 
+@pytest.mark.slow
 def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
     normal, mask = ball()
     towards, solid = directions(24), solid_angles(24)
@@ -246,6 +251,7 @@ def test_under_an_even_environment_alpha_is_undetermined() -> None:
     assert fit.outcome == LobeFitOutcome.SMOOTH_LIGHT and fit.alpha is None
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_answer_and_it_is_ready_for_json() -> None:
     scene = seen(Ggx(0.2), directional(KEY, COLOUR))
     first, second = fit_lobe(*scene), fit_lobe(*scene)
@@ -255,6 +261,7 @@ def test_the_same_input_gives_the_same_answer_and_it_is_ready_for_json() -> None
     assert json.loads(text)["alpha"] == first.alpha
 
 
+@pytest.mark.slow
 def test_brighter_light_changes_the_product_alone() -> None:
     specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR))
     dim, bright = fit_lobe(specular, normal, mask), fit_lobe(1000 * specular, normal, mask)
@@ -548,6 +555,7 @@ def test_the_jacobian_of_the_whole_model_is_that_of_differences(thresholded: boo
         )
 
 
+@pytest.mark.slow
 def test_a_rendered_highlight_is_found() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     from synth.capture.truth import render_truth

@@ -45,6 +45,7 @@ def test_a_lambert_ball_tells_its_light(direction: tuple[float, float, float]) -
     assert found.determined
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("direction", "exponent"),
     [(LIGHTS[0], 60.0), (LIGHTS[1], 12.0), (LIGHTS[2], 300.0), (LIGHTS[3], 60.0)],
@@ -105,6 +106,7 @@ def test_flat_light_and_no_gloss_are_undetermined() -> None:
         assert not found.determined
 
 
+@pytest.mark.slow
 def test_noise_everywhere_is_no_highlight() -> None:
     scene = ball()
     noise = np.random.default_rng(1).uniform(0, 0.2, (*scene.mask.shape, 1)) * scene.mask[..., None]
@@ -121,6 +123,7 @@ def test_the_sphere_is_brightest_where_it_faces_the_light() -> None:
     assert (glint >= color).all() and glint.max() > 1.05
 
 
+@pytest.mark.slow
 def test_specks_of_a_matt_object_tell_no_light() -> None:
     """Where the fit of the lobe says that there are next to no highlights, two faint pixels are no
     direction.

@@ -16,6 +16,7 @@ from isc_core.shading.environment_map import environment_from_shading
 from tests.core.result_files.test_arrays_file import glossy
 
 
+@pytest.mark.slow
 def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
     d = glossy()
     facing = replace(d, normal=np.broadcast_to(np.array([0, 0, 1], np.float32), d.normal.shape))
@@ -30,6 +31,7 @@ def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
     assert specular_upper_bound(grey, 0.3, 0 * even) == np.inf
 
 
+@pytest.mark.slow
 def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> None:
     d = glossy()
     gloss = fitted_specular(d)
@@ -42,6 +44,7 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
     assert (shown.specular_source, shown.roughness) == (SpecularSource.LOWERED, gloss.roughness)
 
 
+@pytest.mark.slow
 def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     d = glossy()
     env_map = environment_from_shading(d.illumination, 16)
@@ -53,6 +56,7 @@ def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [1.0, 100.0])
 def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float) -> None:
     d = stronger(glossy(), factor)

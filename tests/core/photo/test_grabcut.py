@@ -50,6 +50,7 @@ def test_grabcut_is_the_same_every_time_and_in_linear_light() -> None:
     assert overlap(grabcut(srgb_to_linear(image / 255).astype(np.float32), box), truth) > 0.97
 
 
+@pytest.mark.slow
 def test_large_boxes_are_solved_smaller() -> None:
     image, truth = scene(1200, 1600)
     assert overlap(grabcut(image, (400, 200, 800, 800), iterations=2), truth) > 0.97
@@ -71,6 +72,7 @@ def test_bad_boxes(box: tuple[int, int, int, int], words: str) -> None:
     assert words in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_a_strip_of_background_too_thin_to_learn_from() -> None:
     image, _ = scene(1501, 2000)
     with pytest.raises(InputError, match="too little background"):
@@ -122,6 +124,7 @@ def test_cut_out_of_a_black_photo(tmp_path: Path) -> None:
     assert not (tmp_path / "mask.png").exists()
 
 
+@pytest.mark.slow
 def test_cut_out_of_a_real_photo(shared: Path, tmp_path: Path) -> None:
     found = cut_out(
         shared / "data" / "highlight" / "fish.ppm", (60, 60, 500, 360), tmp_path / "mask.png"

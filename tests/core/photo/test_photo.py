@@ -850,6 +850,7 @@ def test_the_masked_photos(shared: Path) -> None:
         )
 
 
+@pytest.mark.slow
 def test_linear_16_bit_photos_of_mit_berkeley(shared: Path) -> None:
     for name in ("apple", "cup1"):
         folder = shared / "data" / "mit_berkeley_train" / "laboratory" / name

@@ -298,6 +298,7 @@ class TestAbsoluteTable:
         assert np.abs(fitted - density)[near].max() < 0.05 * density.max()
         assert losses[-1] < losses[0]
 
+    @pytest.mark.slow
     def test_more_smoothness_bends_less(self) -> None:
         histogram = absolute_table.splat(
             np.random.default_rng(7).normal(-1, 0.5, (50, 1)), 256, np.full(50, 0.02)
@@ -395,6 +396,7 @@ class TestFit:
         statistics = object_statistics(painted_ball(0, size=120))
         assert statistics.curvature.absolute_sum / statistics.curvature.counts.sum() < 2e-3
 
+    @pytest.mark.slow
     def test_all_priors_expand(
         self, balls: dict[str, ObjectStatistics], environments: np.ndarray
     ) -> None:
@@ -412,6 +414,7 @@ class TestFit:
                 )
         assert fitted.record.objects == tuple(f"ball{k}" for k in range(8))
 
+    @pytest.mark.slow
     def test_same_objects_give_the_same_priors_in_any_order(
         self, balls: dict[str, ObjectStatistics], environments: np.ndarray
     ) -> None:
@@ -420,6 +423,7 @@ class TestFit:
         assert np.array_equal(one.absolute.coarse, other.absolute.coarse)
         assert np.array_equal(one.color_smoothness.weights, other.color_smoothness.weights)
 
+    @pytest.mark.slow
     def test_contrast_can_be_given(
         self, balls: dict[str, ObjectStatistics], environments: np.ndarray
     ) -> None:
@@ -495,6 +499,7 @@ class TestAgainstTheReference:
     all of them.
     """
 
+    @pytest.mark.slow
     def test_curvature(
         self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
     ) -> None:
@@ -507,6 +512,7 @@ class TestAgainstTheReference:
         theirs = np.interp(x, nodes, reference["z_curv_lut_cost"])
         assert np.abs((cost - cost[0]) - (theirs - theirs[0])).max() < 0.25
 
+    @pytest.mark.slow
     def test_color_smoothness(
         self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
     ) -> None:
@@ -530,6 +536,7 @@ class TestAgainstTheReference:
         ours, theirs = fit_whitening(list(measured.values())), reference["a_whiten"]
         assert np.linalg.norm(ours - theirs) < 0.01 * np.linalg.norm(theirs)
 
+    @pytest.mark.slow
     def test_absolute_color(
         self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
     ) -> None:

@@ -51,6 +51,7 @@ def arrays(folder: Path) -> Arrays:
     return read(folder / ARRAYS)
 
 
+@pytest.mark.slow
 def test_the_maps_are_those_of_the_result(arrays: Arrays) -> None:
     d = ball()
     for name in (*COLOR_MAPS, "normal", "height", "confidence", "mask"):
@@ -122,6 +123,7 @@ def test_the_sun_explains_the_shading(arrays: Arrays) -> None:
     assert arrays["sun_explained"] > 0.9
 
 
+@pytest.mark.slow
 def test_detail_stays_where_vertices_are_few() -> None:
     """With every second pixel a vertex, vertex normal and normal map together are the recovered
     normals, without rounding to codes.
@@ -154,6 +156,7 @@ def glossy() -> Decomposition:
     )
 
 
+@pytest.mark.slow
 def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
     d = glossy()
     save(d, tmp_path / "out", arrays=True)
@@ -172,6 +175,7 @@ def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_command_gives_the_same_bytes_as_the_option(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -187,6 +191,7 @@ def test_the_command_gives_the_same_bytes_as_the_option(
     assert not (tmp_path / "later" / ARRAYS).exists()
 
 
+@pytest.mark.slow
 def test_a_disk_without_room_for_arrays_is_known_before(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

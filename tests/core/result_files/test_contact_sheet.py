@@ -57,6 +57,7 @@ def inner() -> np.ndarray:
     return np.hypot(row, column) < 120
 
 
+@pytest.mark.slow
 def test_one_exposure_holds_for_input_diffuse_and_specular(
     shown: dict[str, np.ndarray], scene: Decomposition
 ) -> None:
@@ -249,6 +250,7 @@ def drawn_subtitle(d: Decomposition) -> str:
     return drawn[1]
 
 
+@pytest.mark.slow
 def test_the_title_says_what_was_fitted() -> None:
     d = ball()
     fit = fit_lobe(d.specular, d.normal, d.mask)

@@ -218,6 +218,7 @@ def test_spikes_at_the_rim_go_and_a_ball_stays() -> None:
     assert (repaired == height)[inside].all()  # only the rim is touched
 
 
+@pytest.mark.slow
 def test_a_steep_rim_has_no_teeth() -> None:
     """From the side, a ball's outline must be about as long as its great circle, not climb and fall
     at each step of the grid.

@@ -49,6 +49,7 @@ def change(folder: Path, **entries: object) -> None:
     path.write_text(json.dumps(json.loads(path.read_text()) | entries))
 
 
+@pytest.mark.slow
 def test_a_result_of_the_first_schema_loads(old: Path) -> None:
     found = load(old)
     diagnostics = found.provenance.diagnostics
@@ -59,6 +60,7 @@ def test_a_result_of_the_first_schema_loads(old: Path) -> None:
     assert not found.brdf.determined
 
 
+@pytest.mark.slow
 def test_it_is_saved_in_the_present_schema(old: Path, tmp_path: Path) -> None:
     found = load(old)
     save(found, tmp_path / "again")
@@ -68,6 +70,7 @@ def test_it_is_saved_in_the_present_schema(old: Path, tmp_path: Path) -> None:
     assert load(tmp_path / "again").provenance.diagnostics == found.provenance.diagnostics
 
 
+@pytest.mark.slow
 def test_a_reason_that_nobody_wrote_is_refused(old: Path) -> None:
     about = json.loads((old / "decomposition.json").read_text())
     change(old, brdf=about["brdf"] | {"reason": "it is Tuesday"})

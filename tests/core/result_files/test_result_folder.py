@@ -164,6 +164,7 @@ def test_a_fit_that_knows_nothing_is_read_back_with_its_reason(tmp_path: Path) -
     assert not back.predicted.any()
 
 
+@pytest.mark.slow
 def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
     d = ball((48, 60), 20.0, (22, 33))
     env_map = np.full((8, 16, 3), 0.02)
@@ -176,6 +177,7 @@ def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
     assert back.to_json() == fit.to_json()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [
@@ -447,6 +449,7 @@ def test_a_black_image_cannot_be_shown(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_folder_keeps_the_shared_contract(saved: Path, shared: Path) -> None:
     check = shared / "tools" / "check_result.py"
     done = subprocess.run(

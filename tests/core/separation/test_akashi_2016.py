@@ -33,6 +33,7 @@ def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "best"), [("animals", 36.6), ("cups", 37.8)])
 def test_published_images(shared: Path, name: str, best: float) -> None:
     """The published method reaches 34.5 and 35.2 dB; the improved one more, from any seed."""
@@ -40,6 +41,7 @@ def test_published_images(shared: Path, name: str, best: float) -> None:
     assert psnr(separate(image, mask), truth) >= best
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "least"), [("animals", 32.5), ("cups", 35.2)])
 def test_sihr_from_a_sample(shared: Path, name: str, least: float) -> None:
     """One random start: between 32.7 and 35.9 dB on animals (the published one 34.5), 35.8 and 37.1

@@ -44,6 +44,7 @@ def ratio(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.ndar
     return float(np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "improved", "paper"), [("animals", 0.2, 0.65), ("cups", 0.26, 0.55)]
 )

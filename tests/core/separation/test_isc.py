@@ -277,6 +277,7 @@ def test_without_colours_to_compare_nothing_is_removed(kind: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_what_no_display_shows_is_no_highlight() -> None:
     """Not even in one pixel: a layer is nothing, or can be seen."""
     diffuse, mask = sectors(glossy=False).diffuse, disc()[2]
@@ -361,6 +362,7 @@ def test_what_was_taken_off_costs_trust() -> None:
     )
 
 
+@pytest.mark.slow
 def test_more_probable_highlights_are_taken_off_more() -> None:
     scene = sectors()
     removed = [
@@ -515,6 +517,7 @@ def test_layers_hold_on_photos(answers: dict[str, Answer]) -> None:
 
 
 # What is asked of the structural similarity, .987 and .975, is not reached: .9859 and .9742.
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "decibels", "similarity"), [("animals", 38.5, 0.9855), ("cups", 40.0, 0.9738)]
 )
@@ -553,6 +556,7 @@ def test_confidence_falls_with_the_error(answers: dict[str, Answer], name: str) 
 KNOWN = {("natural", "teabag2"): 0.025}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", ["laboratory", "natural"])
 @pytest.mark.parametrize("name", OBJECTS)
 def test_photos_without_highlights_are_left_alone(shared: Path, light: str, name: str) -> None:

@@ -77,6 +77,7 @@ FIGURES = [
 IMPROVED = {"tan_2005": (37.6, 37.2), "yang_2010": (37.3, 38.4), "yoon_2006": (37.5, 37.9)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("method", "variant", "animals", "cups", "tolerance"), FIGURES)
 def test_published_figures(
     shared: Path, method: str, variant: str, animals: float, cups: float, tolerance: float

@@ -86,6 +86,7 @@ def test_fill_carries_a_plane_across_a_hole() -> None:
     assert np.abs(filled - plane).max() < 0.01
 
 
+@pytest.mark.slow
 def test_every_method_has_sound_layers() -> None:
     image, _, mask = disc_of_two()
     nothing = separate("none", image, mask)

@@ -42,6 +42,7 @@ def test_lights_add_up() -> None:
     assert np.allclose(together, sum(alone))
 
 
+@pytest.mark.slow
 def test_a_white_sky_shows_what_a_surface_keeps() -> None:
     directions, weights = env_map(28)
     white = environment(directions, weights, np.ones((len(weights), 3)))
@@ -51,6 +52,7 @@ def test_a_white_sky_shows_what_a_surface_keeps() -> None:
             assert np.allclose(seen, directional_albedo(model, cos_view), rtol=5e-3)
 
 
+@pytest.mark.slow
 def test_a_cosine_sky_on_a_matt_surface_has_a_closed_form() -> None:
     """Radiance 1 + cos of the angle from the top: the irradiance is pi (1 + 2/3 n_z), as order 1
     harmonics say.

@@ -168,6 +168,7 @@ def test_what_is_known_comes_back_as_it_was_given(solve_size: int) -> None:
     np.testing.assert_array_equal(both.height[scene.mask], scene.height[scene.mask])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("offset", [0.0, 1e6])
 @pytest.mark.parametrize("solve_size", [0, 41])
 def test_depth_with_holes_pulls_the_height(solve_size: int, offset: float) -> None:

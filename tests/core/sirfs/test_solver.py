@@ -76,6 +76,7 @@ def test_loss_falls_and_what_is_returned_belongs_together(engine: str, channels:
     assert 0 < result.iterations <= 40 and result.iterations < result.evaluations
 
 
+@pytest.mark.slow
 def test_solving_improves_on_flat() -> None:
     scene = blob()
     result = solve(make_problem(scene), replace(QUICK, lbfgs=LbfgsOptions()))
@@ -128,6 +129,7 @@ def test_when_all_is_known_it_is_only_evaluated() -> None:
     assert result.converged and result.iterations == 0
 
 
+@pytest.mark.slow
 def test_shape_from_shading_finds_a_hemisphere() -> None:
     scene = hemisphere()
     problem = make_problem(scene, weights(slant=0.5), shading_only=True)
@@ -294,6 +296,7 @@ def test_the_start_that_goes_on_ends_where_it_would_have_ended_alone() -> None:
         assert (chosen.terms, chosen.reason) == (alone.terms, alone.reason)
 
 
+@pytest.mark.slow
 def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> None:
     problem = make_problem(hemisphere())
     problem = replace(problem, weights=replace(problem.weights, starts=(Start(), Start(light=1))))

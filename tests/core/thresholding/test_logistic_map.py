@@ -79,6 +79,7 @@ def test_seeds_repeat_and_differ() -> None:
     )
 
 
+@pytest.mark.slow
 def test_orbits_that_stop_are_started_again() -> None:
     """In floating point one orbit in some 1e8 steps falls on a point where it stops."""
     count = 4096

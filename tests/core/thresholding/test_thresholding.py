@@ -121,6 +121,7 @@ def test_evaluations_are_counted_where_they_happen(optimiser: str) -> None:
     assert objective.evaluations == found.evaluations
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("optimiser", ["chaotic_clonal", "clonal_selection"])
 def test_clonal_selection_finds_the_optimum(optimiser: str) -> None:
     for name in ("camera", "brick", "clock"):  # these have lesser maxima in which a search can end

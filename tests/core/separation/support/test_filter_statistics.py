@@ -103,6 +103,7 @@ def test_nothing_outside_the_mask_counts():
     assert (highlight_prior(image, mask)[~mask] == 0.5).all()
 
 
+@pytest.mark.slow
 def test_exposure_turns_and_mirrors_change_nothing(table):
     intensity, _, mask = photo(4, True)
     image = coloured(intensity)
@@ -128,6 +129,7 @@ def test_the_fitted_prior_knows_highlights_it_has_not_seen(table):
     assert np.concatenate(no).mean() < 0.4
 
 
+@pytest.mark.slow
 def test_where_both_kinds_look_alike_the_temperature_says_nothing():
     made = samples(range(10))
     random = np.random.default_rng(1)
