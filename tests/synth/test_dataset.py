@@ -30,6 +30,8 @@ from synth.dataset.settings import DatasetSettings
 from synth.dataset.splits import SPLITS, Choices
 from synth.scene.materials import MODELS
 
+pytestmark = pytest.mark.slow  # they share a run
+
 # One scene of each split; shapes and lights that are quick to make.
 CHOICES = Choices(
     shapes=("superquadric", "lathe"), albedos=("uniform", "patches"), lights=("directional", "sh")
@@ -60,7 +62,6 @@ def contents(root: Path) -> dict[str, bytes]:
     }
 
 
-@pytest.mark.slow
 def test_the_folders_are_those_of_the_plan_and_hold_all_files(made: Path) -> None:
     planned = plan(RUN)
     assert {scene.split for scene in planned} == {"train", "test_materials", "test_lights", "test"}
@@ -78,7 +79,6 @@ def test_the_folders_are_those_of_the_plan_and_hold_all_files(made: Path) -> Non
     assert [folder.parent.name for folder in list_scenes(made, "test_lights")] == ["test_lights"]
 
 
-@pytest.mark.slow
 def test_maps_keep_their_identities(made: Path) -> None:
     for folder in list_scenes(made):
         channels = read_channels(folder / "maps.exr")
@@ -189,7 +189,6 @@ def test_the_description_records_settings_and_frame(made: Path) -> None:
     assert set(CONVENTIONS) == set(MODELS)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("perspective", [False, True])
 def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it(
     tmp_path: Path, perspective: bool
@@ -214,7 +213,6 @@ def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it
     assert (seen[2] > 0).all()
 
 
-@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -230,7 +228,6 @@ def test_the_same_seed_gives_the_same_bytes(
     )
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_goes_on(
     root: Path, made: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -268,7 +265,6 @@ def test_a_complete_set_is_not_written_again(root: Path, monkeypatch: pytest.Mon
     assert contents(root) == before
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 3, 6])
 def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: int) -> None:
     asked = iter(range(1000))
@@ -285,7 +281,6 @@ def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: 
         assert json.loads(left["manifest.json"])["complete"] is False
 
 
-@pytest.mark.slow
 def test_progress_names_the_scene_and_never_goes_back(tmp_path: Path) -> None:
     seen: list[ProgressEvent] = []
     make_dataset(replace(RUN, count=2), tmp_path / "set", Monitor(seen.append))

@@ -31,6 +31,8 @@ from synth.glossy_mit.settings import LIGHTS, GlossySettings, root_name, root_na
 from synth.glossy_mit.source import Source, load_source
 from synth.scene.lights import lights_as_environment, panel_toward_origin
 
+pytestmark = pytest.mark.slow  # they share a run
+
 VIEW = np.array([0.0, 0.0, 1.0])
 OBJECT = "teabag2"
 CODE = 1 / 65535
@@ -128,7 +130,6 @@ def test_a_uniform_environment_seen_head_on_gives_the_lobes_energy() -> None:
         )
 
 
-@pytest.mark.slow
 def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
     panel = panel_toward_origin((300.0, 400.0, 600.0), (300.0, 400.0), (1.0, 2.0, 3.0))
     normal = facing(200)
@@ -178,7 +179,6 @@ def test_the_surface_is_where_the_mesh_of_its_heights_is(bump: Source) -> None:
     )
 
 
-@pytest.mark.slow
 def test_shading_is_the_sets_own_and_a_panel_adds_to_both_layers(bump: Source) -> None:
     layers = make_layers(bump, GlossySettings(), Monitor())
     assert tuple(layers) == LIGHTS
@@ -207,7 +207,6 @@ def pictures(root: Path, name: str = OBJECT) -> dict[str, np.ndarray]:
     }
 
 
-@pytest.mark.slow
 def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, dataset: Path) -> None:
     theirs = load_object(dataset, OBJECT, "laboratory", "diffuse")
     for name in root_names(GlossySettings()):
@@ -235,7 +234,6 @@ def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, datase
         np.testing.assert_allclose(natural.light, diffuse.light)
 
 
-@pytest.mark.slow
 def test_the_frame_and_the_crop_are_the_sets_own(made: Path, dataset: Path) -> None:
     ours, theirs = (
         made / "level-25_natural" / "laboratory" / OBJECT,
@@ -333,7 +331,6 @@ def stopping_after(count: int) -> Monitor:
     return Monitor(cancelled=lambda: next(calls) >= count)
 
 
-@pytest.mark.slow
 def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_path: Path) -> None:
     settings = {"levels": (25.0,)}
     for name, seed in (("a", 4), ("b", 4), ("c", 5)):
@@ -345,7 +342,6 @@ def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_p
     assert a[f"level-25_natural-area/{png}"] != c[f"level-25_natural-area/{png}"]
 
 
-@pytest.mark.slow
 def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
     small: Path, tmp_path: Path
 ) -> None:
@@ -370,7 +366,6 @@ def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
     ).stat().st_mtime_ns == lately
 
 
-@pytest.mark.slow
 def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     settings = GlossySettings(levels=(25.0,), samples=16, physical=True)
@@ -403,7 +398,6 @@ def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path
 # --- bad input ------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -> None:
     settings = GlossySettings(levels=(25.0,))
     foreign, file = tmp_path / "foreign", tmp_path / "file"
@@ -487,7 +481,6 @@ def parsed(*words: str) -> argparse.Namespace:
     return parser.parse_args(["glossy-mit", *words])
 
 
-@pytest.mark.slow
 def test_the_command_makes_the_sets_and_prints_how_to_evaluate_on_them(
     small: Path, tmp_path: Path
 ) -> None:

@@ -36,6 +36,8 @@ from synth.validation.stages.types import StagePicture
 
 pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
+pytestmark = pytest.mark.slow  # they share a run
+
 SCENES = 5
 VOID = {"meta", "img", "rect", "line", "br"}
 
@@ -107,7 +109,6 @@ class Page(HTMLParser):
         self.words += data
 
 
-@pytest.mark.slow
 def test_a_whole_report(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "report"
     assert validate(dataset, out, "--scenes", "1", "--bounds", "none", "--renders", "1") == 0
@@ -157,7 +158,6 @@ def test_a_whole_report(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert "## Error budget" in summary and len(summary) < 8000
 
 
-@pytest.mark.slow
 def test_bounds_that_are_kept_and_bounds_that_break(
     dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -185,7 +185,6 @@ def test_bounds_that_are_kept_and_bounds_that_break(
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
 
 
-@pytest.mark.slow
 def test_two_runs_measure_the_same_and_any_number_of_threads(dataset: Path, tmp_path: Path) -> None:
     found = []
     for name, threads in (("one", "1"), ("two", "2")):
@@ -214,7 +213,6 @@ def test_two_runs_measure_the_same_and_any_number_of_threads(dataset: Path, tmp_
     assert found[0] == found[1]
 
 
-@pytest.mark.slow
 def test_a_split_and_a_drawn_sample(dataset: Path, tmp_path: Path) -> None:
     content = {}
     for name, more in (

@@ -57,6 +57,8 @@ from synth.validation.stages.separation import SEPARATION
 from synth.validation.stages.types import BLACK, StageOptions, stage_inputs
 from tests.synth.test_validation import facts, sphere
 
+pytestmark = pytest.mark.slow  # they share a run
+
 EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 
 
@@ -156,7 +158,6 @@ def test_every_model_that_separates_has_its_place() -> None:
     assert {field.name for field in fields(Variants)} == {PLAIN, TRUE_DIFFUSE, *SEPARATING_MODELS}
 
 
-@pytest.mark.slow
 def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     truth = sphere(share=0.8)
     energies: list[tuple[float, float]] = []
@@ -194,7 +195,6 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     assert energies[0] == pytest.approx(energies[1], rel=1e-6)
 
 
-@pytest.mark.slow
 def test_the_photo_is_separated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
 
@@ -310,7 +310,6 @@ def test_tables_have_a_row_for_every_model_and_material_and_escape_names() -> No
     assert "By material:" in summary(outcome)
 
 
-@pytest.mark.slow
 def test_the_command_compares_models_by_material(dataset: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     more = (
@@ -361,7 +360,6 @@ def _figures(content: dict[str, Any], kind: str, value: str) -> dict[str, Any]:
     return {figure["metric"]["name"]: figure["interval"] for figure in own}
 
 
-@pytest.mark.slow
 def test_without_models_there_is_no_such_stage(dataset: Path, tmp_path: Path) -> None:
     more = (
         "--stages",
@@ -399,7 +397,6 @@ def test_an_unknown_model_is_refused(
     )
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("stage", ["models", CHAIN])
 def test_evidence_of_a_broken_bound_is_kept(dataset: Path, tmp_path: Path, stage: str) -> None:
     settings = StageOptions(models=("mdr",))

@@ -34,6 +34,8 @@ from isc_core.evaluation.metrics import score, truth_normal
 from isc_core.scene.decomposition import Separation
 from isc_core.shading.spherical_harmonics import light_from_reference, light_to_reference, real_sh
 
+pytestmark = pytest.mark.slow  # they share a run
+
 SIZE = 36
 PAINTS = ((0.8, 0.25, 0.1), (0.15, 0.45, 0.7))
 
@@ -113,7 +115,6 @@ def test_the_truth_scores_perfectly(context: Context, kind: str) -> None:
     assert layer_tables.decibels(0) == np.inf
 
 
-@pytest.mark.slow
 def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Context) -> None:
     for items in (segmentation, removal, sparse_coding):
         for item in items.ITEMS:
@@ -228,7 +229,6 @@ def rows(context: Context) -> list[framework_runs.FrameworkErrors]:
     return framework_runs.score_frameworks(context, subjects, (SIRFS, AFTER[-1], BOUND))
 
 
-@pytest.mark.slow
 def test_sirfs_is_what_all_are_relative_to(rows: list[framework_runs.FrameworkErrors]) -> None:
     table = characteristics.relative_error_table(rows, "balls", 0)
     assert table.rows[0] == ("SIRFS", *["1"] * len(framework_runs.METRICS))
@@ -240,7 +240,6 @@ def test_sirfs_is_what_all_are_relative_to(rows: list[framework_runs.FrameworkEr
     assert all(row.seconds > 0 and row.evaluations > 0 for row in rows)
 
 
-@pytest.mark.slow
 def test_a_separation_afterwards_changes_reflectance_alone(
     rows: list[framework_runs.FrameworkErrors],
 ) -> None:

@@ -165,6 +165,7 @@ def test_options_reach_the_result(tmp_path: Path) -> None:
     assert max(p.input["crop_box"][2:]) <= 30
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes_on_any_number_of_threads(
     result: Path, tmp_path: Path
 ) -> None:

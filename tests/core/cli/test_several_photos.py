@@ -73,8 +73,8 @@ def test_what_belongs_to_one_photo_is_refused_for_several(
     "words",
     [
         ("decompose", "-", *NAIVE, "-o", "out"),
-        ("separate", "-", "--method", "none", "-o", "out"),
-        ("mask", "-", "--box", "2,2,48,44", "-o", "out.png"),
+        pytest.param(("separate", "-", "--method", "none", "-o", "out"), marks=pytest.mark.slow),
+        pytest.param(("mask", "-", "--box", "2,2,48,44", "-o", "out.png"), marks=pytest.mark.slow),
     ],
 )
 def test_a_photo_from_standard_input(tmp_path: Path, words: tuple[str, ...]) -> None:

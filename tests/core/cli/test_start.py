@@ -90,7 +90,10 @@ def interrupted(command: list[str], seconds: float) -> tuple[int, str]:
     return process.returncode, errors
 
 
-@pytest.mark.parametrize("share", [0.1, 0.3, 0.5, 0.7, 0.9])
+@pytest.mark.parametrize(
+    "share",
+    [0.1, 0.5, *(pytest.param(share, marks=pytest.mark.slow) for share in (0.3, 0.7, 0.9))],
+)
 def test_an_interrupt_while_libraries_load_is_never_lost(tmp_path: Path, share: float) -> None:
     """At shares of the time of a run that only starts: nothing is written, the code is 130."""
     photo, output = ball_photo(tmp_path), tmp_path / "out"

@@ -494,6 +494,7 @@ class TestFit:
             object_statistics(empty)
 
 
+@pytest.mark.slow
 class TestAgainstTheReference:
     """The reference's constants came from these ten objects; it drew its samples at random, we take
     all of them.

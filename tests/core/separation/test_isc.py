@@ -529,6 +529,7 @@ def test_figures_on_photos_of_shen_and_zheng(
     assert ssim_volume(truth.diffuse, split.diffuse) >= similarity
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OBJECTS)
 def test_no_worse_than_doing_nothing_in_the_laboratory(
     answers: dict[str, Answer], name: str
