@@ -1,8 +1,8 @@
 """Exhausted memory as an error that says how much is needed.
 
-Problem: libraries report exhausted memory in many ways: as `MemoryError`, as error -4 of OpenCV, as
-the words of a C++ exception, or as nothing but damaged data (libjpeg). Taken for damage, the error
-sends the user to the wrong remedy.
+Problem: libraries report exhausted memory in many ways: as `MemoryError`, as the words of a C++
+exception, or as nothing but damaged data (libjpeg). Taken for damage, the error sends the user to
+the wrong remedy.
 
 Limits: the amounts are estimates for the usual path, within about a third. Linux grants more memory
 than there is, and ends a process that uses it; no process can report that.
@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from ..errors import InputError
 
 READING = 32  # bytes a pixel, at most, from the file to linear light
-_OPENCV_NO_MEMORY = -4
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
 
 
@@ -32,9 +31,7 @@ def is_exhausted(error: BaseException) -> bool:
     """
     cause: BaseException | None = error
     while cause is not None:
-        if isinstance(cause, MemoryError) or getattr(cause, "code", None) == _OPENCV_NO_MEMORY:
-            return True
-        if any(word in str(cause) for word in _WORDS):
+        if isinstance(cause, MemoryError) or any(word in str(cause) for word in _WORDS):
             return True
         cause = cause.__cause__ or cause.__context__
     return False

@@ -1,7 +1,7 @@
 """Finding the object's mask in a photo, and checking it."""
 
-import cv2
 import numpy as np
+from scipy.ndimage import label
 
 from ..errors import InputError
 from ..imaging.bounding_box import mask_box
@@ -49,11 +49,11 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
     -------
     (H, W) bool ndarray
     """
-    _, labels = cv2.connectedComponents((~mask).astype(np.uint8), connectivity=4)
+    labels, _ = label(~mask)
     outside = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     filled = mask | ~np.isin(labels, outside)
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(filled.astype(np.uint8), connectivity=8)
-    areas = stats[:, cv2.CC_STAT_AREA].copy()
+    labels, _ = label(filled, np.ones((3, 3)))
+    areas = np.bincount(labels.ravel())
     areas[0] = 0
     return (areas >= max(0.01 * areas.max(), 1))[labels]
 

@@ -8,7 +8,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 from PIL import Image
 
@@ -39,7 +38,6 @@ _DECODING_ERRORS = (
     OverflowError,
     struct.error,
     zlib.error,
-    cv2.error,
     Image.DecompressionBombError,
 )
 
@@ -111,13 +109,15 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
             values = np.ascontiguousarray(raster.values)
     except InputError:
         raise
-    except (MemoryError, *_DECODING_ERRORS) as error:
+    except (MemoryError, ImportError, *_DECODING_ERRORS) as error:
         width, height = max(checked.sizes, key=math.prod, default=(0, 0))
         needed = len(data) + READING * width * height
         if is_exhausted(error) or not is_available(needed):
             raise memory_error(
                 f"{path}: {width} x {height} pixels", needed, "reduce the image"
             ) from error
+        if isinstance(error, ImportError):  # of a decoder that is not installed properly
+            raise
         raise InputError(
             f"{path}: the {kind} file is damaged, incomplete or of an unsupported kind: save it "
             "again as a plain PNG"

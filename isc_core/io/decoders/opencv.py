@@ -1,6 +1,5 @@
 """Images of 16 bits per channel and floats, decoded by OpenCV."""
 
-import cv2
 import numpy as np
 
 
@@ -17,10 +16,17 @@ def decode_opencv(data: bytes) -> np.ndarray:
 
     Raises
     ------
+    MemoryError
+        If memory is exhausted.
     ValueError
         If OpenCV cannot decode it.
     """
-    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    import cv2  # takes a tenth of a second, and most photos do without
+
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    except cv2.error as error:
+        raise (MemoryError if error.code == cv2.Error.StsNoMem else ValueError)(error.err) from None
     if pixels is None:
         raise ValueError("not decoded")
     if pixels.ndim == 2:

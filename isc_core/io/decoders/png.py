@@ -6,7 +6,6 @@ import struct
 import zlib
 from pathlib import Path
 
-import cv2
 import numpy as np
 from PIL import PngImagePlugin
 
@@ -100,6 +99,8 @@ def write_png(path: Path, raster: Raster) -> None:
             [planes, np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)[..., None]],
             axis=2,
         )
+    import cv2  # takes a tenth of a second, and is not needed to read
+
     done, data = cv2.imencode(".png", np.ascontiguousarray(planes))
     if not done:
         raise OSError(errno.EIO, "the PNG could not be encoded")
