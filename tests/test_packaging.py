@@ -126,6 +126,7 @@ def test_no_string_names_a_module_of_the_repository(staged: Path) -> None:
     assert not wrong, "\n".join(wrong)
 
 
+@pytest.mark.slow
 def test_what_only_the_repository_uses_stays_out(staged: Path, backend: ModuleType) -> None:
     for name in backend.LEFT_OUT:
         folder, _, rest = name.partition("/")
@@ -189,6 +190,7 @@ def metadata(wheel: Path) -> Message:
     )
 
 
+@pytest.mark.slow
 def test_metadata(wheel: Path) -> None:
     told = metadata(wheel)
     assert (told["Name"], told["Version"]) == ("isc3d", __version__)

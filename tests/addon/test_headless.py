@@ -207,6 +207,7 @@ def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
     assert said == [f"{result}: " + "; ".join(status_lines(OLD_STATUS))]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [

@@ -264,6 +264,7 @@ def set_image(settings: Any, values: np.ndarray) -> None:
     settings.image = picture("wall", values)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("prepare", "complaint"),
     [
@@ -322,6 +323,7 @@ def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatc
     assert "the worker is missing" in error_of(addon.ops.isc.decompose)
 
 
+@pytest.mark.slow
 def test_an_empty_box_is_refused(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image = photo()
@@ -342,6 +344,7 @@ def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
 # --- results --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path) -> None:
     scene = addon.context.scene
     scene.isc.own_scene = False

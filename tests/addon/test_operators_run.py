@@ -456,6 +456,7 @@ def test_unregistering_ends_the_run(blender: Any, folder: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
     """A Blender of its own that is left while a run goes on: neither process nor folder outlives
     it.

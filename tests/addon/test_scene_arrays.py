@@ -47,6 +47,7 @@ def test_all_arrays_are_read(bump_folder: Path) -> None:
     assert np.isnan(result.roughness) and result.specular_variation is None
 
 
+@pytest.mark.slow
 def test_a_photo_without_a_name_takes_the_folders(tmp_path: Path) -> None:
     folder = write_result(tmp_path / "my cup")
     (folder / "decomposition.json").write_text("{}", encoding="utf-8")

@@ -53,6 +53,7 @@ def apart(seen: np.ndarray, wanted: np.ndarray) -> float:
     return float(np.sqrt(np.square(seen - wanted).mean()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("axis", range(3))
 def test_light_keeps_its_direction(
     blender: Any, result: ResultArrays, tmp_path: Path, axis: int
@@ -64,6 +65,7 @@ def test_light_keeps_its_direction(
     assert apart(seen, shading_under(sky, result.normal[where].astype(float))) < 0.02
 
 
+@pytest.mark.slow
 def test_the_stored_rotation_rotates_the_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:

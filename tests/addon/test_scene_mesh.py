@@ -76,6 +76,7 @@ def manifold(mesh: Any) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_the_closed_body_is_closed(blender: Any, bump_folder: Path) -> None:
     result = read_result(bump_folder)
     opened = build(result).object.data
@@ -124,6 +125,7 @@ def test_the_front_of_the_closed_body_keeps_its_normals(blender: Any, bump_folde
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("faces", [525_000, 900])
 def test_the_displaced_grid_is_the_height_mesh(blender: Any, tmp_path: Path, faces: int) -> None:
     """Also where the mesh takes every n-th pixel only."""

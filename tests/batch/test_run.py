@@ -65,6 +65,7 @@ def test_good_images_are_made_and_the_bad_one_is_told(
     )
 
 
+@pytest.mark.slow
 def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
     told = rows(made / "summary.jsonl")
     assert [(row["name"], row["status"]) for row in told] == [
@@ -82,6 +83,7 @@ def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
         assert (made / "thumbnails" / f"{name}.jpg").read_bytes().startswith(b"\xff\xd8")
 
 
+@pytest.mark.slow
 def test_what_is_finished_is_skipped_and_what_changed_is_made_again(
     made: Path, photos: Path
 ) -> None:

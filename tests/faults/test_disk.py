@@ -106,6 +106,7 @@ def test_every_writing_step_may_fail(
     assert failures >= (1 if command.resumes and earlier else 2)
 
 
+@pytest.mark.slow
 @some_commands
 def test_files_that_may_not_grow(trial: Trials, command: Command) -> None:
     """As on a disk or under a quota that is exhausted within a file."""

@@ -73,6 +73,7 @@ def test_kill(trial: Trials, command: Command, seed: int) -> None:
     this.assert_complete(*this.run())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", COMMANDS if CAMPAIGN else [MASK], ids=lambda c: c.name)
 @pytest.mark.parametrize("earlier", [False, True], ids=["nothing there", "earlier output"])
 def test_two_runs_into_one_output_both_succeed(
@@ -145,6 +146,7 @@ def keep_changing(target: Path, contents: list[bytes], done: threading.Event) ->
         time.sleep(rng.random() * 0.004)
 
 
+@pytest.mark.slow
 @kinds
 def test_photo_that_keeps_changing(inputs: Path, tmp_path: Path, kind: str) -> None:
     """Each reading is refused, or gives the pixels of one version with its checksum."""

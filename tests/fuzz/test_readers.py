@@ -136,6 +136,7 @@ worker.serve()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "message"),
     [

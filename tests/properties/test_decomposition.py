@@ -155,6 +155,7 @@ def test_number_of_threads_does_not_matter(case: DecompositionCase) -> None:
     assert np.allclose(one.illumination, three.illumination, rtol=1e-9, atol=1e-12)
 
 
+@pytest.mark.slow
 @law(cases(ordinary()), seconds=0.7)
 def test_frame_around_the_object_does_not_matter(case: DecompositionCase) -> None:
     photo = case.made.photo()

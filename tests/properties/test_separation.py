@@ -123,6 +123,7 @@ def test_flips_and_turns_change_little(case: SeparationCase) -> None:
         at_most(TURN_BOUNDS[case.method], change, f"{name} {case.method}")
 
 
+@pytest.mark.slow
 @law(cases(ordinary()), seconds=0.12)
 def test_exposure_changes_little(case: SeparationCase) -> None:
     image, mask = case.made.light(), case.made.inside()
@@ -133,6 +134,7 @@ def test_exposure_changes_little(case: SeparationCase) -> None:
         at_most(SCALE_BOUND, change, f"x {factor:g} {case.method}")
 
 
+@pytest.mark.slow
 def test_network_gives_the_same_bytes_on_any_number_of_threads() -> None:
     """BLAS splits matrix products by threads, and rounds them differently."""
     pytest.importorskip("threadpoolctl")

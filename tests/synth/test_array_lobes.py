@@ -124,6 +124,7 @@ def test_the_white_furnace_has_no_noise(sphere: Seen) -> None:
     assert np.sqrt(result.shading_variance.max()) < 2e-3
 
 
+@pytest.mark.slow
 def test_a_diffuse_ball_under_an_environment_matches_the_closed_form(sphere: Seen) -> None:
     light = environment()
     result = lit(sphere, materials()["lambert"], light)

@@ -26,6 +26,7 @@ def test_the_photo_shows_highlights_and_is_exposed(truth: GroundTruth) -> None:
     assert 0.5 < np.quantile(truth.image[truth.mask], 0.995) <= 0.95
 
 
+@pytest.mark.slow
 def test_light_from_above_left_falls_there(truth: GroundTruth) -> None:
     """Lights and image share one frame: the window of the environment and the key light are on
     their sides.

@@ -148,6 +148,7 @@ def test_bad_files_are_refused_by_name(tmp_path: Path) -> None:
         assert name in str(caught.value) and "\n" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_measured_objects_are_seen_as_they_were_measured(shared: Path) -> None:
     for name in ("apple", "teabag2"):
         height = read_height(shared / "data/mit_berkeley_train/laboratory" / name / "Z.mat")

@@ -135,6 +135,7 @@ def test_a_point_light_falls_off_with_the_square_of_its_distance() -> None:
     np.testing.assert_allclose(found.shading[away], expected[away], atol=1e-4 * expected.max())
 
 
+@pytest.mark.slow
 def test_under_smooth_light_a_diffuse_ball_is_the_closed_form_without_noise() -> None:
     # Degree by degree the clamped cosine keeps pi, 2 pi / 3, pi / 4 of the light; the matt body
     # divides by pi.
@@ -150,6 +151,7 @@ def test_under_smooth_light_a_diffuse_ball_is_the_closed_form_without_noise() ->
     assert np.sqrt(found.shading_variance).max() < 1e-4 * expected.min()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MATERIALS)
 def test_a_panel_is_the_quadrature_of_the_models(name: str) -> None:
     material, body, gloss = MATERIALS[name]
@@ -269,6 +271,7 @@ def test_two_seeds_differ_by_their_noise_and_one_seed_does_not(name: str, light:
             assert 0.8 < z.std() < 1.15
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["blinn_phong", "roughplastic"])
 def test_light_between_parts_of_the_object_is_that_of_mitsubas_path_tracer(model: str) -> None:
     kernels_or_skip()

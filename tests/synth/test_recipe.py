@@ -113,6 +113,7 @@ def test_streams_of_a_member_and_of_a_scene_are_independent() -> None:
     assert np.array_equal(part.generator("shape").random(4), drawn[0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("perspective", [False, True])
 def test_the_object_fills_the_picture(perspective: bool) -> None:
     for shape in SHAPES:
@@ -197,6 +198,7 @@ def test_what_is_held_out_is_never_in_train(names: dict[str, dict[str, set[str]]
             ), (split, aspect)
 
 
+@pytest.mark.slow
 def test_train_and_test_show_every_family(names: dict[str, dict[str, set[str]]]) -> None:
     for split in SPLITS:
         for aspect, families in {

@@ -84,6 +84,7 @@ def test_normals_are_unit_and_those_of_the_faces(name: str) -> None:
         assert np.quantile(agreement, 0.03) > 0.95
 
 
+@pytest.mark.slow
 @every
 def test_objects_are_centred_and_two_units_large(name: str) -> None:
     for seed in SEEDS:

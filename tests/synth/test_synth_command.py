@@ -233,6 +233,7 @@ def test_the_command_in_the_readme_makes_the_same_scenes(tmp_path: Path) -> None
     assert ours.read_bytes() == theirs.read_bytes()
 
 
+@pytest.mark.slow
 def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     (tmp_path / "solid.obj").write_text(TETRAHEDRON)
@@ -262,6 +263,7 @@ def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture
     assert str(tmp_path) not in text and "derived from them" in text
 
 
+@pytest.mark.slow
 def test_a_textured_mesh_keeps_its_albedo(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     (tmp_path / "solid.obj").write_text("mtllib solid.mtl\nusemtl red\n" + TETRAHEDRON)

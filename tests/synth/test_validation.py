@@ -282,6 +282,7 @@ def test_truths_that_hand_an_error_over_have_no_share_of_it() -> None:
         budget(METRICS[0], [], 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("geometric", [False, True])
 def test_intervals_hold_the_mean_about_as_often_as_they_say(geometric: bool) -> None:
     rng = np.random.default_rng(11)

@@ -42,6 +42,7 @@ def scores(truth: GroundTruth) -> LobeScores:
     return score_lobe(truth, run_lobe(stage_inputs(truth, LOBE.needs), StageOptions(), Monitor()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "material",
     [Material(RED, "ggx", 0.2, 1.0), Material(RED, "blinn_phong", 50.0, 0.1)],

@@ -42,6 +42,7 @@ def test_an_object_is_reproducible(traced: TracedObject) -> None:
     assert str(again["shape"]) == traced.shape
 
 
+@pytest.mark.slow
 def test_the_arrays_of_an_object_are_consistent(traced: TracedObject) -> None:
     assert traced.mask.shape == (SIZE, SIZE) and traced.reached.shape == (LIGHTS, SIZE, SIZE)
     np.testing.assert_allclose(
@@ -90,6 +91,7 @@ def test_objects_are_read_by_name(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_excluded_shapes_are_left_out(tmp_path: Path, traced: TracedObject) -> None:
     np.savez_compressed(tmp_path / "000003.npz", **make_object(3))  # type: ignore[arg-type]
     assert [one.shape for one in relightable_objects([tmp_path], [])] == [traced.shape]

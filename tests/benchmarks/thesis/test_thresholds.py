@@ -126,6 +126,7 @@ def test_statistics_are_what_they_are_called() -> None:
     assert count_iterations("CS", np.array([50, 51, 305, 306])).tolist() == [0, 1, 1, 2]
 
 
+@pytest.mark.slow
 def test_another_seed_is_another_run(context: Context, tmp_path: Path) -> None:
     one, other = (
         threshold_runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5)

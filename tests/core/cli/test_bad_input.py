@@ -148,6 +148,7 @@ def test_a_photo_that_cannot_be_used(
     assert not list(tmp_path.glob(".*"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ["missing file", "truncated png", "NaN", "CMYK jpeg"])
 def test_the_same_in_a_process_of_its_own(tmp_path: Path, case: str) -> None:
     make, words = PHOTOS[case]
@@ -247,6 +248,7 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         subprocess.run(["umount", str(place)], capture_output=True, check=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "command",
     [("decompose", "--model", "naive"), ("separate", "--method", "none")],

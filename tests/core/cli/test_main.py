@@ -216,6 +216,7 @@ def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
     np.testing.assert_allclose(found.height[mask], (height - height[mask].min())[mask], atol=1e-4)
 
 
+@pytest.mark.slow
 def test_a_known_shape_goes_on_beyond_its_rim(tmp_path: Path) -> None:
     """Nothing outside the mask is read: on a slanted plane even the normals at the rim are the
     plane's.
@@ -606,6 +607,7 @@ def test_the_command_also_runs_outside_the_main_thread(tmp_path: Path) -> None:
     assert codes == [0]
 
 
+@pytest.mark.slow
 def test_a_reader_that_goes_away_is_no_error() -> None:
     pipe = f"{sys.executable} -m isc_core decompose --help | true; exit ${{PIPESTATUS[0]}}"
     done = subprocess.run(

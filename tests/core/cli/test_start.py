@@ -40,6 +40,7 @@ def test_the_help_imports_no_command(arguments: tuple[str, ...]) -> None:
     assert not modules & commands
 
 
+@pytest.mark.slow
 def test_a_command_imports_no_other_command() -> None:
     modules = loaded("mask", "--help")
     others = {entry.module for entry in CORE if entry.name != "mask"}
@@ -145,6 +146,7 @@ sys.meta_path.insert(0, Greedy())
 """
 
 
+@pytest.mark.slow
 def test_a_library_that_swallows_the_interrupt_does_not_keep_it(tmp_path: Path) -> None:
     """Some libraries catch everything that is raised while they import others."""
     command = isc_command(

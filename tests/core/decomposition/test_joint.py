@@ -90,6 +90,7 @@ def test_a_highlight_on_grey_paint_is_taken_off(
     assert answer.diagnostics.joint == JointOutcome.CONTINUED
 
 
+@pytest.mark.slow
 def test_the_layers_sum_up_and_are_not_negative(
     glossy: tuple[Decomposition, SceneEstimate],
 ) -> None:
@@ -109,6 +110,7 @@ def test_the_same_again(glossy: tuple[Decomposition, SceneEstimate]) -> None:
     np.testing.assert_array_equal(again.split.diffuse, answer.split.diffuse)
 
 
+@pytest.mark.slow
 def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
     d = grey_ball(0)
     found, start = joint(task_of(d)), mdr(task_of(d))

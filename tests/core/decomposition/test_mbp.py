@@ -102,6 +102,7 @@ def test_plain_sirfs_has_no_lobe() -> None:
     assert not found.specular.any()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
     d = glossy()
@@ -114,6 +115,7 @@ def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
     assert lobe_status(found) == LobeStatus.NO_HIGHLIGHTS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_where_nobody_looked_for_highlights_the_object_is_not_called_matt(model: str) -> None:
     d = glossy((52, 60), 23.0)

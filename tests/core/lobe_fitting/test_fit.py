@@ -238,6 +238,7 @@ def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
     assert fit.explained > 0.99
 
 
+@pytest.mark.slow
 def test_under_an_even_environment_alpha_is_undetermined() -> None:
     normal, mask = ball(48)
     mask &= (
@@ -503,6 +504,7 @@ def test_a_separators_level_is_found() -> None:
     assert unknown.alpha is None or abs(np.log(unknown.alpha / 0.15)) > off
 
 
+@pytest.mark.slow
 def test_a_near_light_is_told_from_a_far_one() -> None:
     _, mask = ball()
     row, column = np.indices(mask.shape)

@@ -73,6 +73,7 @@ def test_outliers_hardly_move_the_light() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_cone_holds_what_noise_in_blocks_does() -> None:
     """Errors that whole regions share move the direction by about what the cone says, not by the
     tiny error of single pixels.

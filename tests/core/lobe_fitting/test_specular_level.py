@@ -47,6 +47,7 @@ def lit(
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("strength", [0.3, 1.0, 4.0])
 def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
     gloss = fitted_specular(lit(0.2, strength))
@@ -59,6 +60,7 @@ def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
     assert gloss.variation is None
 
 
+@pytest.mark.slow
 def test_the_lamp_s_brightness_does_not_matter() -> None:
     dim, bright = (
         fitted_specular(lit(0.2, 0.6, lamp, env_map)).specular
@@ -116,6 +118,7 @@ def test_without_a_fit_nothing_is_said() -> None:
     assert (fitted_specular(ball()).roughness, fitted_specular(ball()).specular) == (None, None)
 
 
+@pytest.mark.slow
 def test_an_upper_bound_is_called_one() -> None:
     d = lit(0.2, 1.0)
     assert d.brdf is not None

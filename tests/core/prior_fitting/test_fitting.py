@@ -449,6 +449,7 @@ class TestFit:
         with pytest.raises(Cancelled):
             fit_priors(balls, environments, FAST, Monitor(cancelled=lambda: True))
 
+    @pytest.mark.slow
     def test_progress_never_goes_back(
         self, balls: dict[str, ObjectStatistics], environments: np.ndarray
     ) -> None:

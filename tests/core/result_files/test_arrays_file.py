@@ -63,6 +63,7 @@ def test_the_maps_are_those_of_the_result(arrays: Arrays) -> None:
     assert arrays["photo_size"].tolist() == [120, 96] and arrays["crop_scale"] == 1
 
 
+@pytest.mark.slow
 def test_the_mesh_is_that_of_the_glb(arrays: Arrays, folder: Path) -> None:
     (mesh,) = trimesh.load(folder / "mesh.glb", process=False).geometry.values()
     assert np.array_equal(arrays["faces"], mesh.faces)

@@ -69,6 +69,7 @@ def test_one_exposure_holds_for_input_diffuse_and_specular(
     assert shown["diffuse"][160, 160] == pytest.approx(gain * scene.diffuse[300, 320], abs=0.02)
 
 
+@pytest.mark.slow
 def test_reflectance_and_shading_have_their_own_exposure(shown: dict[str, np.ndarray]) -> None:
     for label in ("reflectance", "shading"):
         assert np.percentile(shown[label][inner()].max(-1), 99.5) == pytest.approx(0.95, abs=0.03)
@@ -97,6 +98,7 @@ def test_the_relief_is_lit_from_the_upper_left(shown: dict[str, np.ndarray]) -> 
     assert grey[95:115, 95:115].mean() > 3 * grey[205:225, 205:225].mean()
 
 
+@pytest.mark.slow
 def test_contour_lines_show_in_a_dome_and_not_in_a_plain(scene: Decomposition) -> None:
     flat = replace(
         scene,
@@ -119,6 +121,7 @@ def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:
     assert row[0] == pytest.approx(0.95, abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_object_fills_its_panel_wherever_it_is_in_the_frame() -> None:
     near_corner = panels(contact_sheet(ball((300, 500), 60, (62, 430))))["shading"]
     central = panels(contact_sheet(ball((200, 200), 60, (100, 100))))["shading"]

@@ -139,6 +139,7 @@ def test_it_is_read_back_bit_by_bit(saved: Path) -> None:
     assert back.identity_errors().broken() == ()
 
 
+@pytest.mark.slow
 def test_the_fitted_lobe_is_read_back_number_by_number(tmp_path: Path) -> None:
     d = fitted(ball((48, 60), 20.0, (22, 33)))
     assert d.brdf is not None
@@ -320,6 +321,7 @@ def test_a_cancelled_save_waits_for_its_preview(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of processes")
 @pytest.mark.parametrize("limit", [1_000, 150_000])
 def test_a_disk_that_takes_no_more_is_one_clear_line_and_leaves_nothing(

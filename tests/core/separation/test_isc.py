@@ -121,6 +121,7 @@ def test_highlights_on_strong_paint_are_found() -> None:
     assert not split.residual.any()
 
 
+@pytest.mark.slow
 def test_the_layers_are_the_layers_in_any_light() -> None:
     """Exactly: a power of two rounds nothing."""
     scene = sectors()
@@ -445,6 +446,7 @@ def test_options_that_make_no_sense(field: str, value: object, message: str) -> 
         isc.separate(scene.image, scene.mask, replace(IscOptions(), **{field: value}))  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 def test_options_do_what_they_say() -> None:
     scene = sectors()
     usual, lower, higher = (
@@ -538,6 +540,7 @@ def test_no_worse_than_doing_nothing_in_the_laboratory(
     assert error.mean() <= {"apple": 0.12, "teabag2": 0.9}.get(name, 1.001) * nothing.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["apple", "cups", "animals"])
 def test_the_least_confident_pixels_hold_the_error(answers: dict[str, Answer], name: str) -> None:
     answer = answers[name]

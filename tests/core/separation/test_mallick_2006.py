@@ -9,6 +9,7 @@ from tests.core.separation.scenes import assert_layers_hold
 from tests.core.separation.scenes import conical_plate as plate
 
 
+@pytest.mark.slow
 def test_highlights_of_large_photos_go_as_well() -> None:
     """720 pixels wide, highlights of 24 pixels' radius: more than the steps reach, but not on
     averages over 2 x 2 pixels.

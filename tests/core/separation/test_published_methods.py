@@ -88,6 +88,7 @@ def test_published_figures(
         assert got == pytest.approx(figure, abs=tolerance), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", IMPROVED)
 def test_improved_variant_exceeds_the_published_figure(shared: Path, method: str) -> None:
     for name, least in zip(("animals", "cups"), IMPROVED[method], strict=True):

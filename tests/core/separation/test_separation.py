@@ -152,6 +152,7 @@ def test_every_method_has_the_same_face(method: str) -> None:
         )
 
 
+@pytest.mark.slow
 def test_a_start_does_not_wait_for_the_methods() -> None:
     code = (
         "import sys; from isc_core.cli.main import main; main(['separate', '--help']); "
@@ -241,6 +242,7 @@ def test_the_command_chooses_variants_and_options(
 RANDOM = {"akashi_2016"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "method", sorted({method for method in METHODS if "sihr" in variants(method)} - RANDOM)
 )

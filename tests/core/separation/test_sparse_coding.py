@@ -135,6 +135,7 @@ def test_layers_hold(variant: str) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_scale_surroundings_and_transposition_do_not_matter(variant: str) -> None:
     image, _, mask = glossy_scene()

@@ -1,6 +1,7 @@
 """Tan & Ikeuchi 2005: what its sweeps move, and what they leave alone."""
 
 import numpy as np
+import pytest
 
 from isc_core.separation.published import tan_2005
 from isc_core.separation.published.tan_2005 import VARIANTS, Tan2005Options
@@ -17,6 +18,7 @@ def test_diffuse_surface_is_left_alone() -> None:
         assert tan_2005.separate(plain, mask, variant).specular.max() < 1e-6
 
 
+@pytest.mark.slow
 def test_no_pixel_passes_the_limit_of_its_colour() -> None:
     image, _, mask = glossy_disc()
     image = image * np.random.default_rng(2).uniform(0.8, 1.25, image.shape)

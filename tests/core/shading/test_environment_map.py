@@ -42,6 +42,7 @@ def test_a_constant_light_is_a_uniform_sky() -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_sky_gives_the_recovered_shading(seed: int) -> None:
     """Lights of the strength that decompositions find.

@@ -111,6 +111,7 @@ def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads() -> None:
     assert len(set(results)) == 1
 
 
+@pytest.mark.slow
 def test_a_whole_solve_is_the_same_bytes_on_any_threads() -> None:
     problem = make_problem(blob((90, 84)))
     short = LbfgsOptions(iterations=25)

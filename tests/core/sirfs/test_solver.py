@@ -146,6 +146,7 @@ def test_shape_from_shading_finds_a_hemisphere() -> None:
     )
 
 
+@pytest.mark.slow
 def test_depth_with_holes_pulls_the_height() -> None:
     """What was seen is another shape than shading tells, 37 px nearer."""
     scene = blob()
@@ -261,6 +262,7 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"
 
 
+@pytest.mark.slow
 def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
     """A light far from any likely one is a bad start; which of the starts stands first does not
     matter.
@@ -279,6 +281,7 @@ def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
     assert lowest(good, good).evaluations == alone.evaluations, "the same start is not tried twice"
 
 
+@pytest.mark.slow
 def test_the_start_that_goes_on_ends_where_it_would_have_ended_alone() -> None:
     """However far it had got when it was chosen: in the middle of its way, or at its end."""
     problem = make_problem(hemisphere())

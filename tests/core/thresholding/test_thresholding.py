@@ -132,6 +132,7 @@ def test_clonal_selection_finds_the_optimum(optimiser: str) -> None:
             assert values == pytest.approx([best] * 4, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_swarm_finds_easy_optima_and_comes_close_to_others() -> None:
     easy, hard = (OtsuObjective.of(levels(name)) for name in ("coins", "brick"))
     assert all(
@@ -145,6 +146,7 @@ def test_swarm_finds_easy_optima_and_comes_close_to_others() -> None:
     )
 
 
+@pytest.mark.slow
 def test_swarm_with_falling_inertia_gathers_later() -> None:
     objective = OtsuObjective.of(levels("coins"))
     best = exact(objective, 3).value

@@ -117,6 +117,7 @@ def test_exposure_turns_and_mirrors_change_nothing(table):
     )
 
 
+@pytest.mark.slow
 def test_the_fitted_prior_knows_highlights_it_has_not_seen(table):
     yes, no = [], []
     for seed in range(100, 106):

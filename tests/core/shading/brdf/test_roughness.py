@@ -47,6 +47,7 @@ def test_the_errors_are_those_written_down(
     ) == pytest.approx(fitted, abs=tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("alpha", [0.02, 0.1, 0.2, 0.3, 0.4, 0.5])
 def test_the_fitted_exponent_is_next_to_the_best(alpha: float) -> None:
     best = float(roughness.fitted_exponent(alpha))
