@@ -146,6 +146,7 @@ def test_a_folder_becomes_one_file_with_several_scenes_or_several_files(
     ]
 
 
+@pytest.mark.slow
 def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree(
     tmp_path: Path,
 ) -> None:

@@ -45,6 +45,7 @@ def census(bpy: Any) -> dict[str, list[str]]:
     return {kind: sorted(block.name for block in getattr(bpy.data, kind)) for kind in KINDS}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options",
     [

@@ -43,6 +43,7 @@ def as_list(folder: Path) -> Path:
     return folder / "list.jsonl"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("given", ["folder", "pattern", "manifest", "file URLs"])
 def test_what_cannot_be_read_fails_alone(mixed: Path, tmp_path: Path, given: str) -> None:
     inputs: dict[str, tuple[object, ...]] = {

@@ -361,6 +361,7 @@ def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -
     refused(read_bounds, "bounds.json", huge_number(bounds, b"limit"), "must be a number")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "given",
     [

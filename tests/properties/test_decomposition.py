@@ -119,6 +119,7 @@ def assert_sound(d: Decomposition) -> None:
     between(0, 1, confidence=d.confidence)
 
 
+@pytest.mark.slow
 @law(cases(photos(7, 32, masks=(*USUAL_MASKS, *USUAL_MASKS, "row"))), seconds=0.4)
 def test_maps_and_mesh_are_sound(case: DecompositionCase) -> None:
     listener = Listener()

@@ -112,6 +112,7 @@ def test_frame_around_the_object_does_not_matter(case: SeparationCase) -> None:
     at_most(1e-5, np.abs(inner - plain.diffuse).max() / peak, f"padding {case.method}")
 
 
+@pytest.mark.slow
 @law(cases(ordinary()), seconds=0.1)
 def test_flips_and_turns_change_little(case: SeparationCase) -> None:
     image, mask = case.made.light(), case.made.inside()

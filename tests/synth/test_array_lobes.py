@@ -134,6 +134,7 @@ def test_a_diffuse_ball_under_an_environment_matches_the_closed_form(sphere: See
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["oren_nayar", "blinn_phong", "ggx"])
 def test_lobes_under_an_environment_match_quadrature(sphere: Seen, name: str) -> None:
     light, rows = environment(), 128

@@ -76,6 +76,7 @@ def test_the_same_seed_gives_the_same_lights_and_another_one_others(name: str) -
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INVENTED)
 def test_every_draw_lights_what_the_viewer_sees(name: str) -> None:
     for lights in draws(name):
@@ -84,6 +85,7 @@ def test_every_draw_lights_what_the_viewer_sees(name: str) -> None:
         assert 0.3 < shading.max() < 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", INVENTED)
 def test_invented_lights_are_nearly_white_yet_not_all_alike(name: str) -> None:
     shading = np.array([ball(lights).mean(0) for lights in draws(name)])

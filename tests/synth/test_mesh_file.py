@@ -101,6 +101,7 @@ def test_a_texture_comes_through_linear_and_the_right_way_up(tmp_path: Path) -> 
     )
 
 
+@pytest.mark.slow
 def test_colours_of_vertices_are_projected_from_the_front(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(4)
     shade = np.clip((ball.vertices + 1) * 127.5, 0, 255).astype(np.uint8)

@@ -252,6 +252,7 @@ def accept(difference: np.ndarray, variance: np.ndarray, samples: int, tolerance
     assert bias <= 4.5 * noise + tolerance / 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("light", [PANEL, sky()], ids=["panel", "sky"])
 @pytest.mark.parametrize("name", ["ggx .05", "oren_nayar"])
 def test_two_seeds_differ_by_their_noise_and_one_seed_does_not(name: str, light: Light) -> None:

@@ -65,6 +65,7 @@ def names(pools: Pools) -> dict[str, dict[str, set[str]]]:
     return found
 
 
+@pytest.mark.slow
 def test_a_member_is_the_same_in_every_scene() -> None:
     one = build(RECIPE)
     other = build(

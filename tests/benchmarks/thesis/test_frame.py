@@ -169,6 +169,7 @@ def test_a_failing_item_does_not_stop_the_others_and_is_named(tmp_path: Path) ->
         make_items([item("9.2", fails)], Context(tmp_path))
 
 
+@pytest.mark.slow
 def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) -> None:
     made: list[str] = []
     stop = {"after": 2}
@@ -307,6 +308,7 @@ def test_missing_libraries_are_named_with_the_remedy(
     assert "needs matplotlib: install with `pip install 'matplotlib>=" in refused("list")
 
 
+@pytest.mark.slow
 def test_the_other_commands_need_no_matplotlib() -> None:
     done = run_isc(
         "separate",

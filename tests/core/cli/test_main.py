@@ -66,6 +66,7 @@ def test_every_command_explains_itself_with_an_example(
     assert all(len(line) <= 140 for line in text.splitlines())
 
 
+@pytest.mark.slow
 def test_the_examples_in_the_help_are_commands(capsys: pytest.CaptureFixture[str]) -> None:
     """An example whose options no longer exist would not parse."""
     found = []
@@ -178,6 +179,7 @@ def test_the_same_command_gives_the_same_bytes_on_any_number_of_threads(
     ).read_bytes()
 
 
+@pytest.mark.slow
 def test_an_earlier_result_is_replaced(tmp_path: Path) -> None:
     photo = ball_photo(tmp_path)
     for model in ("naive", "retinex"):
@@ -200,6 +202,7 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
 # --- known inputs ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
     photo = ball_photo(tmp_path)
     mask = read_photo(photo).mask
@@ -700,6 +703,7 @@ def test_a_file_gets_a_line_for_each_stage(tmp_path: Path) -> None:
 # --- compiled kernels -----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
     """Numba refuses functions that it cannot cache; here it is forbidden every folder but one that
     is named, and none is.

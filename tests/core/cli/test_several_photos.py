@@ -26,6 +26,7 @@ def two_photos(folder: Path) -> tuple[Path, Path]:
     return ball_photo(folder), write_image(folder / "other ball.png", ball_codes(24.0))
 
 
+@pytest.mark.slow
 def test_several_photos_get_a_folder_each(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

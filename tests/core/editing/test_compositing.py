@@ -126,6 +126,7 @@ def coded(full: Decomposition, kind: type, transfer: str) -> tuple[np.ndarray, n
     return values, alpha.astype(kind)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "transfer"), [(np.uint8, "srgb"), (np.uint16, "srgb"), (np.uint16, "linear")]
 )

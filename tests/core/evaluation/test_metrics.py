@@ -184,6 +184,7 @@ def test_angular_error_of_a_rotation(angle: float) -> None:
     assert angular_error(a, b) == pytest.approx(angle, abs=1e-7)
 
 
+@pytest.mark.slow
 @given(st.floats(1e-3, 1e3))
 def test_scale_is_free(scale: float) -> None:
     rng = np.random.default_rng(4)

@@ -111,6 +111,7 @@ def test_a_blinn_phong_lobe_is_found_exactly(exponent: float) -> None:
     assert angle(fit.direction, KEY) < 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [2, 3])
 def test_several_lights_are_counted(count: int) -> None:
     towards = np.array([KEY, [0.6, 0.0, 0.8], [-0.1, -0.7, np.sqrt(0.5)]])[:count]

@@ -31,6 +31,7 @@ def degrees(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.rad2deg(np.arccos(np.clip(a @ b, -1, 1))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("direction", LIGHTS)
 def test_a_lambert_ball_tells_its_light(direction: tuple[float, float, float]) -> None:
     true = DirectionalLight(

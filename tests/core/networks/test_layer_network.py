@@ -107,6 +107,7 @@ def test_a_highlight_on_grey_paint_is_found_where_colour_tells_nothing():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [60, 160, 420])
 def test_matt_balls_keep_their_light(side):
     image, _, mask = ball(side, (0.6, 0.5, 0.3), gloss=0)

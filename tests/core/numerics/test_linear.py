@@ -26,6 +26,7 @@ def test_a_zero_in_the_way_is_walked_around_and_a_singular_matrix_refused() -> N
         solve_linear(np.ones((3, 3)), np.eye(3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["natural", "laboratory"])
 def test_the_precision_of_light_is_its_covariance_s_inverse_on_any_number_of_threads(
     kind: str,

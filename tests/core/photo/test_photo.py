@@ -591,6 +591,7 @@ def test_nothing_is_enlarged() -> None:
         photo.resized_to_object(-1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("max_size", [512, 300, 199, 77, 33])
 def test_the_box_obeys_max_size_at_one_scale(max_size: int) -> None:
     mask = object_mask(401, 733)

@@ -150,6 +150,7 @@ def test_odd_shapes_can_be_shown(shape: tuple[int, int]) -> None:
     assert contact_sheet(odd).size == contact_sheet(d).size
 
 
+@pytest.mark.slow
 def test_a_black_result_and_a_long_name_can_be_shown() -> None:
     d = ball()
     named = replace(

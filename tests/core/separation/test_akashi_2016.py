@@ -51,6 +51,7 @@ def test_sihr_from_a_sample(shared: Path, name: str, least: float) -> None:
     assert psnr(separate(image, mask, replace(VARIANTS["sihr"], sample=1024)), truth) >= least
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["box", "frog1"])
 def test_near_grey_objects_are_left_alone(shared: Path, name: str) -> None:
     image, _, mask = (array[::2, ::2] for array in laboratory_photo(shared, name))
@@ -81,6 +82,7 @@ def test_descent_reaches_the_minimum() -> None:
     assert np.abs(slope[codes > 0]).max() < 0.5 and slope[codes == 0].min() > -0.5
 
 
+@pytest.mark.slow
 def test_updates_never_raise_the_objective() -> None:
     image, _, mask = glossy_scene()
     pixels = 255 * image[mask].T

@@ -134,6 +134,7 @@ def test_the_layers_are_the_layers_in_any_light() -> None:
     assert np.abs(3 * third.diffuse - split.diffuse).max() < 1e-3
 
 
+@pytest.mark.slow
 def test_what_is_around_does_not_matter() -> None:
     scene = sectors()
     split = separate("isc", scene.image, scene.mask)

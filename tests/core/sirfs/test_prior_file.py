@@ -178,6 +178,7 @@ def test_unknown_kinds_of_photo(prior_set: PriorSet) -> None:
 
 
 class TestShipped:
+    @pytest.mark.slow
     def test_expands_for_every_kind_of_photo(self) -> None:
         shipped = shipped_prior_set()
         for illumination in ("natural", "laboratory"):

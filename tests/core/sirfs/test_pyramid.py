@@ -64,6 +64,7 @@ def test_levels_halve_and_stop_at_the_smallest() -> None:
     assert level_shapes((1, 90)) == [(1, 90)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 1e-5)])
 def test_compiled_steps_equal_numpy(
