@@ -180,8 +180,9 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
                 for m in members
             ):
                 raise ValueError("not an archive of arrays")
-            needed += 2 * sum(member.file_size for member in members)
-            limits.check_unpacked(name, needed // 2, len(data))
+            size = sum(member.file_size for member in members)
+            limits.check_unpacked(name, size, len(data))
+            needed += 2 * size  # the member's bytes, and the array
             unpacked = {
                 member.filename.removesuffix(".npy"): archive.read(member) for member in members
             }

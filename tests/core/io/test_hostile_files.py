@@ -5,6 +5,7 @@ import struct
 import subprocess
 import sys
 import time
+import zipfile
 import zlib
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from PIL import Image
 
 from isc_core.errors import InputError
 from isc_core.io.decoders import read_raster
+from isc_core.io.limits import Limits
 from isc_core.io.memory import enough_memory, is_exhausted
 from isc_core.io.npy import read_arrays
 from tests.core.command_line import ROOT
@@ -163,6 +165,16 @@ def test_an_array_that_does_not_fit_is_no_damage(
     monkeypatch.setattr("zipfile.ZipFile.read", fail)
     with pytest.raises(InputError, match=r"its arrays need about 24.0 MB of memory"):
         read_arrays(path)
+
+
+def test_an_archive_may_unpack_to_the_limit(tmp_path: Path) -> None:
+    path = tmp_path / "arrays.npz"
+    np.savez(path, a=np.zeros(1_000_000))
+    with zipfile.ZipFile(path) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    assert read_arrays(path, Limits(max_bytes=size, max_ratio=0))["a"].size == 1_000_000
+    with pytest.raises(InputError, match="unpacks to"):
+        read_arrays(path, Limits(max_bytes=size - 1, max_ratio=0))
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
