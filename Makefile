@@ -33,7 +33,7 @@ test-slow: .venv/.ready-dev
 	$(PYTEST) -m slow
 
 test-all: test
-	$(PYTEST) -m slow
+	@$(MAKE) --no-print-directory test-slow
 
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .

@@ -16,6 +16,7 @@ from pathlib import Path, PurePath
 from .. import __version__
 from ..decomposition.pipeline import decompose
 from ..errors import Cancelled, InputError
+from ..io.memory import memory_message
 from ..photo import read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
@@ -75,12 +76,8 @@ def _run(job: ImageJob, work: Work) -> tuple[str, str]:
     except InputError as error:
         return FAILED, str(error)
     except MemoryError as error:
-        amount = f" ({error})" if str(error) else ""
-        return (
-            FAILED,
-            f"not enough memory{amount}: use a smaller image, a smaller --max-size or fewer "
-            "workers",
-        )
+        remedy = "use a smaller image, a smaller --max-size or fewer workers"
+        return FAILED, memory_message(error, remedy)
     except OSError as error:
         return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
 

@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from ..errors import Cancelled, InputError, Rejected
+from ..io.memory import memory_message
 from .interface.interrupts import Interrupts
 from .interface.json_progress import JsonReporter
 from .interface.terminal import TerminalReporter, Verbosity, discard_output
@@ -64,12 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         discard_output()
         return BROKEN_PIPE
     except MemoryError as error:
-        # NumPy says how much: "Unable to allocate 7.45 GiB for an array with shape ...".
-        amount = f" ({error})" if str(error) else ""
-        return _report_failure(
-            reporter,
-            f"not enough memory{amount}: use a smaller image or a smaller --max-size",
-        )
+        remedy = "use a smaller image or a smaller --max-size"
+        return _report_failure(reporter, memory_message(error, remedy))
     except OSError as error:
         location = f"{error.filename}: " if error.filename else ""
         return _report_failure(reporter, f"{location}{error.strerror or error}")

@@ -76,6 +76,24 @@ def memory_error(work: str, needed: int, remedy: str) -> InputError:
     return InputError(f"{work} need about {amount} of memory, more than is available: {remedy}")
 
 
+def memory_message(error: MemoryError, remedy: str) -> str:
+    """Return the message for work whose need is not known beforehand.
+
+    Parameters
+    ----------
+    error : MemoryError
+        NumPy's says how much: "Unable to allocate 7.45 GiB for an array with shape ...".
+    remedy : str
+        Ends the message.
+
+    Returns
+    -------
+    str
+    """
+    amount = f" ({error})" if str(error) else ""
+    return f"not enough memory{amount}: {remedy}"
+
+
 @contextmanager
 def enough_memory(work: str, needed: int, remedy: str) -> Iterator[None]:
     """Turn a `MemoryError` of the block into an error that says how much is needed.
