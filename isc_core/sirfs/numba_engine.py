@@ -10,13 +10,15 @@ from typing import Any
 
 import numpy as np
 
+from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..shading.irradiance_basis import C1, C2, C3, C4, C5
 from ..shading.surface_stencils import fold_border
-from . import kernels, reflectance, surface
+from . import kernels, reflectance, shading_kernels, surface
 from .illumination import light_cost
 from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
+from .shading_term import ExpectedShading, best_offset
 
 _ROWS_A_BLOCK = 16
 _MOST_BLOCKS = 16
@@ -63,6 +65,63 @@ def _spans(valid: np.ndarray) -> np.ndarray:
     spans[rows, 0] = valid[rows].argmax(axis=1)
     spans[rows, 1] = valid.shape[1] - valid[rows, ::-1].argmax(axis=1)
     return spans
+
+
+class _ShadingTerm:
+    """The term of the expected shading, and its gradient joined with that of the palette.
+
+    Parameters
+    ----------
+    problem : Problem
+    expected : ExpectedShading
+    dtype : dtype
+    """
+
+    def __init__(self, problem: Problem, expected: ExpectedShading, dtype: np.dtype[Any]) -> None:
+        valid, weights = problem.valid, problem.weights
+        strength = expected.strength(valid, weights.predicted_shading)
+        self._exact, self._strength = strength, strength.astype(dtype)
+        self._mean = np.ascontiguousarray(expected.mean.transpose(0, 2, 1), dtype)
+        self._spans = _spans(valid)
+        channels = expected.mean.shape[2]
+        whiten = np.eye(channels) if problem.shading_only else problem.priors.parsimony_whiten
+        # reflectance is image less shading, hence the sign
+        self._back = np.ascontiguousarray(-solve_linear(whiten, np.eye(channels)).T, dtype)
+        self._residual, self.joined = np.zeros((2, *self._mean.shape), dtype)
+        self._sums = np.zeros(len(valid))
+
+    def residuals(self, geometry: np.ndarray, light: np.ndarray, first: int, last: int) -> None:
+        shading_kernels.residual_rows(
+            first,
+            last,
+            geometry,
+            self._spans,
+            light,
+            self._mean,
+            self._strength,
+            self._residual,
+            self._sums,
+        )
+
+    def offset(self) -> float:
+        return best_offset(float(self._sums.sum()), self._exact, self._mean.shape[1])
+
+    def pulls(self, offset: float, palette: np.ndarray, first: int, last: int) -> None:
+        shading_kernels.pull_rows(
+            first,
+            last,
+            self._spans,
+            self._residual,
+            offset,
+            self._strength,
+            self._back,
+            palette,
+            self.joined,
+            self._sums,
+        )
+
+    def cost(self) -> float:
+        return float(self._sums.sum())
 
 
 class NumbaEngine:
@@ -152,6 +211,8 @@ class NumbaEngine:
                 np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
             )
         self._palette_terms: dict[str, float] = {}
+        expected = self.problem.expected_shading
+        self._shading = None if expected is None else _ShadingTerm(self.problem, expected, t)
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
         """Compute the objective and its gradients.
@@ -183,8 +244,9 @@ class NumbaEngine:
         self._add_spills()
         if p.silhouette is not None:
             self._each_block(self._silhouette_rows)
+        pulls = self._pulls if self._shading is None else self._with_shading(self._shading, folded)
         contour = self._contour_term()
-        self._each_block(partial(self._backward, folded))
+        self._each_block(partial(self._backward, folded, pulls))
         self._workers.run(
             [
                 partial(kernels.adjoint_rows, a, b, self._backward_out.derivatives, self._wide)
@@ -197,6 +259,8 @@ class NumbaEngine:
         terms = self._palette_terms | {"contour": contour, "light": cost} | self._pair_terms()
         if p.silhouette is not None:
             terms["silhouette"] = float(self._silhouette_cost.sum())
+        if self._shading is not None:
+            terms["predicted_shading"] = self._shading.cost()
         if p.observation is not None:
             terms["observation"], pull_height = surface.observation_cost(height, p.observation)
             gradient += pull_height.astype(self.dtype)
@@ -319,6 +383,12 @@ class NumbaEngine:
         self._palette_terms = {"parsimony": parsimony, "absolute": absolute}
         self._pulls.palette[:] = (gradient @ np.linalg.inv(self._whiten.palette)).transpose(0, 2, 1)
 
+    def _with_shading(self, term: _ShadingTerm, light: np.ndarray) -> kernels.Pulls:
+        """The pulls with that of the expected shading, for the folded `light`."""
+        self._each_block(partial(term.residuals, self._surface.geometry, light))
+        self._each_block(partial(term.pulls, term.offset(), self._pulls.palette))
+        return self._pulls._replace(palette=term.joined)
+
     def _contour_term(self) -> float:
         p, w = self.problem, self.problem.weights
         at = (p.contour.rows, p.contour.columns)
@@ -358,7 +428,7 @@ class NumbaEngine:
             )
         return terms
 
-    def _backward(self, light: np.ndarray, first: int, last: int) -> None:
+    def _backward(self, light: np.ndarray, pulls: kernels.Pulls, first: int, last: int) -> None:
         kernels.backward_rows(
             first,
             last,
@@ -366,7 +436,7 @@ class NumbaEngine:
             self._photo.spans,
             light,
             self._whiten,
-            self._pulls,
+            pulls,
             self._scales(),
             self._in_plane,
             self._backward_out,

@@ -8,6 +8,7 @@ from ..shading.irradiance_basis import basis, basis_adjoint
 from . import reflectance, surface
 from .illumination import light_cost
 from .problem import Evaluation, Problem, Terms
+from .shading_term import shading_cost
 from .silhouette import silhouette_cost
 
 
@@ -44,13 +45,17 @@ class NumpyEngine:
         p = self.problem
         g = surface.geometry(np.asarray(height, float), self.dtype)
         functions = basis(g.n1, g.n2, g.n3)
-        log_reflectance = self._log_image - np.einsum(
-            "khw,kc->hwc", functions, light.astype(self.dtype)
-        )
+        log_shading = np.einsum("khw,kc->hwc", functions, light.astype(self.dtype))
+        log_reflectance = self._log_image - log_shading
         log_reflectance[~p.valid] = 0
         reflectance_terms, d_reflectance = self._reflectance(log_reflectance)
         d_reflectance[~p.valid] = 0
         d_shading = -d_reflectance
+        if p.expected_shading is not None:
+            reflectance_terms["predicted_shading"], pull_shading = shading_cost(
+                log_shading, p.expected_shading, p.valid, p.weights.predicted_shading
+            )
+            d_shading = d_shading + pull_shading
         light_gradient = np.einsum("khw,hwc->kc", functions, d_shading, dtype=float)
         d1, d2, d3 = basis_adjoint(
             g.n1, g.n2, g.n3, np.einsum("hwc,kc->khw", d_shading, light.astype(self.dtype))

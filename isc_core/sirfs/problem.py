@@ -8,6 +8,7 @@ from ..scene.known_inputs import DepthObservation
 from ..shading.occluding_contour import Contour
 from .priors.priors import Priors
 from .settings import Weights
+from .shading_term import ExpectedShading
 from .silhouette import ExpectedNormals
 
 # Half of the offsets (down, right) in a 5 x 5 window: every unordered pair once.
@@ -52,6 +53,8 @@ class Problem:
     pixel_weight : (H, W) ndarray or None
         Weight of a valid pixel in the reflectance terms, in [0, 1] and not 0 everywhere; a pair
         counts with the product. None: 1.
+    expected_shading : ExpectedShading or None
+        Expected log shading, from a prediction.
     """
 
     log_image: np.ndarray
@@ -64,6 +67,7 @@ class Problem:
     shading_only: bool = False
     silhouette: ExpectedNormals | None = None
     pixel_weight: np.ndarray | None = None
+    expected_shading: ExpectedShading | None = None
 
     @property
     def reflectance_weight(self) -> np.ndarray:
@@ -85,6 +89,7 @@ class Terms:
     silhouette: float = 0.0
     observation: float = 0.0
     shading_only: float = 0.0
+    predicted_shading: float = 0.0
 
     @property
     def total(self) -> float:

@@ -54,6 +54,8 @@ class Weights:
         Normals are near the expected ones (ours; not in the published sets).
     shading_only : float
         In shape-from-shading mode, the reflectance is one colour.
+    predicted_shading : float
+        The shading is near the predicted one (ours).
     starts : tuple of Start
         At least one; each is tried, and the one with the lowest loss goes on.
     """
@@ -69,6 +71,7 @@ class Weights:
     contour_power: float = 0.75
     silhouette: float = 0.0
     shading_only: float = 50.0
+    predicted_shading: float = 0.0
     starts: tuple[Start, ...] = (Start(),)
 
 

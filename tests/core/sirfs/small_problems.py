@@ -15,6 +15,7 @@ from isc_core.sirfs.priors.priors import AbsoluteTable, LightPrior, Priors, Silh
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
+from isc_core.sirfs.shading_term import ExpectedShading
 from isc_core.sirfs.silhouette import normals_from_silhouette
 
 NODES = 30
@@ -148,6 +149,7 @@ def only(term: str) -> Weights:
         "light",
         "silhouette",
         "shading_only",
+        "predicted_shading",
     )
     none = dict.fromkeys(names, 0.0)
     return weights(**(none | {term: 3.0} if term in none else none))
@@ -191,6 +193,13 @@ def some_pixel_weight(shape: tuple[int, ...]) -> np.ndarray:
     """How far pixels of a photo may be weighted: between 0 and 1, not at all in places."""
     weight = np.random.default_rng(12).uniform(-0.3, 1, shape)
     return np.maximum(weight, 0)
+
+
+def some_shading(valid: np.ndarray, channels: int) -> ExpectedShading:
+    """A random expected log shading; in places, nothing is expected."""
+    rng = np.random.default_rng(13)
+    mean = ndimage.gaussian_filter(rng.normal(size=(*valid.shape, channels)), (4, 4, 0))
+    return ExpectedShading(3 * mean, np.maximum(rng.uniform(-3, 25, valid.shape), 0))
 
 
 def random_state(

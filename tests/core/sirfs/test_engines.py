@@ -12,7 +12,14 @@ from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .small_problems import blob, make_problem, random_state, some_pixel_weight, weights
+from .small_problems import (
+    blob,
+    make_problem,
+    random_state,
+    some_pixel_weight,
+    some_shading,
+    weights,
+)
 
 numba_engine = pytest.importorskip(
     "isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError
@@ -25,6 +32,9 @@ KINDS = {
     "grey": (1, False),
     "shading only": (3, True),
     "grey shading only": (1, True),
+    "weighted, expected shading": (3, False),
+    "grey, expected shading": (1, False),
+    "shading only, expected shading": (3, True),
 }
 
 
@@ -36,14 +46,16 @@ def problem_of(kind: str) -> Problem:
     )
     problem = make_problem(
         scene,
-        weights(silhouette=2.0),
+        weights(silhouette=2.0, predicted_shading=0.7),
         shading_only=shading_only,
         observation=seen,
         holes=True,
         outline=True,
     )
     return replace(
-        problem, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None
+        problem,
+        pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None,
+        expected_shading=some_shading(problem.valid, channels) if "expected" in kind else None,
     )
 
 
@@ -94,8 +106,9 @@ def test_same_numbers_in_float32_but_for_jumps_between_table_cells(kind: str) ->
         assert np.linalg.norm(without_jumps) < 1e-5 * np.linalg.norm(want.height_gradient)
 
 
-def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads() -> None:
-    problem = problem_of("colour")
+@pytest.mark.parametrize("kind", ["colour", "weighted, expected shading"])
+def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads(kind: str) -> None:
+    problem = problem_of(kind)
     height, light = states(problem, np.float32)[5]
     results = []
     for threads in (1, 2, 3, 5):

@@ -8,12 +8,23 @@ import pytest
 from scipy import ndimage
 
 from isc_core.scene.known_inputs import DepthObservation
+from isc_core.shading.irradiance_basis import basis
+from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import Problem, Terms
+from isc_core.sirfs.shading_term import ExpectedShading
 from isc_core.sirfs.solver import Engine
 
-from .small_problems import blob, make_problem, only, random_state, some_pixel_weight, weights
+from .small_problems import (
+    blob,
+    make_problem,
+    only,
+    random_state,
+    some_pixel_weight,
+    some_shading,
+    weights,
+)
 
 TERMS = (
     "smoothness",
@@ -26,9 +37,10 @@ TERMS = (
     "silhouette",
     "observation",
     "shading_only",
+    "predicted_shading",
 )
 OF_HEIGHT = set(TERMS) - {"light"}
-OF_LIGHT = {"smoothness", "parsimony", "absolute", "light", "shading_only"}
+OF_LIGHT = {"smoothness", "parsimony", "absolute", "light", "shading_only", "predicted_shading"}
 STEP = 1e-7
 
 numba_only = pytest.mark.skipif(find_spec("numba") is None, reason="needs numba")
@@ -63,7 +75,7 @@ def problem_of(term: str, channels: int) -> Problem:
         seen = DepthObservation(heights, sigma=1.5, weight=4.0)
     problem = make_problem(
         scene,
-        weights(silhouette=2.0) if everything else only(term),
+        weights(silhouette=2.0, predicted_shading=0.7) if everything else only(term),
         observation=seen,
         shading_only=term == "shading_only",
         holes=True,
@@ -77,6 +89,9 @@ def problem_of(term: str, channels: int) -> Problem:
         problem,
         priors=priors,
         pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in term else None,
+        expected_shading=some_shading(problem.valid, channels)
+        if everything or term == "predicted_shading"
+        else None,
     )
 
 
@@ -159,3 +174,36 @@ def test_what_trust_means(engine: str, shading_only: bool) -> None:
     for name in ("smoothness", "parsimony", "absolute", "shading_only"):
         assert getattr(less, name) == pytest.approx(getattr(without, name), rel=1e-9), name
     assert less.curvature == whole.curvature
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
+def test_expected_shading_leaves_brightness_open(engine: str) -> None:
+    """The shading of the state itself costs nothing at any brightness; other colours cost."""
+    problem = make_problem(blob((30, 34)), only("predicted_shading"))
+    height, light = random_state((30, 34), 3, 4)
+    down, right, toward = np.moveaxis(normals(height), -1, 0)
+    shading = np.einsum("khw,kc->hwc", basis(down, right, toward), light)
+    precision = some_shading(problem.valid, 3).precision
+
+    def cost(added: np.ndarray) -> float:
+        expected = ExpectedShading(shading + added, precision)
+        of_term = make_engine(engine, replace(problem, expected_shading=expected))
+        return of_term.evaluate(height, light).terms.predicted_shading
+
+    assert cost(np.zeros(3)) == pytest.approx(0, abs=1e-20)
+    assert cost(np.full(3, 1.7)) == pytest.approx(0, abs=1e-20)
+    assert cost(np.array([0.2, 0.0, -0.2])) > 0.01
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
+def test_where_nothing_is_expected_no_shading_costs(engine: str) -> None:
+    problem = make_problem(blob((30, 34)), weights(predicted_shading=1.0))
+    height, light = random_state((30, 34), 3, 4)
+    nothing = replace(some_shading(problem.valid, 3), precision=np.zeros(problem.valid.shape))
+    without = make_engine(engine, problem).evaluate(height, light)
+    with_it = make_engine(engine, replace(problem, expected_shading=nothing)).evaluate(
+        height, light
+    )
+    assert with_it.terms == without.terms
+    np.testing.assert_array_equal(with_it.height_gradient, without.height_gradient)
+    np.testing.assert_array_equal(with_it.light_gradient, without.light_gradient)
