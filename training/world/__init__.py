@@ -1,0 +1,1 @@
+"""The world that the networks learn from: bodies, colours, lights and cameras."""
