@@ -91,7 +91,16 @@ def _whitened(task: DecompositionTask, colour: np.ndarray) -> DecompositionTask:
         if light is None
         else replace(task.known, light=scaled_light(light, -np.log(colour)))
     )
-    return replace(task, working=working, maps=maps, split=split, known=known)
+    return replace(
+        task,
+        working=working,
+        maps=maps,
+        split=split,
+        known=known,
+        shading_estimate=task.shading_estimate and task.shading_estimate.brighter(-np.log(colour)),
+        light_coefficients=task.light_coefficients
+        and task.light_coefficients.brighter(-np.log(colour)),
+    )
 
 
 def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:

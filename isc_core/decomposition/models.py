@@ -96,17 +96,17 @@ def _light_estimate(task: DecompositionTask) -> LightEstimate | None:
 
 
 def _normal_estimate(task: DecompositionTask) -> NormalEstimate | None:
-    """The predicted normals; None where the settings exclude them, a depth is known, or the frame
-    cuts the object.
+    """The predicted normals: those given; else None where the settings exclude them, a depth is
+    known, or the frame cuts the object.
     """
+    if task.normal_estimate is not None:
+        return task.normal_estimate
     if (
         not task.settings.uses_predicted_normals
         or task.known.depth is not None
         or is_cut(task.working.mask)
     ):
         return None
-    if task.normal_estimate is not None:
-        return task.normal_estimate
     with task.clock.stage("predict normals"):
         return predict_normals(task.working.image.astype(np.float32, copy=False), task.working.mask)
 

@@ -21,11 +21,12 @@ from ..scene.diagnostics import Diagnostics, StopReason
 from ..scene.known_inputs import SceneConstraints
 from ..scene.light_estimate import LightEstimate
 from ..sirfs.kernel_cache import announce_compilation
+from ..sirfs.priors.light_posterior import light_posterior
 from ..sirfs.priors.predicted_light import predicted_light_prior
 from ..sirfs.priors.prior_file import shipped_prior_set
 from ..sirfs.priors.priors import Priors
 from ..sirfs.recover import Recovered, RecoverOptions, recover
-from ..sirfs.settings import isc_weights
+from ..sirfs.settings import Weights, isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import scaled_light
 from .task import DecompositionTask
@@ -153,12 +154,8 @@ def _recover(
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
     with task.clock.stage("shape and light"):
-        priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-        if settings.uses_predicted_light and task.light_estimate is not None:
-            priors = with_predicted_light(priors, task.light_estimate)
-    weights = isc_weights(
-        settings.illumination, channels, normals_predicted=task.normal_estimate is not None
-    )
+        priors = _priors(task, channels)
+    weights, evaluations = _weights(task, channels)
     light = (
         known.light
         if known.light is None or channels == 3
@@ -174,9 +171,10 @@ def _recover(
             gain * working.code_value / 2,
             priors,
             weights,
-            _recover_options(task),
+            _recover_options(task, evaluations),
             pixel_weight=weight,
             predicted_normals=task.normal_estimate,
+            predicted_shading=task.shading_estimate,
             silhouette=task.silhouette,
             known=SceneConstraints(known.height, light, known.depth),
             monitor=monitor,
@@ -184,15 +182,42 @@ def _recover(
     return found if gain == 1 else replace(found, light=scaled_light(found.light, -np.log(gain)))
 
 
-def _recover_options(task: DecompositionTask) -> RecoverOptions:
+def _priors(task: DecompositionTask, channels: int) -> Priors:
+    """The priors for this photo, with what was predicted of its light."""
+    settings, coefficients = task.settings, task.light_coefficients
+    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
+    if coefficients is not None:
+        temperature = task.options.prediction_weights.light_temperature
+        return replace(priors, light=light_posterior(priors.light, coefficients, temperature))
+    if settings.uses_predicted_light and task.light_estimate is not None:
+        return with_predicted_light(priors, task.light_estimate)
+    return priors
+
+
+def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, int | None]:
+    """The weights for what was predicted, and a limit of the evaluations if there is one."""
+    normals = task.normal_estimate is not None
+    weights = isc_weights(task.settings.illumination, channels, normals_predicted=normals)
+    return task.options.prediction_weights.applied(
+        weights,
+        normals=normals,
+        shading=task.shading_estimate is not None,
+        light=task.light_coefficients is not None,
+    )
+
+
+def _recover_options(task: DecompositionTask, evaluations: int | None) -> RecoverOptions:
     settings, options = task.settings, task.options
+    solver = SolverOptions(engine=settings.engine, threads=settings.threads)
+    if evaluations is not None:
+        solver = replace(solver, lbfgs=replace(solver.lbfgs, evaluations=evaluations))
     return RecoverOptions(
         options.solve_size,
         options.margin,
         options.whole_frame,
         options.drop_near_edge,
         settings.shading_only,
-        SolverOptions(engine=settings.engine, threads=settings.threads),
+        solver,
     )
 
 

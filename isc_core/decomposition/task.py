@@ -14,11 +14,14 @@ from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import Diagnostics
 from ..scene.known_inputs import SceneConstraints
+from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
 from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import LobeFit
 from ..scene.normal_estimate import NormalEstimate
+from ..scene.shading_estimate import ShadingEstimate
 from ..sirfs.priors.prior_set import PriorSet
 from ..sirfs.recover import MARGIN, SOLVE_SIZE
+from ..sirfs.settings import PredictionWeights
 from .settings import Settings
 
 
@@ -78,6 +81,8 @@ class SolveOptions:
         even where it is not used.
     layer_network : LayerNetwork or None
         Network of the model joint; None for the shipped one.
+    prediction_weights : PredictionWeights
+        How far predicted normals, shading and light coefficients are trusted.
     """
 
     solve_size: int = SOLVE_SIZE
@@ -88,6 +93,7 @@ class SolveOptions:
     fit_lobe: bool = True
     check_assumptions: bool = True
     layer_network: LayerNetwork | None = None
+    prediction_weights: PredictionWeights = field(default_factory=PredictionWeights)
 
 
 @dataclass(frozen=True)
@@ -115,7 +121,12 @@ class DecompositionTask:
     light_estimate : LightEstimate or None
         Predicted light, where already computed.
     normal_estimate : NormalEstimate or None
-        Predicted normals at the working scale, where already computed.
+        Predicted normals at the working scale, where already computed; used in any light.
+    shading_estimate : ShadingEstimate or None
+        Predicted log shading at the working scale.
+    light_coefficients : LightCoefficientsEstimate or None
+        Predicted coefficients of the light; then `light_estimate` does not change the light's
+        prior.
     silhouette : (h, w) ndarray of bool or None
         Outline of the object in `working`; None where it is the working photo's mask.
     options : SolveOptions
@@ -132,6 +143,8 @@ class DecompositionTask:
     split: Separation | None = None
     light_estimate: LightEstimate | None = None
     normal_estimate: NormalEstimate | None = None
+    shading_estimate: ShadingEstimate | None = None
+    light_coefficients: LightCoefficientsEstimate | None = None
     silhouette: np.ndarray | None = None
     options: SolveOptions = field(default_factory=SolveOptions)
 

@@ -1,6 +1,6 @@
 """A probabilistic estimate of a photo's light: a Gaussian over its spherical harmonics."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,3 +20,19 @@ class LightCoefficientsEstimate:
 
     mean: np.ndarray
     covariance: np.ndarray
+
+    def brighter(self, log_factor: np.ndarray) -> "LightCoefficientsEstimate":
+        """Multiply the shading of each channel by a constant.
+
+        Parameters
+        ----------
+        log_factor : (3,) ndarray
+            Natural logarithm of the factors.
+
+        Returns
+        -------
+        LightCoefficientsEstimate
+        """
+        mean = self.mean.copy()
+        mean[0] += np.sqrt(4 * np.pi) * log_factor
+        return replace(self, mean=mean)

@@ -1,6 +1,6 @@
 """A probabilistic estimate of an object's log shading: mean and deviation per pixel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,3 +22,18 @@ class ShadingEstimate:
 
     log_shading: np.ndarray
     deviation: np.ndarray
+
+    def brighter(self, log_factor: np.ndarray) -> "ShadingEstimate":
+        """Multiply the shading of each channel by a constant.
+
+        Parameters
+        ----------
+        log_factor : (3,) ndarray
+            Natural logarithm of the factors.
+
+        Returns
+        -------
+        ShadingEstimate
+        """
+        known = self.deviation[..., None] > 0
+        return replace(self, log_shading=np.where(known, self.log_shading + log_factor, 0))

@@ -20,11 +20,13 @@ from ..imaging.resampling import height_scale, resample_height, resample_inside
 from ..progress import Monitor
 from ..scene.known_inputs import DepthObservation, SceneConstraints
 from ..scene.normal_estimate import NormalEstimate
+from ..scene.shading_estimate import ShadingEstimate
 from ..shading.occluding_contour import Contour, occluding_contour
 from .normal_prior import expected_normals
 from .priors.priors import Priors
 from .problem import Problem, Terms
 from .settings import Weights
+from .shading_term import expected_shading
 from .solver import SirfsResult, SolverOptions, solve
 
 MARGIN = 20
@@ -208,6 +210,8 @@ class SolveInputs:
         Predicted normals.
     depth : DepthObservation or None
         Observed depth.
+    shading : ShadingEstimate or None
+        Predicted log shading.
     """
 
     image: np.ndarray
@@ -217,6 +221,7 @@ class SolveInputs:
     pixel_weight: np.ndarray | None = None
     normals: NormalEstimate | None = None
     depth: DepthObservation | None = None
+    shading: ShadingEstimate | None = None
 
     def cut(self, window: Window) -> "SolveInputs":
         """Cut the window out of all maps.
@@ -230,6 +235,7 @@ class SolveInputs:
         SolveInputs
         """
         weight, normals, depth = self.pixel_weight, self.normals, self.depth
+        shading = self.shading
         return SolveInputs(
             window.cut(self.image, 0),
             window.cut(self.valid, False),
@@ -239,6 +245,10 @@ class SolveInputs:
             normals
             and NormalEstimate(window.cut(normals.normal, 0), window.cut(normals.deviation, 0)),
             depth and replace(depth, height=window.cut(depth.height, np.nan)),
+            shading
+            and ShadingEstimate(
+                window.cut(shading.log_shading, 0), window.cut(shading.deviation, 0)
+            ),
         )
 
     def scaled(self, factor: float) -> "SolveInputs":
@@ -274,6 +284,7 @@ class SolveInputs:
             None if weight is None else inside(weight),
             normals and NormalEstimate(inside(normals.normal), inside(normals.deviation)),
             depth and _scaled_depth(depth, factor),
+            self.shading and _scaled_shading(self.shading, factor),
         )
 
 
@@ -287,6 +298,7 @@ def recover(
     *,
     pixel_weight: np.ndarray | None = None,
     predicted_normals: NormalEstimate | None = None,
+    predicted_shading: ShadingEstimate | None = None,
     silhouette: np.ndarray | None = None,
     known: SceneConstraints | None = None,
     monitor: Monitor | None = None,
@@ -311,6 +323,8 @@ def recover(
         In [0, 1], see `Problem`.
     predicted_normals : NormalEstimate, optional
         Expected normals; by default, those that the silhouette suggests.
+    predicted_shading : ShadingEstimate, optional
+        Expected log shading.
     silhouette : (H, W) bool ndarray, optional
         The object's silhouette, if it differs from `mask`.
     known : SceneConstraints, optional
@@ -338,6 +352,7 @@ def recover(
         pixel_weight,
         predicted_normals,
         known.depth,
+        predicted_shading,
     ).cut(window)
     problem = _problem(inputs.scaled(factor), floor, priors, weights, options)
     fixed = None
@@ -409,6 +424,7 @@ def _problem(
         options.shading_only,
         expected_normals(inputs.silhouette, priors.silhouette, inputs.normals),
         inputs.pixel_weight,
+        expected_shading(inputs.shading, priors.channels),
     )
 
 
@@ -426,6 +442,14 @@ def _scaled_depth(depth: DepthObservation, factor: float) -> DepthObservation:
     return DepthObservation(
         np.where(share >= 0.5, height * scale, np.nan), depth.sigma * scale, depth.weight
     )
+
+
+def _scaled_shading(shading: ShadingEstimate, factor: float) -> ShadingEstimate:
+    known = shading.deviation > 0
+    mean, share = resample_inside(shading.log_shading, known, factor)
+    deviation = resample_inside(shading.deviation, known, factor)[0]
+    inside = share >= 0.5 * share.max()
+    return ShadingEstimate(np.where(inside[..., None], mean, 0), np.where(inside, deviation, 0))
 
 
 def _scaled_height(height: np.ndarray, factor: float) -> np.ndarray:

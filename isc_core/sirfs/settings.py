@@ -122,6 +122,61 @@ ISC_GREY_NATURAL = replace(
 PREDICTED_NORMALS_WEIGHT = 0.4
 
 
+@dataclass(frozen=True)
+class PredictionWeights:
+    """How far SIRFS trusts what was predicted from the photo.
+
+    Attributes
+    ----------
+    normals : float
+        Weight of predicted normals (`normal_prior`) that come with either of the other two.
+    shading : float
+        Weight of predicted log shading (`shading_term`).
+    light_temperature : float
+        Factor of the predicted light's covariance (`priors.light_posterior`).
+    single_start : bool
+        Start only at the predicted normals' height and the expected light, where both normals and
+        light are predicted.
+    evaluations : int
+        Most evaluations of the objective from that start.
+    """
+
+    normals: float = PREDICTED_NORMALS_WEIGHT
+    shading: float = 0.3
+    light_temperature: float = 1.0
+    single_start: bool = True
+    evaluations: int = 1000
+
+    def applied(
+        self, weights: Weights, *, normals: bool, shading: bool, light: bool
+    ) -> tuple[Weights, int | None]:
+        """Return a set of weights for a problem with predictions.
+
+        Parameters
+        ----------
+        weights : Weights
+            The set without them.
+        normals, shading, light : bool
+            What was predicted: normals, log shading and the light's coefficients.
+
+        Returns
+        -------
+        weights : Weights
+            Unchanged if neither shading nor light was predicted.
+        evaluations : int or None
+            Limit of the evaluations; None for the solver's own.
+        """
+        if not (shading or light):
+            return weights, None
+        if normals:
+            weights = replace(weights, silhouette=self.normals)
+        if shading:
+            weights = replace(weights, predicted_shading=self.shading)
+        if normals and light and self.single_start:
+            return replace(weights, starts=(Start(dome=1, light=1),)), self.evaluations
+        return weights, None
+
+
 def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:
     """Return our own set of weights.
 

@@ -8,7 +8,6 @@ independent of each other, and their sums are added in the order of the rows.
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
 
-
 from ..numerics.jit import REASSOCIATED, jit
 
 
