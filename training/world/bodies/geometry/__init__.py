@@ -1,0 +1,1 @@
+"""What the sources of bodies share: welding, orientation, parts, creases."""

@@ -1,0 +1,120 @@
+"""Taking a model apart into single things.
+
+Equation: a piece is a set of faces connected by shared vertices. Two pieces touch if points spread
+over both fall into the same cell of one of two cubic grids, offset by half a cell, of CELL times
+the model's longest side. Pieces that touch are one thing. A named object of the file, or what
+touches within it, is a thing of its own too if the largest side of its box is below PORTION of its thing's:
+the vase on the shelf, the shade of a lamp. Things below SHARE of the model's longest side are dropped, and objects of less
+than FACES faces. Of the rest at most `most` are kept, the largest first; one whose relative extents
+and area are those of a larger one is dropped: the second of two equal chairs.
+
+Limits: things that stand on a common floor plate are one thing with it, and things of their own
+only if the file names them. Gaps narrower than a cell close.
+"""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from .surface import Surface
+
+CELL = 0.015  # relative to the longest side of the model
+SHARE, FACES, PORTION = 0.15, 150, 0.6
+ALIKE = 0.02  # relative difference up to which two things are of one shape
+_POINTS = 12_000
+
+
+def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surface]:
+    """Take a model apart.
+
+    Parameters
+    ----------
+    surface : Surface
+        On merged vertices.
+    objects : (M,) ndarray of int
+        The file's named object of each face.
+    most : int
+        Number of things to return at most.
+
+    Returns
+    -------
+    list of Surface
+        The largest first; none equal in shape.
+    """
+    piece = _pieces(surface)
+    touching = _contacts(surface, piece)
+    thing = _joined(int(piece.max()) + 1, touching)[piece]
+    found = [thing == k for k in range(thing.max() + 1)]
+    for k in np.unique(objects):
+        own = (objects == k) & (thing == thing[np.argmax(objects == k)])
+        inside = np.isin(touching, piece[own]).all(1)
+        part = _joined(int(piece.max()) + 1, touching[inside])[piece]
+        own &= part == part[np.argmax(own)]
+        whole = surface.part(found[thing[np.argmax(own)]])
+        if own.sum() >= FACES and _face_of_box(surface.part(own)) < PORTION * _face_of_box(whole):
+            found.append(own)
+    least = SHARE * surface.extents().max()
+    things = [surface.part(one) for one in found]
+    things = [one for one in things if one.extents().max() > least]
+    return _of_different_shape(sorted(things, key=_face_of_box, reverse=True), most)
+
+
+def _pieces(surface: Surface) -> np.ndarray:
+    """Number (M,) of the piece of each face."""
+    a, b, c = surface.faces.T
+    graph = coo_matrix(
+        (np.ones(2 * len(a), np.int8), (np.concatenate([a, b]), np.concatenate([b, c]))),
+        shape=(len(surface.vertices),) * 2,
+    )
+    return np.asarray(connected_components(graph, directed=False)[1][a])
+
+
+def _contacts(surface: Surface, piece: np.ndarray) -> np.ndarray:
+    """Pairs (P, 2) of pieces with points in a common cell."""
+    points, owner = _spread(surface, piece)
+    pairs = []
+    for offset in (0.0, 0.5):
+        cells = np.floor(points / (CELL * surface.extents().max()) + offset).astype(np.int64)
+        number = np.ravel_multi_index(tuple((cells - cells.min(0)).T), tuple(np.ptp(cells, 0) + 1))
+        order = np.lexsort([owner, number])
+        beside = number[order[1:]] == number[order[:-1]]
+        pairs.append(np.stack([owner[order[1:]], owner[order[:-1]]], -1)[beside])
+    return np.unique(np.concatenate([*pairs, np.stack([piece, piece], -1)]), axis=0)
+
+
+def _spread(surface: Surface, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners and points uniform over the area, and the piece of each."""
+    rng = np.random.default_rng(0)
+    areas = surface.areas()
+    face = np.repeat(np.arange(len(areas)), np.ceil(_POINTS * areas / areas.sum()).astype(int))
+    weights = rng.dirichlet((1, 1, 1), len(face))
+    inside = np.einsum("ij,ijk->ik", weights, surface.corners()[face])
+    corners = surface.vertices[surface.faces.ravel()]
+    return np.concatenate([corners, inside]), np.concatenate([np.repeat(piece, 3), piece[face]])
+
+
+def _joined(count: int, pairs: np.ndarray) -> np.ndarray:
+    """Number of the thing of each of `count` pieces, from the pairs that belong together."""
+    graph = coo_matrix((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
+    return np.asarray(connected_components(graph, directed=False)[1])
+
+
+def _face_of_box(surface: Surface) -> float:
+    """Product of the two larger sides of the bounding box: also a size of flat things."""
+    return float(np.sort(surface.extents())[1:].prod())
+
+
+def _of_different_shape(things: list[Surface], most: int) -> list[Surface]:
+    kept: list[Surface] = []
+    signatures: list[np.ndarray] = []
+    for thing in things:
+        if len(kept) == most:
+            break
+        size = thing.extents().max()
+        signature = np.log(
+            [*(np.sort(thing.extents()) / size + 0.01), thing.areas().sum() / size**2 + 0.01]
+        )
+        if all(np.abs(signature - other).max() > ALIKE for other in signatures):
+            kept.append(thing)
+            signatures.append(signature)
+    return kept
