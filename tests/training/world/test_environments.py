@@ -123,7 +123,7 @@ def test_a_lobe_is_symmetric_about_the_mirrored_direction() -> None:
     level = smoothed_levels(lamp, (0.3,))[0, ..., 0]
     toward = directions(ROWS)
     cosine = toward @ toward[12, 20]
-    assert np.unravel_index(level.argmax(), level.shape) == (12, 20)
+    assert level.argmax() == 12 * 2 * ROWS + 20
     for low in (0.2, 0.5, 0.8):
         ring = level[(cosine > low) & (cosine < low + 0.02)]
         assert len(ring) > 4 and ring.std() < 0.06 * ring.mean()
