@@ -12,9 +12,16 @@ import numpy as np
 from isc_core.errors import InputError
 
 from ..geometry.surface import Surface
+from . import cloth, fruit, lathes, paper, rocks
 
 CREDIT = "made by training.world.bodies.built"
-_MAKERS: dict[str, Callable[[np.random.Generator], Surface]] = {}
+_MAKERS: dict[str, Callable[[np.random.Generator], Surface]] = {
+    "cloth": cloth.make,
+    "fruit": fruit.make,
+    "lathe": lathes.make,
+    "paper": paper.make,
+    "rock": rocks.make,
+}
 KINDS: tuple[str, ...] = tuple(_MAKERS)
 
 

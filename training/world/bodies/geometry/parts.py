@@ -3,10 +3,11 @@
 Equation: a piece is a set of faces connected by shared vertices. Two pieces touch if points spread
 over both fall into the same cell of one of two cubic grids, offset by half a cell, of CELL times
 the model's longest side. Pieces that touch are one thing. A named object of the file, or what
-touches within it, is a thing of its own too if the largest side of its box is below PORTION of its thing's:
-the vase on the shelf, the shade of a lamp. Things below SHARE of the model's longest side are dropped, and objects of less
-than FACES faces. Of the rest at most `most` are kept, the largest first; one whose relative extents
-and area are those of a larger one is dropped: the second of two equal chairs.
+touches within it, is a thing of its own too if the largest face of its bounding box is below
+PORTION of its thing's: the vase on the shelf, the shade of a lamp. Things below SHARE of the
+model's longest side are dropped, and objects of less than FACES faces. Of the rest at most `most`
+are kept, the largest first; one whose relative extents and area are those of a larger one is
+dropped: the second of two equal chairs.
 
 Limits: things that stand on a common floor plate are one thing with it, and things of their own
 only if the file names them. Gaps narrower than a cell close.
