@@ -111,11 +111,12 @@ def test_weights_change_only_with_a_new_prediction() -> None:
         assert belief.applied(old, normals=True, shading=False, light=False) == (old, None)
         full, most = belief.applied(old, normals=True, shading=True, light=True)
         assert (full.silhouette, full.predicted_shading, most) == (1.5, 0.7, 99)
-        assert full.starts == (Start(dome=1, light=1),)
+        assert full.starts == (Start(light=1),)
         lit, most = belief.applied(usual, normals=False, shading=False, light=True)
         assert (lit, most) == (usual, None)
-    many = replace(belief, single_start=False)
-    assert many.applied(old, normals=True, shading=True, light=True)[0].starts == old.starts
+    two = (Start(dome=1, light=1), Start())
+    both = replace(belief, starts=two).applied(old, normals=True, shading=False, light=True)[0]
+    assert both.starts == two
 
 
 @pytest.mark.slow
