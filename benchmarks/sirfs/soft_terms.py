@@ -8,7 +8,8 @@ fitted to the other nine. Predictions are the truth with smooth Gaussian errors:
 deviations are right for each pixel; neighbouring errors are correlated, as those of networks are,
 so the weights that are found are those of predictions calibrated pixel by pixel.
 
-A way is "normals:shading:temperature"; "-" leaves a prediction out. Errors are geometric means over
+A way is "normals:shading:temperature"; "-" leaves a prediction out. With both normals and
+light, the solver starts once for each of `--domes`; else as usual. Errors are geometric means over
 objects and noises, relative to no prediction at all.
 
 Limits: errors of the three predictions are independent here; a network's are not.
@@ -40,14 +41,12 @@ from isc_core.shading.spherical_harmonics import (
 )
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.priors.prior_set import PriorSet
+from isc_core.sirfs.settings import Start
 
 from .leave_one_out import METRICS, without
 from .mit_berkeley import LIGHTS, write_json
 
-WAYS = (
-    "-:-:-,.1:-:1,.4:-:1,1.5:-:1,-:.1:-,-:.3:-,-:1:-,-:3:-,.4:-:-,-:-:1,-:-:.3,"
-    ".4:.1:1,.4:.3:1,.4:1:1,.4:3:1,1.5:1:1"
-)
+WAYS = "-:-:-,1.5:-:-,-:3:-,-:-:1,1.5:-:1,.4:1:1,.4:3:1,1.5:3:1,1.5:10:1,4:10:1,1.5:3:4"
 _CORRELATED = 15.0  # pixels: standard deviation of the filter that makes errors smooth
 
 
@@ -78,6 +77,8 @@ class Job:
     way: str
     number: int
     noise: Noise
+    starts: tuple[Start, ...]
+    evaluations: int
     priors: PriorSet
 
 
@@ -154,6 +155,8 @@ def with_predictions(
         normals=of.normals if parts[0] is None else parts[0],
         shading=of.shading if parts[1] is None else parts[1],
         light_temperature=of.light_temperature if parts[2] is None else parts[2],
+        starts=job.starts,
+        evaluations=job.evaluations,
     )
     return replace(
         task,
@@ -220,11 +223,13 @@ def jobs(given: argparse.Namespace) -> list[Job]:
     statistics = collect_statistics(read_training_objects(given.data))
     lights, names = load_natural_lights(given.data), given.names.split(",")
     noise = Noise(given.degrees, given.shading, given.light)
+    starts = tuple(Start(float(dome), light=1) for dome in given.domes.split(","))
+    most = given.evaluations
     made = []
     for name in statistics if given.names == "all" else names:
         priors = fit_priors(without(statistics, name), lights, FitOptions())
         made += [
-            Job(given.data, name, illumination, way, number, noise, priors)
+            Job(given.data, name, illumination, way, number, noise, starts, most, priors)
             for illumination in LIGHTS
             for way in given.ways.split(",")
             for number in range(given.noises if way != "-:-:-" else 1)
@@ -261,6 +266,8 @@ def main() -> None:
     options.add_argument("--degrees", type=float, default=18.0, help="of normals")
     options.add_argument("--shading", type=float, default=0.15, help="of log shading")
     options.add_argument("--light", type=float, default=0.3, help="of light coefficients")
+    options.add_argument("--domes", default="0", help="starts: factors on the normals' height")
+    options.add_argument("--evaluations", type=int, default=1000, help="most of a solve")
     options.add_argument("--processes", type=int, default=2, help="parallel processes")
     options.add_argument("--json", type=Path, help="JSON file to write")
     given = options.parse_args()
