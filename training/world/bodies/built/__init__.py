@@ -12,15 +12,47 @@ import numpy as np
 from isc_core.errors import InputError
 
 from ..geometry.surface import Surface
-from . import cloth, fruit, lathes, paper, rocks
+from . import (
+    booleans,
+    boxes,
+    cloth,
+    creatures,
+    faces,
+    figurines,
+    fruit,
+    fuzzy,
+    lathes,
+    lettering,
+    metaballs,
+    paper,
+    plants,
+    pouches,
+    rocks,
+    shells,
+    skins,
+    thin,
+)
 
 CREDIT = "made by training.world.bodies.built"
 _MAKERS: dict[str, Callable[[np.random.Generator], Surface]] = {
+    "boolean": booleans.make,
+    "box": boxes.make,
     "cloth": cloth.make,
+    "creature": creatures.make,
+    "face": faces.make,
+    "figurine": figurines.make,
     "fruit": fruit.make,
+    "fuzzy": fuzzy.make,
     "lathe": lathes.make,
+    "lettering": lettering.make,
+    "metaball": metaballs.make,
     "paper": paper.make,
+    "plant": plants.make,
+    "pouch": pouches.make,
     "rock": rocks.make,
+    "shell": shells.make,
+    "skin": skins.make,
+    "thin": thin.make,
 }
 KINDS: tuple[str, ...] = tuple(_MAKERS)
 

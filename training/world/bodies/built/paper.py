@@ -81,9 +81,7 @@ def _folded(flat: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         beyond = rest @ normal > rng.uniform(-0.4, 0.5)
         degrees = rng.uniform(25, 150) * rng.choice([-1, 1])
         if 0.02 < beyond.mean() < 0.98:
-            points = _turned(
-                rest, points, beyond, normal, rng.uniform(25, 150) * rng.choice([-1, 1])
-            )
+            points = _turned(rest, points, beyond, normal, degrees)
     points[..., 2] += 0.015 * _creases(flat.reshape(-1, 3), 0.5, 2, rng).reshape(rest.shape[:2])
     return points
 

@@ -2,14 +2,14 @@
 
 Equation: a primitive's distance d to a point is, for a limb from a to b with radii r, s, the
 distance to the nearest point of the segment minus the radius there; for an ellipsoid with axes e,
-(|x / e| - 1) min(e). Primitives are joined by -log(sum exp(-d / blend)) blend, which rounds their
+|x / e| (|x / e| - 1) / |x / e^2|. Primitives are joined by -log(sum exp(-d / blend)) blend, which rounds their
 joints by about `blend`, and holes are cut by max(d, -hole). The zero set is triangulated by naive
 surface nets: one vertex a cell that the surface crosses, at the mean of the crossings of its edges,
 and one quadrilateral an edge that it crosses.
 
 Citation: S. F. Gibson 1998, doi:10.1007/BFb0056277 (surface nets).
 
-Limits: of the order of CELLS cells a side; details below a cell are lost. Sharp edges are blunt.
+Limits: CELLS cells along the longest side; details below a cell are lost. Sharp edges are blunt.
 """
 
 from dataclasses import dataclass
@@ -71,7 +71,9 @@ class Ellipsoid:
     def distance(self, points: np.ndarray) -> np.ndarray:
         """Return roughly the distance to points (..., 3), negative inside."""
         away = (points - np.array(self.centre)) / np.array(self.axes)
-        return np.asarray((np.linalg.norm(away, axis=-1) - 1) * min(self.axes))
+        place = np.linalg.norm(away, axis=-1)
+        slope = np.linalg.norm(away / np.array(self.axes), axis=-1)
+        return np.asarray(place * (place - 1) / np.maximum(slope, 1e-9))
 
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the corners of the bounding box."""

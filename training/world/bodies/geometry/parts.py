@@ -60,6 +60,23 @@ def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surf
     return _of_different_shape(sorted(things, key=_face_of_box, reverse=True), most)
 
 
+def largest_piece(surface: Surface) -> Surface:
+    """Return the piece of the largest area.
+
+    Parameters
+    ----------
+    surface : Surface
+        On merged vertices.
+
+    Returns
+    -------
+    Surface
+        Connected by shared vertices.
+    """
+    piece = _pieces(surface)
+    return surface.part(piece == np.argmax(np.bincount(piece, surface.areas())))
+
+
 def _pieces(surface: Surface) -> np.ndarray:
     """Number (M,) of the piece of each face."""
     a, b, c = surface.faces.T
