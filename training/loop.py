@@ -7,7 +7,9 @@ d = min(d_max, (k + 1) / (k + delay)).
 Citation: optimiser: I. Loshchilov and F. Hutter, "Decoupled Weight Decay Regularization", 2019,
 arXiv:1711.05101.
 
-Limits: CPU only. The gradient is clipped to norm 1. A resumed run draws other samples than the
+With a limit of minutes, k / K is the share of the time that has passed.
+
+Limits: one device. The gradient is clipped to norm 1. A resumed run draws other samples than the
 uninterrupted one would have drawn.
 """
 
@@ -32,7 +34,8 @@ _VALIDATION_BATCHES = 8
 _CHECKPOINT_KEYS = {"step", "network", "average", "optimizer"}
 
 Batch = tuple[torch.Tensor, ...]
-DrawBatch = Callable[[np.random.Generator], Batch]
+DrawBatch = Callable[[np.random.Generator], Any]
+Prepare = Callable[[Any], Any]
 Member = TypeVar("Member")
 
 
@@ -119,6 +122,10 @@ class RunOptions:
         Checkpoint of an interrupted run to continue.
     start : Path or None
         Checkpoint whose averaged weights a new run starts from.
+    device : str
+        Where the network is fitted: "cpu" or "cuda".
+    minutes : float
+        Length of the run; 0: until `steps`.
     """
 
     output: Path
@@ -130,6 +137,8 @@ class RunOptions:
     validation: float = 0.0
     resume: Path | None = None
     start: Path | None = None
+    device: str = "cpu"
+    minutes: float = 0.0
 
 
 def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -> None:
@@ -157,6 +166,8 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
         help="share of subjects to hold out for validation (default: none, as for the shipped "
         "networks)",
     )
+    add("--device", default="cpu", choices=("cpu", "cuda"), help="default: %(default)s")
+    add("--minutes", type=float, default=0, help="end after so long (default: after --steps)")
     begin = parser.add_mutually_exclusive_group()
     begin.add_argument(
         "--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint"
@@ -187,6 +198,8 @@ def run_options(arguments: argparse.Namespace) -> RunOptions:
         arguments.validation,
         arguments.resume,
         arguments.start,
+        arguments.device,
+        arguments.minutes,
     )
 
 
@@ -245,6 +258,7 @@ def fit(
     schedule: Schedule,
     options: RunOptions,
     draw_validation: DrawBatch | None = None,
+    prepare: Prepare = lambda batch: batch,
 ) -> Net:
     """Fit a network and write its weights.
 
@@ -253,13 +267,15 @@ def fit(
     network : nn.Module
         A `Trainable`, changed in place.
     draw : callable
-        Draws a training batch.
+        Draws a training batch; in worker processes.
     schedule : Schedule
         Constants of the optimiser.
     options : RunOptions
         Length, files and seeds of the run.
     draw_validation : callable, optional
         Draws a batch of held-out subjects. The same batches are used at every evaluation.
+    prepare : callable, optional
+        Makes what the network's loss takes of what was drawn, on the device.
 
     Returns
     -------
@@ -273,32 +289,62 @@ def fit(
     """
     if options.threads:
         torch.set_num_threads(options.threads)
+    network.to(options.device)
     optimizer, rates = _optimizer(network, schedule)
     if options.start is not None:
         network.load_state_dict(_checkpoint(options.start)["average"])
-    average, first = copy.deepcopy(network).eval(), 0
+    average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
-        first = _restore(_checkpoint(options.resume), network, average, optimizer)
-    batches = _loader(draw, options, first)
-    held_out = _validation_batches(draw_validation, options)
-    report = _Report(options.steps)
-    for step in range(first, options.steps):
-        share = _rate_share(step, options.steps, schedule.warm_up)
+        clock.resume(_restore(_checkpoint(options.resume), network, average, optimizer))
+    batches = _loader(draw, options, clock.step)
+    held_out = [prepare(batch) for batch in _validation_batches(draw_validation, options)]
+    report = _Report()
+    while not clock.over:
+        share = _rate_share(clock.step, clock.progress, schedule.warm_up)
         for group, rate in zip(optimizer.param_groups, rates, strict=True):
             group["lr"] = share * rate + schedule.floor
-        loss, terms = network.loss(next(batches))
+        loss, terms = network.loss(prepare(next(batches)))
         optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
-        _follow(average, network, step, schedule)
-        report.add(step, loss, terms)
-        done = step + 1
-        if done % _CHECKPOINT_EVERY == 0 or done == options.steps:
-            _write(average, network, optimizer, done, options.output)
+        _follow(average, network, clock.step, schedule)
+        clock.tick()
+        report.add(clock.step, loss, terms, clock.over)
+        if clock.step % _CHECKPOINT_EVERY == 0 or clock.over:
+            _write(average, network, optimizer, clock, options.output)
             if held_out:
-                print(f"  validation loss {_mean_loss(average, held_out):.4f}", flush=True)
+                print(f"  held out: {_shown(_mean_terms(average, held_out))}", flush=True)
     return average
+
+
+class _Clock:
+    """Steps and time of a run, over interruptions."""
+
+    def __init__(self, options: RunOptions) -> None:
+        self._options, self._began = options, time.monotonic()
+        self.step = 0
+
+    def resume(self, state: tuple[int, float]) -> None:
+        self.step, seconds = state
+        self._began -= seconds
+
+    @property
+    def seconds(self) -> float:
+        return time.monotonic() - self._began
+
+    @property
+    def progress(self) -> float:
+        if self._options.minutes:
+            return min(1.0, self.seconds / (60 * self._options.minutes))
+        return self.step / self._options.steps
+
+    @property
+    def over(self) -> bool:
+        return self.progress >= 1
+
+    def tick(self) -> None:
+        self.step += 1
 
 
 def _optimizer(network: Net, schedule: Schedule) -> tuple[Any, tuple[float, float]]:
@@ -312,8 +358,8 @@ def _optimizer(network: Net, schedule: Schedule) -> tuple[Any, tuple[float, floa
     return torch.optim.AdamW(groups, weight_decay=schedule.weight_decay), rates
 
 
-def _rate_share(step: int, steps: int, warm_up: int) -> float:
-    return min(1.0, (step + 1) / warm_up) * 0.5 * (1 + math.cos(math.pi * step / steps))
+def _rate_share(step: int, progress: float, warm_up: int) -> float:
+    return min(1.0, (step + 1) / warm_up) * 0.5 * (1 + math.cos(math.pi * progress))
 
 
 def _loader(draw: DrawBatch, options: RunOptions, first: int) -> Iterator[Batch]:
@@ -326,16 +372,24 @@ def _loader(draw: DrawBatch, options: RunOptions, first: int) -> Iterator[Batch]
     return iter(loader)
 
 
-def _validation_batches(draw: DrawBatch | None, options: RunOptions) -> list[Batch]:
+def _validation_batches(draw: DrawBatch | None, options: RunOptions) -> list[Any]:
     if draw is None:
         return []
     rng = np.random.default_rng([options.seed, 2])
     return [draw(rng) for _ in range(_VALIDATION_BATCHES)]
 
 
-def _mean_loss(network: Net, batches: Sequence[Batch]) -> float:
+def _mean_terms(network: Net, batches: Sequence[Any]) -> dict[str, float]:
     with torch.no_grad():
-        return float(np.mean([float(network.loss(batch)[0]) for batch in batches]))
+        found = [network.loss(batch) for batch in batches]
+    whole = {"loss": float(np.mean([float(loss) for loss, _ in found]))}
+    for name in found[0][1]:
+        whole[name] = float(np.mean([float(terms[name]) for _, terms in found]))
+    return whole
+
+
+def _shown(terms: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4f}" for name, value in terms.items())
 
 
 def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedule) -> None:
@@ -353,49 +407,52 @@ def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedul
 class _Report:
     """Prints smoothed losses every hundred steps."""
 
-    def __init__(self, steps: int) -> None:
-        self._steps, self._began = steps, time.monotonic()
+    def __init__(self) -> None:
+        self._began = time.monotonic()
         self._smoothed: dict[str, float] = {}
         self._count = 0
 
-    def add(self, step: int, loss: torch.Tensor, terms: dict[str, torch.Tensor]) -> None:
+    def add(
+        self, done: int, loss: torch.Tensor, terms: dict[str, torch.Tensor], last: bool
+    ) -> None:
         self._count += 1
         for name, value in chain([("loss", loss)], terms.items()):
             smoothed = self._smoothed.get(name, 0.0)
             self._smoothed[name] = 0.99 * smoothed + 0.01 * float(value.detach())
-        if (step + 1) % _REPORT_EVERY and step + 1 < self._steps:
+        if done % _REPORT_EVERY and not last:
             return
         weight = 1 - 0.99**self._count
-        shown = ", ".join(f"{name} {part / weight:.4f}" for name, part in self._smoothed.items())
+        shown = _shown({name: part / weight for name, part in self._smoothed.items()})
         seconds = time.monotonic() - self._began
-        print(f"step {step + 1}/{self._steps}: {shown} ({seconds:.0f} s)", flush=True)
+        print(f"step {done}: {shown} ({seconds:.0f} s)", flush=True)
 
 
 def _checkpoint(path: Path) -> dict[str, Any]:
-    found = torch.load(path, weights_only=True)
+    found = torch.load(path, weights_only=True, map_location="cpu")
     if not isinstance(found, dict) or not found.keys() >= _CHECKPOINT_KEYS:
         raise ValueError(f"{path} is not a training checkpoint")
     return found
 
 
-def _restore(kept: dict[str, Any], network: Net, average: Net, optimizer: Any) -> int:
-    """Restore a run; return the number of steps already done."""
+def _restore(kept: dict[str, Any], network: Net, average: Net, optimizer: Any) -> tuple[int, float]:
+    """Restore a run; return the number of steps already done, and the seconds they took."""
     try:
         network.load_state_dict(kept["network"])
         average.load_state_dict(kept["average"])
         optimizer.load_state_dict(kept["optimizer"])
     except RuntimeError as error:
         raise ValueError(f"the checkpoint is of another network: {error}") from error
-    return int(kept["step"])
+    return int(kept["step"]), float(kept.get("seconds", 0))
 
 
-def _write(average: Net, network: Net, optimizer: Any, step: int, output: Path) -> None:
+def _write(average: Net, network: Net, optimizer: Any, clock: _Clock, output: Path) -> None:
     """Write the averaged weights (.npz), and beside them the state to resume from (.pt)."""
     output.parent.mkdir(parents=True, exist_ok=True)
     with new_file(output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **average.arrays())
     state = {
-        "step": step,
+        "step": clock.step,
+        "seconds": clock.seconds,
         "network": network.state_dict(),
         "average": average.state_dict(),
         "optimizer": optimizer.state_dict(),

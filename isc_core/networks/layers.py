@@ -82,6 +82,26 @@ def weights_in(
     return weights, biases
 
 
+def is_chain(
+    weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...], shapes: list[tuple[int, ...]]
+) -> bool:
+    """Return whether convolutions have these shapes, and biases that fit.
+
+    Parameters
+    ----------
+    weights, biases : tuple of ndarray
+    shapes : list of tuple of int
+        (9, inputs, outputs) each.
+
+    Returns
+    -------
+    bool
+    """
+    return [w.shape for w in weights] == shapes and [b.shape for b in biases] == [
+        shape[2:] for shape in shapes
+    ]
+
+
 def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) -> bool:
     """Return whether these are the convolutions of an encoder: two a level, each fitting the next.
 

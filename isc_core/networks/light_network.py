@@ -246,10 +246,11 @@ def _softmax(score: np.ndarray) -> np.ndarray:
 
 def _mirror(places: np.ndarray) -> np.ndarray:
     """Probabilities of `PLACES` for the mirrored photo."""
-    flipped = places[_mirrored_places()]
+    flipped = places[mirrored_places()]
     return np.asarray(flipped / flipped.sum())
 
 
 @cache
-def _mirrored_places() -> np.ndarray:
+def mirrored_places() -> np.ndarray:
+    """Return the number (256,) of the place that mirrors each of `PLACES`."""
     return np.argmax((PLACES * (-1, 1, 1)) @ PLACES.T, axis=1)

@@ -26,7 +26,7 @@ def make(rng: np.random.Generator) -> Surface:
     """
     bpy = emptied()
     body = _primitive(bpy, rng, np.zeros(3), rng.uniform(0.5, 1, 3))
-    for _ in range(int(rng.integers(3, 7))):
+    for _ in range(int(rng.integers(3, 6))):
         cut = rng.random() < 0.65
         place = 0.85 * _outside(rng)
         tool = _primitive(bpy, rng, place, rng.uniform(0.2, 0.55, 3))

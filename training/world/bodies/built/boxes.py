@@ -126,8 +126,7 @@ def _telephone(rng: np.random.Generator) -> list[Surface]:
     t = np.linspace(-1, 1, 60)
     arch = np.stack([0.85 * t, 0.62 + 0.12 * (1 - t**2), 0 * t - 0.35], -1)
     handset = [tube(arch, 0.09 + 0.04 * t**4, 20)]
-    for side in (-1, 1):
-        handset.append(_box((0.17, 0.13, 0.18), 0.1, (side * 0.8, 0.5, -0.35), 20))
+    handset += [_box((0.17, 0.13, 0.18), 0.1, (x, 0.5, -0.35), 20) for x in (-0.8, 0.8)]
     parts = [body, *handset]
     tilt = Rotation.from_euler("x", -np.pi / 2 + np.arctan(slope / 2)).as_matrix()
     for k in range(12):
@@ -196,8 +195,7 @@ def _car(rng: np.random.Generator) -> list[Surface]:
             parts.append(
                 _button(0.45 * radius, 0.03, (x_wheel, -high, 0.47 if side > 0 else -0.51))
             )
-    for side in (-1, 1):
-        parts.append(_box((0.03, 0.06, 0.06), 0.03, (long, 0.0, side * 0.28)))
+    parts += [_box((0.03, 0.06, 0.06), 0.03, (long, 0.0, z)) for z in (-0.28, 0.28)]
     parts.append(_box((0.04, 0.05, 0.44), 0.02, (long, -0.7 * high, 0)))
     return parts
 
@@ -262,8 +260,8 @@ def _camera(rng: np.random.Generator) -> list[Surface]:
     wide, high, deep = rng.uniform(0.7, 1.0), rng.uniform(0.4, 0.65), rng.uniform(0.18, 0.4)
     parts = [_box((wide, high, deep), rng.uniform(0.03, 0.15), (0, 0, 0), 32)]
     radius, x = rng.uniform(0.2, 0.38), rng.uniform(-0.4, 0.4)
-    for k in range(int(rng.integers(2, 5))):
-        parts.append(_button(radius * (1 - 0.18 * k), 0.08 + 0.1 * k, (x, 0, deep)))
+    lens = [(radius * (1 - 0.18 * k), 0.08 + 0.1 * k) for k in range(int(rng.integers(2, 5)))]
+    parts += [_button(*size, (x, 0, deep)) for size in lens]
     for _ in range(int(rng.integers(1, 5))):
         at = (rng.uniform(-0.8, 0.8) * wide, high, rng.uniform(-0.5, 0.5) * deep)
         knob = revolved(

@@ -94,15 +94,15 @@ def _plush(rng: np.random.Generator) -> Surface:
 
 def _wool(rng: np.random.Generator) -> Surface:
     """A ball of wool: cords along great circles."""
-    thick, u = rng.uniform(0.03, 0.06), np.linspace(0, 2 * np.pi, 90)
+    thick, u = rng.uniform(0.04, 0.07), np.linspace(0, 2 * np.pi, 72)
     parts = [placed(ball(24), scale=0.93)]
     circle = np.stack([np.cos(u), 0 * u, np.sin(u)], -1)
-    for _ in range(8):
+    for _ in range(6):
         bundle = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
-        for k in np.linspace(-0.45, 0.45, 7):
+        for k in np.linspace(-0.4, 0.4, 7):
             path = circle * np.sqrt(1 - k**2) + (0, k, 0)
             path = path * (1 + rng.uniform(-0.03, 0.05))
-            parts.append(placed(tube(path, np.full(90, thick), 8), turn=bundle))
+            parts.append(placed(tube(path, np.full(72, thick), 8), turn=bundle))
     return together(parts)
 
 

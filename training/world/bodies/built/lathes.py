@@ -5,12 +5,15 @@ moved inward by the wall's thickness, and revolved around the y axis. Relief is 
 radius: flutes, twists, grooves, facets.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..geometry.forms import curve, displaced, placed, revolved, tube
 from ..geometry.noise import noise
 from ..geometry.surface import Surface, together
 
+Relief = Callable[[np.ndarray, np.ndarray], np.ndarray]
 # Radius at heights from foot to rim, relative to the height, and the range of the height.
 _OUTLINES: dict[str, tuple[list[float], tuple[float, float]]] = {
     "mug": ([0.42, 0.44, 0.44, 0.44, 0.45], (0.8, 1.4)),
@@ -74,7 +77,7 @@ def _walled(outer: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([foot, outer, rim, inner, floor])
 
 
-def _relief(rng: np.random.Generator, name: str):  # type: ignore[no-untyped-def]
+def _relief(rng: np.random.Generator, name: str) -> Relief | None:
     """Factor of the radius by row and angle; none on half of the vessels."""
     style = int(rng.integers(8))
     count, amount = int(rng.integers(5, 40)), rng.uniform(0.01, 0.05)
@@ -91,7 +94,7 @@ def _relief(rng: np.random.Generator, name: str):  # type: ignore[no-untyped-def
         part = np.mod(angle + twist * row, 2 * np.pi / sides) - np.pi / sides
         return np.asarray(np.cos(np.pi / sides) / np.cos(part))
 
-    styles = {0: flutes, 1: grooves, 2: facets}
+    styles: dict[int, Relief] = {0: flutes, 1: grooves, 2: facets}
     return styles.get(style) if name != "plate" or style == 0 else None
 
 

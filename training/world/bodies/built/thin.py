@@ -45,7 +45,8 @@ def _ring(radius: float, thick: float, squash: float = 1.0, count: int = 64) -> 
 
 
 def _rod(ends: list[list[float]], thick: float) -> Surface:
-    return tube(np.linspace(*np.array(ends, float), 6), np.full(6, thick), 12)
+    start, end = np.array(ends, float)
+    return tube(np.linspace(start, end, 6), np.full(6, thick), 12)
 
 
 def _wire(rng: np.random.Generator) -> list[Surface]:

@@ -32,7 +32,7 @@ def emptied() -> Any:
         import bpy
     except ImportError as error:
         raise InputError(
-            f"bodies of this kind are built with bpy, which is missing: {install_command('blender')}"
+            f"bpy, which builds bodies of this kind, is missing: {install_command('blender')}"
         ) from error
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy

@@ -2,10 +2,10 @@
 
 Equation: a primitive's distance d to a point is, for a limb from a to b with radii r, s, the
 distance to the nearest point of the segment minus the radius there; for an ellipsoid with axes e,
-|x / e| (|x / e| - 1) / |x / e^2|. Primitives are joined by -log(sum exp(-d / blend)) blend, which rounds their
-joints by about `blend`, and holes are cut by max(d, -hole). The zero set is triangulated by naive
-surface nets: one vertex a cell that the surface crosses, at the mean of the crossings of its edges,
-and one quadrilateral an edge that it crosses.
+about |x / e| (|x / e| - 1) / |x / e^2|. Primitives are joined by -log(sum exp(-d / blend)) blend,
+which rounds their joints by about `blend`, and holes are cut by max(d, -hole). The zero set is
+triangulated by naive surface nets: one vertex a cell that the surface crosses, at the mean of the
+crossings of its edges, and one quadrilateral an edge that it crosses.
 
 Citation: S. F. Gibson 1998, doi:10.1007/BFb0056277 (surface nets).
 

@@ -7,7 +7,8 @@ touches within it, is a thing of its own too if the largest face of its bounding
 PORTION of its thing's: the vase on the shelf, the shade of a lamp. Things below SHARE of the
 model's longest side are dropped, and objects of less than FACES faces. Of the rest at most `most`
 are kept, the largest first; one whose relative extents and area are those of a larger one is
-dropped: the second of two equal chairs.
+dropped: the second of two equal chairs. Models of more than OBJECTS named objects are taken apart by
+contact alone.
 
 Limits: things that stand on a common floor plate are one thing with it, and things of their own
 only if the file names them. Gaps narrower than a cell close.
@@ -20,7 +21,7 @@ from scipy.sparse.csgraph import connected_components
 from .surface import Surface
 
 CELL = 0.015  # relative to the longest side of the model
-SHARE, FACES, PORTION = 0.15, 150, 0.6
+SHARE, FACES, PORTION, OBJECTS = 0.15, 150, 0.6, 200
 ALIKE = 0.02  # relative difference up to which two things are of one shape
 _POINTS = 12_000
 
@@ -45,19 +46,46 @@ def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surf
     piece = _pieces(surface)
     touching = _contacts(surface, piece)
     thing = _joined(int(piece.max()) + 1, touching)[piece]
-    found = [thing == k for k in range(thing.max() + 1)]
-    for k in np.unique(objects):
-        own = (objects == k) & (thing == thing[np.argmax(objects == k)])
-        inside = np.isin(touching, piece[own]).all(1)
-        part = _joined(int(piece.max()) + 1, touching[inside])[piece]
-        own &= part == part[np.argmax(own)]
-        whole = surface.part(found[thing[np.argmax(own)]])
-        if own.sum() >= FACES and _face_of_box(surface.part(own)) < PORTION * _face_of_box(whole):
+    boxes = _extents(surface, thing)
+    size = np.sort(boxes, axis=1)[:, 1:].prod(1)  # the largest face of each box
+    found = [thing == k for k in np.argsort(-size, kind="stable")[: 2 * most]]
+    named = np.unique(objects)
+    for k in named if len(named) <= OBJECTS else ():
+        own = _largest_within(objects == k, thing)
+        own = _touching_part(own, piece, touching)
+        whole = size[thing[np.argmax(own)]]
+        if own.sum() >= FACES and _face_of_box(surface.part(own)) < PORTION * whole:
             found.append(own)
     least = SHARE * surface.extents().max()
     things = [surface.part(one) for one in found]
     things = [one for one in things if one.extents().max() > least]
     return _of_different_shape(sorted(things, key=_face_of_box, reverse=True), most)
+
+
+def _extents(surface: Surface, label: np.ndarray) -> np.ndarray:
+    """Sides (K, 3) of the bounding box of the faces of each label, all of which occur."""
+    order = np.argsort(label, kind="stable")
+    starts = np.searchsorted(label[order], np.arange(label.max() + 1))
+    corners = surface.corners()[order]
+    high = np.maximum.reduceat(corners.max(1), starts)
+    return np.asarray(high - np.minimum.reduceat(corners.min(1), starts))
+
+
+def _largest_within(own: np.ndarray, label: np.ndarray) -> np.ndarray:
+    """Of some faces, those of the label that has the most of them."""
+    return np.asarray(own & (label == np.argmax(np.bincount(label[own]))))
+
+
+def _touching_part(own: np.ndarray, piece: np.ndarray, touching: np.ndarray) -> np.ndarray:
+    """Of some faces, those that hang together without the others' help: the most there are."""
+    numbers, local = np.unique(piece[own], return_inverse=True)
+    if len(numbers) == 1:
+        return own
+    inside = np.isin(touching, numbers).all(1)
+    part = _joined(len(numbers), np.searchsorted(numbers, touching[inside]))[local]
+    chosen = own.copy()
+    chosen[own] = part == np.argmax(np.bincount(part))
+    return chosen
 
 
 def largest_piece(surface: Surface) -> Surface:

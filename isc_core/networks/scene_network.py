@@ -1,0 +1,417 @@
+"""Prediction of all that a photo shows of its scene, before any model explains it.
+
+Problem: shape, layers, shading and light are ambiguous pixel by pixel. Having seen many things in
+many lights helps with all of them, and what helps one helps the others: one network predicts them
+together, each with its uncertainty.
+
+Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo, each
+half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Each pixel
+gets m (3,), the mean of the probable unit normals, and the deviation of n_x and n_y from it; the
+log ratio y (3,) of image and diffuse image, and its scale; the log shading (3,) of a photo whose
+mean light is 1, and its scale; and the log odds of a depth edge. The coarse feature maps, averaged
+over the object, and their maxima give the light: mean l and covariance D^2 + F F' of the 27
+coefficients of the log shading, the number of lamps, the direction of the strongest, and what the
+object is made of. Photo and mirror image are averaged. y and the shading have Laplace
+distributions, the normals and the light normal ones. Each scale is multiplied by a factor fitted on
+bodies that the weights have not seen.
+
+Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28; uncertainties: A. Kendall, Y. Gal, "What uncertainties do we need
+in Bayesian deep learning for computer vision?", 2017, arXiv:1703.04977; their factors: C. Guo et
+al., "On calibration of modern neural networks", 2017, arXiv:1706.04599. Weights, training pictures
+and losses are our own: `python -m training.networks.scene_network`.
+
+Limits: measured in docs/methods/scene_network.md. It sees the object 112 pixels long.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from scipy import ndimage
+
+from ..errors import InputError
+from ..imaging.area_resize import averaged_object
+from ..imaging.bounding_box import mask_slices
+from ..imaging.upsampling import enlarged
+from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
+from ..scene.normal_estimate import NormalEstimate
+from ..scene.shading_estimate import ShadingEstimate
+from .layers import (
+    average_pool,
+    conv_block,
+    convolved,
+    depth_to_space,
+    inputs_of,
+    is_chain,
+    space_to_depth,
+)
+from .light_network import mirrored_places
+from .loader import Network, Parameters
+from .network_input import NetworkInput
+
+SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
+INPUTS = 6
+LIGHT, FACTORS = 27, 3
+COUNTS, PLACE_COUNT, KIND_COUNT = 3, 256, 3
+GLOBAL = LIGHT * (2 + FACTORS) + COUNTS + PLACE_COUNT + KIND_COUNT
+MIN_LOG_SCALE, MAX_LOG_SCALE = -5.0, 1.5
+COARSE = 3  # levels that the light is read from, the coarsest ones
+_MARGIN = 2.0  # offset of the log ratio: its prior is a small one
+_LEAST = 1e-6
+
+
+class Head(StrEnum):
+    """What is predicted at each pixel."""
+
+    NORMAL = "normal"
+    NORMAL_SCALE = "normal_scale"
+    RATIO = "ratio"
+    RATIO_SCALE = "ratio_scale"
+    SHADING = "shading"
+    SHADING_SCALE = "shading_scale"
+    EDGE = "edge"
+
+
+HEADS: Mapping[Head, slice] = {
+    Head.NORMAL: slice(0, 3),
+    Head.NORMAL_SCALE: slice(3, 4),
+    Head.RATIO: slice(4, 7),
+    Head.RATIO_SCALE: slice(7, 8),
+    Head.SHADING: slice(8, 11),
+    Head.SHADING_SCALE: slice(11, 12),
+    Head.EDGE: slice(12, 13),
+}
+CHANNELS = 13
+TEMPERATURES = ("normal", "ratio", "shading", "light")
+
+
+@dataclass(frozen=True)
+class RawPrediction:
+    """What the network gives, on its own frame.
+
+    Attributes
+    ----------
+    maps : (H, W, CHANNELS) float32 ndarray
+        By `HEADS`; scales as logarithms.
+    vector : (GLOBAL,) ndarray
+        The light's mean, log deviations and factors, scores of lamps, places and kinds.
+    """
+
+    maps: np.ndarray
+    vector: np.ndarray
+
+
+@dataclass(frozen=True)
+class SceneNetwork(Network):
+    """The scene network. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        Two for each level down, two for each level up from the coarsest, the output.
+    biases : tuple of (outputs,) float32 ndarray
+    dense : tuple of (inputs, outputs) ndarray
+        The two layers of the light.
+    offsets : tuple of (outputs,) ndarray
+    temperatures : (4,) ndarray
+        Factors of the scales, by `TEMPERATURES`.
+    """
+
+    title = "scene network"
+    file = "scene_network.npz"
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+    dense: tuple[np.ndarray, ...]
+    offsets: tuple[np.ndarray, ...]
+    temperatures: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not self._fits():
+            raise InputError(
+                "these are not the weights of a scene network of this version: "
+                "fit them anew, or use the shipped ones"
+            )
+
+    def _fits(self) -> bool:
+        if len(self.weights) < 7 or len(self.weights) % 4 != 3:
+            return False
+        down = 2 * self._levels
+        wide = [w.shape[-1] for w in self.weights[1:down:2]]
+        shapes, inputs = list[tuple[int, ...]](), 4 * INPUTS
+        for width in wide:
+            shapes += [(9, inputs, width), (9, width, width)]
+            inputs = width
+        for width in wide[-2::-1]:
+            shapes += [(9, width + inputs, width), (9, width, width)]
+            inputs = width
+        shapes.append((9, inputs, 4 * CHANNELS))
+        hidden = self.dense[0].shape[-1]
+        light = [(2 * sum(wide[-COARSE:]), hidden), (hidden, GLOBAL)]
+        return (
+            is_chain(self.weights, self.biases, shapes)
+            and [m.shape for m in self.dense] == light
+            and [o.shape for o in self.offsets] == [s[1:] for s in light]
+            and self.temperatures.shape == (len(TEMPERATURES),)
+            and bool((self.temperatures > 0).all())
+        )
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "SceneNetwork":
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        SceneNetwork
+
+        Raises
+        ------
+        InputError, KeyError
+            If the parameters do not fit.
+        """
+        others = parameters.others
+        return cls(
+            parameters.weights,
+            parameters.biases,
+            (others["hidden_weight"], others["light_weight"]),
+            (others["hidden_bias"], others["light_bias"]),
+            others["temperatures"],
+        )
+
+    @property
+    def _levels(self) -> int:
+        return (len(self.weights) + 1) // 4
+
+    def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
+        """Predict maps and light for an input of `framed`.
+
+        Parameters
+        ----------
+        image : (H, W, 3) ndarray
+        mask : (H, W) bool ndarray
+
+        Returns
+        -------
+        RawPrediction
+        """
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        layer, skips = space_to_depth(channels_of(image, mask)), []
+        for level in range(self._levels):
+            layer = conv_block(layer if level == 0 else average_pool(layer), steps)
+            skips.append(layer)
+        vector = self._light(skips, mask)
+        for skip in skips[-2::-1]:
+            layer = conv_block(
+                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
+            )
+        return RawPrediction(depth_to_space(convolved(layer, *next(steps))), vector)
+
+    def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
+        """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
+        cover, features = mask.astype(np.float64)[..., None], []
+        for level, layer in enumerate(skips):
+            cover = average_pool(cover)
+            if level < len(skips) - COARSE:
+                continue
+            values = layer.astype(np.float64)
+            weight = cover[..., 0] / max(float(cover.sum()), _LEAST)
+            features.append(np.einsum("ij,ijc->c", weight, values))
+            features.append((values * np.minimum(2 * cover, 1)).max(axis=(0, 1)))
+        hidden = np.einsum("n,nk->k", np.concatenate(features), self.dense[0]) + self.offsets[0]
+        return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]
+
+
+def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return the channels of the first layer.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W, INPUTS) float32 ndarray
+        Log light over the object's mean and the mask; right and up from the middle of the frame,
+        half its side being 1. All are 0 outside the mask.
+    """
+    rows, columns = mask.shape
+    right = ((np.arange(columns) + 0.5) * (2 / columns) - 1).astype(np.float32)
+    up = (1 - (np.arange(rows) + 0.5) * (2 / rows)).astype(np.float32)
+    place = np.stack(np.meshgrid(right, up), axis=2) * mask[..., None]
+    return np.concatenate([inputs_of(image, mask), place], axis=2)
+
+
+@dataclass(frozen=True)
+class ScenePrediction:
+    """What the network says of a photo.
+
+    Attributes
+    ----------
+    normals : NormalEstimate
+    log_ratio : (H, W, 3) ndarray
+        Median of the log of image over diffuse image, >= 0.
+    ratio_scale : (H, W) ndarray
+        Mean absolute error of `log_ratio`, > 0 on the object.
+    shading : ShadingEstimate
+    light : LightCoefficientsEstimate
+    counts : (3,) ndarray
+        Probabilities of no, one and several lamps.
+    places : (256,) ndarray
+        Probabilities of `scene.light_estimate.PLACES` for the strongest lamp, if there is one.
+    kinds : (3,) ndarray
+        Probabilities of an opaque object, a mirror, and glass.
+    edge : (H, W) ndarray
+        Probability that the depth jumps.
+    """
+
+    normals: NormalEstimate
+    log_ratio: np.ndarray
+    ratio_scale: np.ndarray
+    shading: ShadingEstimate
+    light: LightCoefficientsEstimate
+    counts: np.ndarray
+    places: np.ndarray
+    kinds: np.ndarray
+    edge: np.ndarray
+
+
+def predict_scene(
+    image: np.ndarray, mask: np.ndarray, network: SceneNetwork | None = None
+) -> ScenePrediction:
+    """Predict shape, layers, shading and light of a photo.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) bool ndarray
+    network : SceneNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    ScenePrediction
+    """
+    network = network or SceneNetwork.shipped()
+    frame = framed(image, mask)
+    direct = network(frame.image, frame.mask)
+    mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
+    maps = _settled(direct.maps), _settled(mirrored.maps[:, ::-1]) * _MIRRORED
+    small = 0.5 * (maps[0] + maps[1])
+    factors = dict(zip(TEMPERATURES, network.temperatures, strict=True))
+    full = _at_full_size(small, frame, mask)
+    part = {head: full[..., place] for head, place in HEADS.items()}
+    return ScenePrediction(
+        NormalEstimate(part[Head.NORMAL], _scale(part[Head.NORMAL_SCALE], mask, factors["normal"])),
+        part[Head.RATIO],
+        _scale(part[Head.RATIO_SCALE], mask, factors["ratio"]),
+        ShadingEstimate(
+            part[Head.SHADING],
+            # the standard deviation of a Laplace distribution
+            _scale(part[Head.SHADING_SCALE], mask, np.sqrt(2) * factors["shading"]),
+        ),
+        *_light_of(direct.vector, mirrored.vector, factors["light"]),
+        1 / (1 + np.exp(-part[Head.EDGE][..., 0])) * mask,
+    )
+
+
+def framed(image: np.ndarray, mask: np.ndarray) -> NetworkInput:
+    """Place an object in the middle of the network's frame.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    NetworkInput
+        `SIDE` pixels wide and high.
+    """
+    small, inside, factor = averaged_object(image, mask, LONG_SIDE)
+    rows, columns = inside.shape
+    top, left = (SIDE - rows) // 2, (SIDE - columns) // 2
+    place = slice(top, top + rows), slice(left, left + columns)
+    light, cover = np.zeros((SIDE, SIDE, 3), np.float32), np.zeros((SIDE, SIDE), bool)
+    light[place], cover[place] = small, inside
+    return NetworkInput(light, cover, place, inside, factor)
+
+
+_MIRRORED = np.ones(CHANNELS, np.float32)
+_MIRRORED[HEADS[Head.NORMAL].start] = -1
+
+
+def _settled(maps: np.ndarray) -> np.ndarray:
+    """Maps with the log ratio as it is meant, so that they can be averaged."""
+    found = maps.copy()
+    ratio = HEADS[Head.RATIO]
+    found[..., ratio] = np.logaddexp(0, maps[..., ratio] - np.float32(_MARGIN))
+    return found
+
+
+def _at_full_size(small: np.ndarray, frame: NetworkInput, mask: np.ndarray) -> np.ndarray:
+    """Maps of the network's frame on the photo's pixels, 0 outside the mask."""
+    box = mask_slices(mask)
+    nearest = ndimage.distance_transform_edt(
+        ~frame.mask, return_distances=False, return_indices=True
+    )
+    values = small[tuple(nearest)][frame.place]
+    if frame.factor != 1:
+        values = enlarged(values, mask[box].shape, 1 / frame.factor)
+    full = np.zeros((*mask.shape, CHANNELS), np.float32)
+    full[box] = np.where(mask[box][..., None], values, 0)
+    return full
+
+
+def _scale(log_scale: np.ndarray, mask: np.ndarray, factor: float) -> np.ndarray:
+    scale = factor * np.exp(np.clip(log_scale[..., 0], MIN_LOG_SCALE, MAX_LOG_SCALE))
+    return np.where(mask, scale, 0)
+
+
+_FLIPPED = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])  # signs of the harmonics in a mirror
+_FACTOR_SCALE = 0.1  # as in the trainer
+
+
+def _light_of(
+    direct: np.ndarray, mirrored: np.ndarray, factor: float
+) -> tuple[LightCoefficientsEstimate, np.ndarray, np.ndarray, np.ndarray]:
+    """The light, the lamps' counts and places, and the kinds, of both predictions."""
+    signs = np.tile(_FLIPPED, 3)
+    first, second = _split_vector(direct), _split_vector(mirrored)
+    mean = (first[0] + signs * second[0]) / 2
+    covariance = (_covariance(first) + signs[:, None] * _covariance(second) * signs) / 2
+    estimate = LightCoefficientsEstimate(mean.reshape(3, 9).T, factor**2 * covariance)
+    counts, places, kinds = (
+        (_softmax(first[k]), _softmax(second[k])) for k in range(3, len(first))
+    )
+    flipped = places[1][mirrored_places()]
+    return (
+        estimate,
+        (counts[0] + counts[1]) / 2,
+        (places[0] + flipped / flipped.sum()) / 2,
+        (kinds[0] + kinds[1]) / 2,
+    )
+
+
+def _split_vector(vector: np.ndarray) -> list[np.ndarray]:
+    sizes = (LIGHT, LIGHT, LIGHT * FACTORS, COUNTS, PLACE_COUNT, KIND_COUNT)
+    return np.split(vector, np.cumsum(sizes)[:-1])
+
+
+def _covariance(parts: list[np.ndarray]) -> np.ndarray:
+    scale = np.exp(np.clip(parts[1], MIN_LOG_SCALE, MAX_LOG_SCALE))
+    factors = _FACTOR_SCALE * parts[2].reshape(LIGHT, FACTORS)
+    return np.diag(scale**2) + np.einsum("if,jf->ij", factors, factors)
+
+
+def _softmax(score: np.ndarray) -> np.ndarray:
+    shares = np.exp(score - score.max())
+    return np.asarray(shares / shares.sum())

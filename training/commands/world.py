@@ -1,0 +1,85 @@
+"""`isc world build`: trace the bodies that the networks learn from."""
+
+import argparse
+from pathlib import Path
+
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count
+from isc_core.errors import InputError
+from isc_core.progress import Monitor
+
+from ..world.bodies.sources import BodyFolders
+from ..world.build import build_world
+from ..world.files import WorldSettings
+
+SUMMARY = "trace bodies from random sides"
+
+_EXAMPLES = """  isc world build -o WORLD --count 50
+  isc world build -o WORLD --furniture SH3F --urdfs URDFS --scans PLY --built 1200 --families 600
+
+An interrupted build continues in the same folder. Each body is traced once: where its surface is,
+and which of 64 directions see past it. Training lights it anew for every photo."""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
+    jobs = parser.add_subparsers(metavar="JOB", required=True)
+    build = jobs.add_parser("build", help=SUMMARY)
+    describe(build, run, "Trace bodies from random sides, to train on.", examples=_EXAMPLES)
+    add = build.add_argument
+    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the world")
+    add("--count", type=count, metavar="N", help="stop after N entries of the list of bodies")
+    add("--furniture", type=Path, metavar="DIR", help="folder of Sweet Home 3D catalogues (.sh3f)")
+    add("--urdfs", type=Path, metavar="DIR", help="folder random_urdfs of pybullet_data")
+    add("--scans", type=Path, metavar="DIR", help="folder of scanned bodies (.ply)")
+    for name, default, what in (
+        ("built", 600, "bodies built with Blender or by formula"),
+        ("families", 300, "bodies of the shape families of isc synth"),
+        ("views", 2, "sides of each body"),
+        ("seed", 0, "seed of the order, the sides and the lights"),
+        ("workers", 2, "processes"),
+    ):
+        add(
+            f"--{name}",
+            type=count,
+            default=default,
+            metavar="N",
+            help=f"{what} (default: %(default)s)",
+        )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        The parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+
+    Raises
+    ------
+    InputError
+        For invalid input.
+    """
+    if not options.views or not options.workers:
+        raise InputError("--views and --workers must be at least 1")
+    settings = WorldSettings(options.seed, options.views, options.built, options.families)
+    folders = BodyFolders(options.furniture, options.urdfs, options.scans)
+    lines = build_world(
+        options.output, folders, settings, options.count, options.workers, monitor
+    )
+    program = "python -m training.networks.scene_network"
+    return hints(options, *lines, f"next: {program} {options.output} --panoramas DIR -o SCENE.npz")

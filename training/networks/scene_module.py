@@ -1,0 +1,366 @@
+"""The trainable scene network and its loss; the counterpart of `isc_core.networks.scene_network`.
+
+Equation: with n, y, s the truth at a pixel, m, y', s' the prediction and their scales,
+
+    |m - n|^2 + .1 (|t - t'|^2 / (2 d^2) + 2 log d)        normals, t their part in the plane
+    + (|y - y'| / b + log b) / 4                           log ratio of image and diffuse image
+    + (|s - s' - k| / c + log c) / 3 + |grad (s - s')|     log shading, k its median offset
+    + .1 (binary cross entropy of depth edges)
+    + .02 (negative log likelihood of the light's 27 numbers, a Gaussian of low rank)
+    + .1 (cross entropies of the number and the place of lamps, and of the material)
+
+each averaged over the object. Batch normalisation follows each convolution and is folded into it
+when the weights are written.
+
+Citation: S. Ioffe, C. Szegedy, "Batch normalization", 2015, arXiv:1502.03167; deviations: A.
+Kendall, Y. Gal 2017, arXiv:1703.04977; initial weights: K. He et al. 2015, doi:10.1109/ICCV.2015.123.
+
+Limits: one deviation for both components of a normal, one scale for three colours.
+"""
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from isc_core.networks.scene_network import (
+    CHANNELS,
+    COARSE,
+    COUNTS,
+    FACTORS,
+    GLOBAL,
+    HEADS,
+    INPUTS,
+    KIND_COUNT,
+    LIGHT,
+    MAX_LOG_SCALE,
+    MIN_LOG_SCALE,
+    PLACE_COUNT,
+    TEMPERATURES,
+    Head,
+)
+
+from ..world.samples import Sample
+
+WIDTHS = (32, 64, 128, 192, 256)
+HIDDEN = 192
+_MARGIN = 2.0  # as in isc_core.networks.scene_network
+_DARK = 0.03  # as in isc_core.networks.layers
+
+
+class Block(nn.Module):  # type: ignore[misc]
+    """Two 3 x 3 convolutions, each followed by batch normalisation and max(0, .).
+
+    Parameters
+    ----------
+    inputs, outputs : int
+        Channels.
+    """
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.c1 = nn.Conv2d(inputs, outputs, 3, padding=1, bias=False)
+        self.n1 = nn.BatchNorm2d(outputs)
+        self.c2 = nn.Conv2d(outputs, outputs, 3, padding=1, bias=False)
+        self.n2 = nn.BatchNorm2d(outputs)
+
+    def forward(self, layer: torch.Tensor) -> torch.Tensor:
+        """Apply both convolutions.
+
+        Parameters
+        ----------
+        layer : (B, inputs, H, W) tensor
+
+        Returns
+        -------
+        (B, outputs, H, W) tensor
+        """
+        layer = functional.relu(self.n1(self.c1(layer)))
+        return functional.relu(self.n2(self.c2(layer)))
+
+    @property
+    def pairs(self) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
+        """The convolutions with their normalisations."""
+        return [(self.c1, self.n1), (self.c2, self.n2)]
+
+
+class SceneNetworkModule(nn.Module):  # type: ignore[misc]
+    """The trainable scene network.
+
+    Parameters
+    ----------
+    widths : tuple of int
+        Channels of the levels, the finest first.
+    """
+
+    def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
+        super().__init__()
+        fine = (4 * INPUTS, *widths[:-1])
+        self.down = nn.ModuleList(
+            [Block(inputs, outputs) for inputs, outputs in zip(fine, widths, strict=True)]
+        )
+        pairs = list(zip(widths[-2::-1], widths[:0:-1], strict=True))
+        self.up = nn.ModuleList([Block(skip + inputs, skip) for skip, inputs in pairs])
+        self.out = nn.Conv2d(widths[0], 4 * CHANNELS, 3, padding=1)
+        self.hidden = nn.Linear(2 * sum(widths[-COARSE:]), HIDDEN)
+        self.light = nn.Linear(HIDDEN, GLOBAL)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
+        for module in (self.out, self.light):
+            nn.init.zeros_(module.bias)
+            module.weight.data *= 0.1
+        self.to(memory_format=torch.channels_last)
+
+    def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Predict maps and light.
+
+        Parameters
+        ----------
+        inputs : (B, INPUTS, side, side) tensor
+            See `network_channels`.
+
+        Returns
+        -------
+        maps : (B, CHANNELS, side, side) tensor
+        vector : (B, GLOBAL) tensor
+            As `RawPrediction` describes them.
+        """
+        cover = inputs[:, 3:4]
+        layer = functional.pixel_unshuffle(inputs, 2).contiguous(memory_format=torch.channels_last)
+        skips, features = [], []
+        device = inputs.device.type
+        with torch.autocast(device, torch.bfloat16, enabled=self.training):
+            for level, block in enumerate(self.down):
+                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
+                skips.append(layer)
+                cover = functional.avg_pool2d(cover, 2)
+                if level >= len(self.down) - COARSE:
+                    features += _pooled(layer.float(), cover)
+            for block, skip in zip(self.up, skips[-2::-1], strict=True):
+                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
+                layer = block(torch.cat([skip, finer], 1))
+            maps = functional.pixel_shuffle(self.out(layer), 2).float()
+        hidden = functional.relu(self.hidden(torch.cat(features, 1)))
+        return maps, self.light(hidden)
+
+    def encoder_parameters(self) -> list[nn.Parameter]:
+        """Return the parameters of the convolutions."""
+        return [*self.down.parameters(), *self.up.parameters(), *self.out.parameters()]
+
+    def loss(self, batch: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Return the loss of a batch and its terms.
+
+        Parameters
+        ----------
+        batch : Sample
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            Not weighted; "degrees" is the mean angular error.
+        """
+        maps, vector = self(network_channels(batch.photo, batch.mask))
+        part = {head: maps[:, place] for head, place in HEADS.items()}
+        opaque = (batch.kind == 0).float()
+        terms = {
+            **_normal_terms(part, batch, 0.3 + 0.7 * opaque),
+            **_layer_terms(part, batch, opaque),
+            "edge": _edge_term(part[Head.EDGE], batch),
+            **_light_terms(vector, batch, opaque),
+        }
+        total = sum(_WEIGHTS[name] * term for name, term in terms.items() if name in _WEIGHTS)
+        return total, terms
+
+    @property
+    def _pairs(self) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
+        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the weights in the layout that the core reads."""
+        pairs = [_folded(*pair) for pair in self._pairs]
+        pairs.append((self.out.weight, self.out.bias))
+        found = {
+            "normalisation": _as_array(torch.cat([_state(norm) for _, norm in self._pairs], 1))
+        }
+        for k, (weight, bias) in enumerate(pairs):
+            kernel = _as_array(weight).transpose(2, 3, 1, 0)
+            found[f"weight{k:02d}"] = kernel.reshape(9, *kernel.shape[2:]).astype(np.float16)
+            found[f"bias{k:02d}"] = _as_array(bias).astype(np.float16)
+        for name, layer in (("hidden", self.hidden), ("light", self.light)):
+            found[f"{name}_weight"] = _as_array(layer.weight).T.astype(np.float16)
+            found[f"{name}_bias"] = _as_array(layer.bias).astype(np.float16)
+        found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
+        return found
+
+    def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:
+        """Start from weights in the core's layout.
+
+        The normalisations are taken apart again as the archive keeps them.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            Content of an archive.
+        """
+        states = torch.from_numpy(arrays["normalisation"].astype(np.float32))
+        with torch.no_grad():
+            for k, (convolution, norm) in enumerate(self._pairs):
+                state, states = states[:, : norm.num_features], states[:, norm.num_features :]
+                for part, values in zip(
+                    (norm.weight, norm.bias, norm.running_mean, norm.running_var),
+                    state,
+                    strict=True,
+                ):
+                    part.copy_(values)
+                gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+                convolution.weight.copy_(
+                    _kernel(arrays[f"weight{k:02d}"]) / gain[:, None, None, None]
+                )
+            last = len(self._pairs)
+            self.out.weight.copy_(_kernel(arrays[f"weight{last:02d}"]))
+            self.out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
+            for name, layer in (("hidden", self.hidden), ("light", self.light)):
+                layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
+                layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
+
+
+def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+    """Return the input channels; equal to `isc_core.networks.scene_network.channels_of`.
+
+    Parameters
+    ----------
+    photo : (B, 3, H, W) tensor
+    mask : (B, 1, H, W) tensor
+
+    Returns
+    -------
+    (B, INPUTS, H, W) tensor
+    """
+    rows, columns = photo.shape[2:]
+    count = mask.sum((2, 3), keepdim=True).clamp(min=1)
+    mean = (photo.mean(1, keepdim=True) * mask).sum((2, 3), keepdim=True) / count
+    light = torch.log(photo / mean.clamp(min=1e-9) + _DARK) * mask
+    right = (torch.arange(columns, device=photo.device) + 0.5) * (2 / columns) - 1
+    up = 1 - (torch.arange(rows, device=photo.device) + 0.5) * (2 / rows)
+    return torch.cat([light, mask, right * mask, up[:, None] * mask], 1)
+
+
+def _pooled(layer: torch.Tensor, cover: torch.Tensor) -> list[torch.Tensor]:
+    weight = cover / cover.sum((2, 3), keepdim=True).clamp(min=1e-6)
+    return [(layer * weight).sum((2, 3)), (layer * (2 * cover).clamp(max=1)).amax((2, 3))]
+
+
+def _mean_over(values: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+    """Mean of values (B, C, H, W) over pixels of weight (B, 1, H, W); every photo counts alike."""
+    total = (values.mean(1, keepdim=True) * weight).sum((1, 2, 3))
+    return total / weight.sum((1, 2, 3)).clamp(min=1)
+
+
+def _normal_terms(
+    part: dict[Head, torch.Tensor], batch: Sample, share: torch.Tensor
+) -> dict[str, torch.Tensor]:
+    error = (part[Head.NORMAL] - batch.normal) ** 2
+    log_scale = part[Head.NORMAL_SCALE].clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)
+    squared = error[:, :2].mean(1, keepdim=True).detach()
+    likelihood = 0.5 * squared * torch.exp(-2 * log_scale) + log_scale
+    cosine = functional.cosine_similarity(part[Head.NORMAL], batch.normal, dim=1, eps=1e-4)
+    angle = torch.rad2deg(torch.acos(cosine.clamp(-0.9999, 0.9999)))[:, None]
+    return {
+        "normal": (3 * _mean_over(error, batch.known) * share).mean(),
+        "normal_scale": (_mean_over(likelihood, batch.known) * share).mean(),
+        "degrees": _mean_over(angle, batch.known).mean().detach(),
+    }
+
+
+def _layer_terms(
+    part: dict[Head, torch.Tensor], batch: Sample, share: torch.Tensor
+) -> dict[str, torch.Tensor]:
+    ratio = functional.softplus(part[Head.RATIO] - _MARGIN)
+    ratio_error = (ratio - batch.ratio).abs()
+    difference = part[Head.SHADING] - batch.log_shading
+    known = batch.known
+    offset = _mean_over(difference, known)[:, None, None, None]
+    shading_error = (difference - offset).abs()
+    steps = torch.zeros_like(offset).flatten()
+    for axis in (2, 3):
+        size = difference.shape[axis] - 1
+        both = known.narrow(axis, 0, size) * known.narrow(axis, 1, size)
+        steps = steps + _mean_over(difference.diff(dim=axis).abs(), both)
+    whole = share.sum().clamp(min=1)
+    return {
+        "ratio": (_laplace(ratio_error, part[Head.RATIO_SCALE], known) * share).sum() / whole,
+        "shading": (_laplace(shading_error, part[Head.SHADING_SCALE], known) * share).sum() / whole,
+        "gradient": (steps * share).sum() / whole,
+        "level": (offset.flatten().abs() * share).sum() / whole,
+        "ratio_error": (_mean_over(ratio_error, known) * share).sum().detach() / whole,
+        "shading_error": (_mean_over(shading_error, known) * share).sum().detach() / whole,
+    }
+
+
+def _laplace(error: torch.Tensor, scale: torch.Tensor, known: torch.Tensor) -> torch.Tensor:
+    log_scale = scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)
+    return _mean_over(error * torch.exp(-log_scale) + log_scale, known)
+
+
+def _edge_term(score: torch.Tensor, batch: Sample) -> torch.Tensor:
+    entropy = functional.binary_cross_entropy_with_logits(score, batch.edge, reduction="none")
+    return _mean_over(entropy, batch.known).mean()
+
+
+def _light_terms(
+    vector: torch.Tensor, batch: Sample, share: torch.Tensor
+) -> dict[str, torch.Tensor]:
+    sizes = [LIGHT, LIGHT, LIGHT * FACTORS, COUNTS, PLACE_COUNT, KIND_COUNT]
+    mean, log_scale, factors, counts, places, kinds = vector.split(sizes, dim=1)
+    gauss = torch.distributions.LowRankMultivariateNormal(
+        mean,
+        0.1 * factors.reshape(-1, LIGHT, FACTORS),
+        torch.exp(2 * log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)),
+    )
+    distance = -gauss.log_prob(batch.light) / LIGHT
+    whole = share.sum().clamp(min=1)
+    lit = batch.place >= 0
+    place = functional.cross_entropy(places, batch.place.clamp(min=0), reduction="none")
+    return {
+        "light": (distance.clamp(max=20) * share).sum() / whole,
+        "count": functional.cross_entropy(counts, batch.count),
+        "place": (place * lit).sum() / lit.sum().clamp(min=1),
+        "kind": functional.cross_entropy(kinds, batch.kind),
+        "light_error": ((mean - batch.light).abs().mean(1) * share).sum().detach() / whole,
+    }
+
+
+_WEIGHTS = {
+    "normal": 1.5,
+    "normal_scale": 0.1,
+    "ratio": 0.2,
+    "shading": 0.25,
+    "gradient": 0.5,
+    "level": 0.1,
+    "edge": 0.1,
+    "light": 0.1,
+    "count": 0.08,
+    "place": 0.04,
+    "kind": 0.1,
+}
+
+
+def _folded(one: nn.Conv2d, norm: nn.BatchNorm2d) -> tuple[torch.Tensor, torch.Tensor]:
+    """The weight and bias of a convolution that does what both do."""
+    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+    return one.weight * gain[:, None, None, None], norm.bias - gain * norm.running_mean
+
+
+def _state(norm: nn.BatchNorm2d) -> torch.Tensor:
+    return torch.stack([norm.weight, norm.bias, norm.running_mean, norm.running_var]).detach()
+
+
+def _kernel(weight: np.ndarray) -> torch.Tensor:
+    kernel = weight.astype(np.float32).reshape(3, 3, *weight.shape[1:])
+    return torch.from_numpy(kernel.transpose(3, 2, 0, 1).copy())
+
+
+def _as_array(values: torch.Tensor) -> np.ndarray:
+    return np.asarray(values.detach().cpu().numpy())

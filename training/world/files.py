@@ -1,0 +1,202 @@
+"""The folder of a world: one archive of views for each reference of the list of bodies.
+
+    DIR/world.json            format, seed, number of views of a body
+    DIR/views/NUMBER.npz      the views of one reference, `View` by `View`; or why it has none
+    DIR/CREDITS.txt           authors and licences of all bodies with views
+
+Splits: all that one reference gives lies in one set. `SOURCE` holds sources that nothing learns
+from, `BODY` one in eight references of the others, chosen by a hash of the name.
+
+Limits: views of another format are refused, not converted.
+"""
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from zipfile import BadZipFile
+from zlib import crc32
+
+import numpy as np
+
+from isc_core.errors import InputError
+from isc_core.io.atomic import new_file
+
+from .views import DIRECTIONS, SIDE, View
+
+FORMAT = 1
+SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
+HELD_OUT_OF = 8
+HELD_OUT_SOURCES = ("scan/", "furniture/Reallusion", "furniture/KatorLegaz")
+_PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions")
+
+
+class Split(StrEnum):
+    """What a view may be used for."""
+
+    TRAIN = "train"
+    BODY = "body"
+    SOURCE = "source"
+
+
+@dataclass(frozen=True)
+class WorldSettings:
+    """What a world's folder was made with.
+
+    Attributes
+    ----------
+    seed : int
+    views : int
+        Of each body.
+    built, families : int
+        Bodies in the list that are built, and of synth's families.
+    """
+
+    seed: int
+    views: int
+    built: int
+    families: int
+
+    def as_json(self) -> dict[str, int]:
+        """Return the settings with the format, as `world.json` holds them."""
+        return {"format": FORMAT, **self.__dict__}
+
+
+def split_of(name: str) -> Split:
+    """Return the set of a reference.
+
+    Parameters
+    ----------
+    name : str
+        Of the reference, such as "scan/cat".
+
+    Returns
+    -------
+    Split
+    """
+    if name.startswith(HELD_OUT_SOURCES):
+        return Split.SOURCE
+    return Split.BODY if crc32(name.encode()) % HELD_OUT_OF == 0 else Split.TRAIN
+
+
+def claim_folder(folder: Path, settings: WorldSettings) -> None:
+    """Prepare a folder for a world, or continue one.
+
+    Parameters
+    ----------
+    folder : Path
+    settings : WorldSettings
+
+    Raises
+    ------
+    InputError
+        If the folder holds another world, or something else.
+    """
+    path = folder / SETTINGS
+    if not path.exists():
+        if folder.exists() and any(folder.iterdir()):
+            raise InputError(f"{folder} is not empty and no world: choose another folder")
+        (folder / VIEWS).mkdir(parents=True, exist_ok=True)
+        with new_file(path) as temporary:
+            temporary.write_text(json.dumps(settings.as_json(), indent=1), encoding="utf-8")
+        return
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if found != settings.as_json():
+        raise InputError(
+            f"{folder} holds a world of other settings ({found}, not {settings.as_json()}): "
+            "choose another folder or the same settings"
+        )
+
+
+def write_views(path: Path, reference: str, views: list[View], reason: str) -> None:
+    """Write the views of one reference.
+
+    Parameters
+    ----------
+    path : Path
+        Of the archive.
+    reference : str
+        Its name.
+    views : list of View
+        May be empty.
+    reason : str
+        Why it has none; empty otherwise.
+    """
+    arrays = {"reference": np.array(reference), "reason": np.array(reason)}
+    arrays["names"] = np.array([view.name for view in views], dtype=np.str_)
+    for k, view in enumerate(views):
+        for part in _PARTS:
+            arrays[f"{part}{k}"] = getattr(view, part)
+        arrays[f"distance{k}"] = np.array(view.distance)
+    with new_file(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
+
+
+def read_views(path: Path) -> tuple[str, list[View]]:
+    """Read the views of one reference.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    reference : str
+    views : list of View
+
+    Raises
+    ------
+    InputError
+        If the file is no such archive.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            reference = str(data["reference"])
+            source = reference.partition("/")[0]
+            views = [
+                View(
+                    name=str(name),
+                    source=source,
+                    distance=float(data[f"distance{k}"]),
+                    **{part: data[f"{part}{k}"] for part in _PARTS},
+                )
+                for k, name in enumerate(data["names"])
+            ]
+    except (ValueError, KeyError, OSError, BadZipFile, EOFError) as error:
+        raise InputError(f"{path} is not an archive of views: {error}; delete it") from error
+    for view in views:
+        count = int(view.mask.sum())
+        shapes = (view.mask.shape, view.normal.shape, view.visible.shape)
+        if shapes != ((SIDE, SIDE), (count, 3), (count, DIRECTIONS // 8)):
+            raise InputError(f"{path} holds views of another shape: delete it and build it again")
+    return reference, views
+
+
+def views_in(folder: Path, split: Split) -> Iterator[View]:
+    """Read the views of a world that belong to one set.
+
+    Parameters
+    ----------
+    folder : Path
+    split : Split
+
+    Yields
+    ------
+    View
+        In the order of the list of bodies.
+
+    Raises
+    ------
+    InputError
+        If the folder is no world.
+    """
+    if not (folder / SETTINGS).is_file():
+        raise InputError(f"{folder} is no world: make one with isc world build")
+    for path in sorted((folder / VIEWS).glob("*.npz")):
+        reference, views = read_views(path)
+        if split_of(reference) == split:
+            yield from views
