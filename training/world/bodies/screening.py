@@ -8,8 +8,8 @@
 | SCRAPS | more than MOST_PIECES pieces, and none has PIECE of the area: foliage, gravel, fringes |
 | INSIDE | less than SEEN of the area is seen from outside: rooms, engines, drawn twice |
 
-"Seen": of points uniform over the area, those that are the nearest one, or within two cells of it,
-in a cell of a depth map of CELLS x CELLS cells, from one of 14 directions (faces and corners of a
+"Seen": of points uniform over the area, those that are the nearest one, or within a cell of it, in
+a cell of a depth map of CELLS x CELLS cells, from one of 14 directions (faces and corners of a
 cube).
 
 Limits: the depth maps are coarse, and a point behind a gap narrower than a cell counts as hidden.
@@ -30,7 +30,7 @@ FEWEST, MOST = 12, 70_000
 FLATTEST = 0.02
 MOST_PIECES, PIECE = 150, 0.05
 SEEN = 0.35
-POINTS, CELLS = 4_000, 32
+POINTS, CELLS = 12_000, 20
 
 
 class Fault(StrEnum):
@@ -153,7 +153,7 @@ def _nearest(points: np.ndarray, toward: np.ndarray) -> np.ndarray:
     number = rows * (CELLS + 2) + columns
     front = np.full(number.max() + 1, -np.inf)
     np.maximum.at(front, number, depth)
-    return np.asarray(depth >= front[number] - 2 * cell)
+    return np.asarray(depth >= front[number] - cell)
 
 
 def _is_scraps(surface: Surface) -> bool:

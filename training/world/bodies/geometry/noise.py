@@ -1,9 +1,11 @@
 """Smooth random functions of space, for displacement.
 
 Equation: `noise` is a periodic cubic spline through random values on a 16 x 16 x 16 lattice, read
-at places turned and shifted at random, of about unit deviation. `fractal` adds octaves, each of
-twice the frequency and `gain` times the amplitude. `cells` is the distance to the nearest of random
-points and the gap to the second nearest.
+at places turned and shifted at random. `fractal` adds octaves, each of twice the frequency and
+`gain` times the amplitude. `cells` is the distance to the nearest of random points and the gap to
+the second nearest. `facets` is linear within the six tetrahedra of each cube of a lattice with
+random values (Kuhn's triangulation: from the cube's low corner, along the axes in the order of the
+coordinates), read at warped places: facets and sharp creases.
 
 Citation: K. Perlin 1985, doi:10.1145/325165.325247; S. Worley 1996, doi:10.1145/237170.237267.
 
@@ -17,7 +19,7 @@ from scipy.spatial.transform import Rotation
 
 _LATTICE = 16
 _WARP = 0.3  # of facets, in their size: without it they repeat
-_DEVIATION = 0.55  # of the spline between the lattice's unit values, about
+_VALUES = 1.8  # deviation of the lattice's values; that of the spline between them is about 1.5
 
 
 def noise(points: np.ndarray, frequency: float, rng: np.random.Generator) -> np.ndarray:
@@ -35,9 +37,9 @@ def noise(points: np.ndarray, frequency: float, rng: np.random.Generator) -> np.
     Returns
     -------
     (N,) ndarray
-        Mean 0, deviation about 1.
+        Mean 0, deviation about 1.5.
     """
-    lattice = rng.normal(0, 1 / _DEVIATION, (_LATTICE,) * 3)
+    lattice = rng.normal(0, _VALUES, (_LATTICE,) * 3)
     coefficients = spline_filter(lattice, mode="grid-wrap")
     turn = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
     places = (points * frequency) @ turn.T + rng.uniform(0, _LATTICE, 3)
@@ -65,7 +67,7 @@ def fractal(
     Returns
     -------
     (N,) ndarray
-        Mean 0; the first octave has a deviation of about 1.
+        Mean 0; the first octave has a deviation of about 1.5.
     """
     total = np.zeros(len(points))
     for k in range(octaves):

@@ -5,10 +5,10 @@ over both fall into the same cell of one of two cubic grids, offset by half a ce
 the model's longest side. Pieces that touch are one thing. A named object of the file, or what
 touches within it, is a thing of its own too if the largest face of its bounding box is below
 PORTION of its thing's: the vase on the shelf, the shade of a lamp. Things below SHARE of the
-model's longest side are dropped, and objects of less than FACES faces. Of the rest at most `most`
-are kept, the largest first; one whose relative extents and area are those of a larger one is
-dropped: the second of two equal chairs. Models of more than OBJECTS named objects are taken apart by
-contact alone.
+longest one are dropped, and objects of less than FACES faces. Of the rest at most `most` are kept,
+the largest first; one whose relative extents and area are those of a larger one is dropped: the
+second of two equal chairs. Models of more than OBJECTS named objects are taken apart by contact
+alone.
 
 Limits: things that stand on a common floor plate are one thing with it, and things of their own
 only if the file names them. Gaps narrower than a cell close.
@@ -56,8 +56,8 @@ def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surf
         whole = size[thing[np.argmax(own)]]
         if own.sum() >= FACES and _face_of_box(surface.part(own)) < PORTION * whole:
             found.append(own)
-    least = SHARE * surface.extents().max()
     things = [surface.part(one) for one in found]
+    least = SHARE * max(one.extents().max() for one in things)
     things = [one for one in things if one.extents().max() > least]
     return _of_different_shape(sorted(things, key=_face_of_box, reverse=True), most)
 
