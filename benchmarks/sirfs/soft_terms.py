@@ -78,7 +78,7 @@ class Job:
     number: int
     noise: Noise
     starts: tuple[Start, ...]
-    evaluations: int
+    tolerance: float
     priors: PriorSet
 
 
@@ -156,7 +156,7 @@ def with_predictions(
         shading=of.shading if parts[1] is None else parts[1],
         light_temperature=of.light_temperature if parts[2] is None else parts[2],
         starts=job.starts,
-        evaluations=job.evaluations,
+        loss_tolerance=job.tolerance,
     )
     return replace(
         task,
@@ -224,12 +224,12 @@ def jobs(given: argparse.Namespace) -> list[Job]:
     lights, names = load_natural_lights(given.data), given.names.split(",")
     noise = Noise(given.degrees, given.shading, given.light)
     starts = tuple(Start(float(dome), light=1) for dome in given.domes.split(","))
-    most = given.evaluations
+    stop = given.tolerance
     made = []
     for name in statistics if given.names == "all" else names:
         priors = fit_priors(without(statistics, name), lights, FitOptions())
         made += [
-            Job(given.data, name, illumination, way, number, noise, starts, most, priors)
+            Job(given.data, name, illumination, way, number, noise, starts, stop, priors)
             for illumination in LIGHTS
             for way in given.ways.split(",")
             for number in range(given.noises if way != "-:-:-" else 1)
@@ -267,7 +267,7 @@ def main() -> None:
     options.add_argument("--shading", type=float, default=0.15, help="of log shading")
     options.add_argument("--light", type=float, default=0.3, help="of light coefficients")
     options.add_argument("--domes", default="0", help="starts: factors on the normals' height")
-    options.add_argument("--evaluations", type=int, default=1000, help="most of a solve")
+    options.add_argument("--tolerance", type=float, default=5e-4, help="of the loss, then")
     options.add_argument("--processes", type=int, default=2, help="parallel processes")
     options.add_argument("--json", type=Path, help="JSON file to write")
     given = options.parse_args()

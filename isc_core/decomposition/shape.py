@@ -155,7 +155,7 @@ def _recover(
     channels = 1 if _is_grey(diffuse, working.mask) else 3
     with task.clock.stage("shape and light"):
         priors = _priors(task, channels)
-    weights, evaluations = _weights(task, channels)
+    weights, loss_tolerance = _weights(task, channels)
     light = (
         known.light
         if known.light is None or channels == 3
@@ -171,7 +171,7 @@ def _recover(
             gain * working.code_value / 2,
             priors,
             weights,
-            _recover_options(task, evaluations),
+            _recover_options(task, loss_tolerance),
             pixel_weight=weight,
             predicted_normals=task.normal_estimate,
             predicted_shading=task.shading_estimate,
@@ -194,8 +194,8 @@ def _priors(task: DecompositionTask, channels: int) -> Priors:
     return priors
 
 
-def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, int | None]:
-    """The weights for what was predicted, and a limit of the evaluations if there is one."""
+def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, float | None]:
+    """The weights for what was predicted, and the optimiser's tolerance if it is another."""
     normals = task.normal_estimate is not None
     weights = isc_weights(task.settings.illumination, channels, normals_predicted=normals)
     return task.options.prediction_weights.applied(
@@ -206,11 +206,11 @@ def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, int | Non
     )
 
 
-def _recover_options(task: DecompositionTask, evaluations: int | None) -> RecoverOptions:
+def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> RecoverOptions:
     settings, options = task.settings, task.options
     solver = SolverOptions(engine=settings.engine, threads=settings.threads)
-    if evaluations is not None:
-        solver = replace(solver, lbfgs=replace(solver.lbfgs, evaluations=evaluations))
+    if loss_tolerance is not None:
+        solver = replace(solver, lbfgs=replace(solver.lbfgs, loss_tolerance=loss_tolerance))
     return RecoverOptions(
         options.solve_size,
         options.margin,

@@ -126,6 +126,8 @@ PREDICTED_NORMALS_WEIGHT = 0.4
 class PredictionWeights:
     """How far SIRFS trusts what was predicted from the photo.
 
+    The defaults were chosen with simulated predictions, `benchmarks.sirfs.soft_terms`.
+
     Attributes
     ----------
     normals : float
@@ -139,19 +141,19 @@ class PredictionWeights:
         flat shape under the expected light: errors of predicted normals add up when integrated, and
         from their height the solver found worse minima in fifteen of fifteen comparisons
         (`benchmarks.sirfs.soft_terms`).
-    evaluations : int
-        Most evaluations of the objective then.
+    loss_tolerance : float
+        Then the optimiser's, see `LbfgsOptions`.
     """
 
-    normals: float = PREDICTED_NORMALS_WEIGHT
-    shading: float = 0.3
+    normals: float = 1.5
+    shading: float = 3.0
     light_temperature: float = 1.0
     starts: tuple[Start, ...] = (Start(light=1),)
-    evaluations: int = 1000
+    loss_tolerance: float = 5e-4
 
     def applied(
         self, weights: Weights, *, normals: bool, shading: bool, light: bool
-    ) -> tuple[Weights, int | None]:
+    ) -> tuple[Weights, float | None]:
         """Return a set of weights for a problem with predictions.
 
         Parameters
@@ -165,8 +167,8 @@ class PredictionWeights:
         -------
         weights : Weights
             Unchanged if neither shading nor light was predicted.
-        evaluations : int or None
-            Limit of the evaluations; None for the solver's own.
+        loss_tolerance : float or None
+            The optimiser's; None for its own.
         """
         if not (shading or light):
             return weights, None
@@ -175,7 +177,7 @@ class PredictionWeights:
         if shading:
             weights = replace(weights, predicted_shading=self.shading)
         if normals and light:
-            return replace(weights, starts=self.starts), self.evaluations
+            return replace(weights, starts=self.starts), self.loss_tolerance
         return weights, None
 
 

@@ -105,15 +105,15 @@ def test_expected_shading_of_a_prediction() -> None:
 
 
 def test_weights_change_only_with_a_new_prediction() -> None:
-    belief = PredictionWeights(normals=1.5, shading=0.7, evaluations=99)
+    belief = PredictionWeights(normals=1.5, shading=0.7, loss_tolerance=0.01)
     for illumination, usual in (("natural", ISC_NATURAL), ("laboratory", ISC_LABORATORY)):
         old = isc_weights(illumination, 3, normals_predicted=True)
         assert belief.applied(old, normals=True, shading=False, light=False) == (old, None)
-        full, most = belief.applied(old, normals=True, shading=True, light=True)
-        assert (full.silhouette, full.predicted_shading, most) == (1.5, 0.7, 99)
+        full, tolerance = belief.applied(old, normals=True, shading=True, light=True)
+        assert (full.silhouette, full.predicted_shading, tolerance) == (1.5, 0.7, 0.01)
         assert full.starts == (Start(light=1),)
-        lit, most = belief.applied(usual, normals=False, shading=False, light=True)
-        assert (lit, most) == (usual, None)
+        lit, tolerance = belief.applied(usual, normals=False, shading=False, light=True)
+        assert (lit, tolerance) == (usual, None)
     two = (Start(dome=1, light=1), Start())
     both = replace(belief, starts=two).applied(old, normals=True, shading=False, light=True)[0]
     assert both.starts == two
@@ -141,7 +141,6 @@ def test_a_task_hands_all_three_to_the_solver_in_both_lights() -> None:
         solve_size=0,
         fit_lobe=False,
         check_assumptions=False,
-        prediction_weights=PredictionWeights(evaluations=60),
     )
 
     def error(illumination: str, **given: object) -> float:
