@@ -179,7 +179,7 @@ def with_a_hole_in_the_numbers() -> Surface:
 
 def inside_a_shell() -> Surface:
     """Nested balls: most of the surface is hidden."""
-    return together([placed(ball(6), scale=size) for size in (1.0, 0.7, 0.68, 0.66, 0.64, 0.62)])
+    return together([placed(ball(6), scale=1 if k == 0 else 0.7 - 0.02 * k) for k in range(10)])
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@
 | HUGE | more than MOST faces |
 | FLAT | smallest extent along the principal axes below FLATTEST of the largest |
 | SCRAPS | more than MOST_PIECES pieces, and none has PIECE of the area: foliage, gravel, fringes |
-| INSIDE | less than SEEN of the area is seen from outside: rooms, engines, drawn twice |
+| INSIDE | less than SEEN of the area is seen from outside: rooms, engines |
 
 "Seen": of points uniform over the area, those that are the nearest one, or within a cell of it, in
 a cell of a depth map of CELLS x CELLS cells, from one of 14 directions (faces and corners of a
@@ -30,7 +30,7 @@ FEWEST, MOST = 12, 70_000
 FLATTEST = 0.02
 MOST_PIECES, PIECE = 150, 0.05
 SEEN = 0.35
-POINTS, CELLS = 12_000, 20
+POINTS, CELLS = 12_000, 16
 
 
 class Fault(StrEnum):
