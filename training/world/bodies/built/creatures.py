@@ -35,10 +35,12 @@ def make(rng: np.random.Generator) -> Surface:
         _quadruped,
         _quadruped,
         _dinosaur,
+        _dinosaur,
         _frog,
         _turtle,
         _bird,
         _fish,
+        _sitting,
         _sitting,
     )
     parts = kinds[int(rng.integers(len(kinds)))](rng)
@@ -164,7 +166,7 @@ def _tail(root: Point, length: float, thick: float, rng: np.random.Generator) ->
 
 
 def _dinosaur(rng: np.random.Generator) -> list[Primitive]:
-    thick, upright = rng.uniform(0.25, 0.38), rng.random() < 0.5
+    thick, upright = rng.uniform(0.34, 0.5), rng.random() < 0.6
     rise = 0.5 if upright else rng.uniform(0, 0.2)
     parts: list[Primitive] = [Limb((-0.3, 0, 0), (0.35, rise, 0), thick, 0.75 * thick)]
     long = rng.uniform(0.4, 1.0)
@@ -174,7 +176,7 @@ def _dinosaur(rng: np.random.Generator) -> list[Primitive]:
         _point(0.6 + 0.5 * long, rise + 0.7 * long, 0),
     ]
     parts += _chain(neck, [0.7 * thick, 0.4 * thick, 0.3 * thick])
-    parts += _head(neck[-1], rng.uniform(0.16, 0.3), rng)
+    parts += _head(neck[-1], rng.uniform(0.22, 0.4), rng)
     leg = rng.uniform(0.45, 0.7)
     parts += _pair(
         [

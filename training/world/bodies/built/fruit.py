@@ -107,7 +107,7 @@ def _pear(rng: np.random.Generator) -> Surface:
     height = y * (1 + rng.uniform(0.2, 0.7) * (y > 0))
     height += 0.18 * np.exp(-(((np.pi - t) / 0.25) ** 2)) - 0.1 * np.exp(-((t / 0.2) ** 2))
     body = _uneven(_around(base.faces, radius, height, d), rng.uniform(0.02, 0.07), rng)
-    body = displaced(body, 0.004 * fractal(body.vertices, 6, 3, 0.6, rng))
+    body = displaced(body, rng.uniform(0, 0.003) * fractal(body.vertices, 6, 3, 0.5, rng))
     start = float(body.vertices[np.argmax(y), 1])
     return together([body, _stem(start, rng.uniform(0.25, 0.5), 0.045, rng)])
 
@@ -145,7 +145,7 @@ def _ribbed(rng: np.random.Generator) -> Surface:
     height -= rng.uniform(0.15, 0.4) * np.exp(-((t / 0.4) ** 2))
     height += 0.2 * np.exp(-(((np.pi - t) / 0.4) ** 2))
     body = _uneven(_around(base.faces, radius, height, d), rng.uniform(0.0, 0.05), rng)
-    body = displaced(body, rng.uniform(0, 0.008) * fractal(body.vertices, 6, 3, 0.6, rng))
+    body = displaced(body, rng.uniform(0, 0.004) * fractal(body.vertices, 6, 3, 0.5, rng))
     start = float(body.vertices[np.argmax(d[:, 1]), 1])
     return together([body, _stem(start, rng.uniform(0.2, 0.5), rng.uniform(0.06, 0.12), rng)])
 

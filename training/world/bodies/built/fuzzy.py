@@ -50,11 +50,11 @@ def _covered(body: Surface, rng: np.random.Generator) -> Surface:
         lie[int(rng.integers(3))] = 1.0
         warped = points + 0.15 * noise(points, 1.5, rng)[:, None]
         hair = fractal(warped * lie, rng.uniform(10, 16), 2, 0.7, rng)
-        return displaced(body, rng.uniform(0.006, 0.02) * hair)
+        return displaced(body, rng.uniform(0.004, 0.011) * hair)
     if style == 2:
         return displaced(body, rng.uniform(0.004, 0.012) * fractal(points, 12, 2, 0.8, rng))
     locks, gap = cells(points + 0.08 * noise(points, 3, rng)[:, None], 0.22, rng)
-    return displaced(body, 0.06 * (0.5 - locks) + 0.03 * np.minimum(gap, 0.4))
+    return displaced(body, 0.04 * (0.5 - locks) + 0.02 * np.minimum(gap, 0.4))
 
 
 def _cushion(rng: np.random.Generator) -> Surface:

@@ -40,7 +40,18 @@ class Limb:
     end_radius: float
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return the distance to points (..., 3), negative inside."""
+        """Return the distance to points.
+
+        Parameters
+        ----------
+        points : (..., 3) ndarray
+            Places.
+
+        Returns
+        -------
+        (...) ndarray
+            Distances, negative inside.
+        """
         start, axis = np.array(self.start), np.subtract(self.end, self.start)
         away = points - start
         along = np.clip(away @ axis / max(float(axis @ axis), 1e-12), 0, 1)
@@ -69,7 +80,18 @@ class Ellipsoid:
     axes: tuple[float, float, float]
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Return roughly the distance to points (..., 3), negative inside."""
+        """Return about the distance to points.
+
+        Parameters
+        ----------
+        points : (..., 3) ndarray
+            Places.
+
+        Returns
+        -------
+        (...) ndarray
+            Distances, negative inside.
+        """
         away = (points - np.array(self.centre)) / np.array(self.axes)
         place = np.linalg.norm(away, axis=-1)
         slope = np.linalg.norm(away / np.array(self.axes), axis=-1)
