@@ -7,12 +7,13 @@ Equation: with the visible directions l_k of a view, its visibility V_k, the rad
 surroundings around l_k times the solid angle, and the lamps' irradiance I_j at V_j,
 
     S = sum_k V_k E_k max(n.l_k, 0) / pi + sum_j V_j I_j max(n.l_j, 0) o_j / pi + bounce,
-    image = albedo S (1 - F) + F R occlusion + sum_j V_j I_j D G F / (4 n.v),
+    image = albedo S (1 - E) + E R occlusion + sum_j V_j I_j D G F / (4 n.v),
 
 V_k max(n.l_k, 0) is the same in every light: it is computed once for each view and kept in 8 bits.
 
-with D, G of a GGX lobe widened by the lamp's radius, o the Oren-Nayar factor, F Schlick's, and R
-the surroundings smoothed as wide as the lobe, in the mirror direction. The bounce is a diffuse
+with D, G of a GGX lobe widened by the lamp's radius, o the Oren-Nayar factor, F Schlick's, E what
+the lobe reflects of uniform light (`training.world.reflectance`), and R the surroundings smoothed
+as wide as the lobe, in the mirror direction. The bounce is a diffuse
 estimate from how much of the hemisphere the body itself covers. A coat is a second, sharp lobe.
 Light may also be given as harmonics of the log shading, as SIRFS assumes it: S = exp(Y(n) L).
 
@@ -31,6 +32,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from .reflectance import reflected_share
 from .views import DIRECTIONS, LOWEST, SIDE, View
 
 _SOLID_ANGLE = 2 * math.pi * (1 - LOWEST) / DIRECTIONS
@@ -353,7 +355,8 @@ def light_views(views: ViewBatch, material: Material, lights: Lights) -> LitView
     if len(which):
         through = _seen_through(views.chosen(which), material.chosen(which), lights.chosen(which))
         diffuse = diffuse.index_copy(0, which, through)
-    diffuse = diffuse * (1 - _fresnel(material.front, _cosine(views)))
+    kept = 1 - reflected_share(material.front, _cosine(views), material.alpha.unsqueeze(-1))
+    diffuse = diffuse * kept
     return LitViews(diffuse, gloss, shading, light_coefficients(views, lights))
 
 
@@ -429,7 +432,8 @@ def _mirrored(
     # S. Lagarde, C. de Rousiers 2014: a sharp mirror sees less of what hides half the hemisphere
     power = torch.exp2(-16 * material.alpha.unsqueeze(-1) - 1)
     free = ((cosine + open_share) ** power - 1 + open_share).clamp(0, 1)
-    gloss = _fresnel(material.front, cosine) * _looked_up(lights, mirror, level) * free
+    share = reflected_share(material.front, cosine, material.alpha.unsqueeze(-1))
+    gloss = share * _looked_up(lights, mirror, level) * free
     which = (material.coat > 0).nonzero()[:, 0]
     if len(which):
         sharp = _looked_up(lights.chosen(which), mirror[which], torch.zeros_like(which))

@@ -22,7 +22,7 @@ from .patterns import Atlas
 from .recipes import LAYERS, Recipe
 
 ALPHAS = (0.06, 0.12, 0.2, 0.33, 0.55)  # roughness of the bank's levels
-_WIDE = 0.33  # the level that serves the stored directions, some 20 degrees apart
+_WIDE = 0.16  # the level that serves the stored directions: as wide as they are apart, 20 degrees
 _MOST = 0.95
 
 
