@@ -8,9 +8,9 @@ fitted to the other nine. Predictions are the truth with smooth Gaussian errors:
 deviations are right for each pixel; neighbouring errors are correlated, as those of networks are,
 so the weights that are found are those of predictions calibrated pixel by pixel.
 
-A way is "normals:shading:temperature"; "-" leaves a prediction out. With both normals and
-light, the solver starts once for each of `--domes`; else as usual. Errors are geometric means over
-objects and noises, relative to no prediction at all.
+A way is "normals:shading:temperature"; "-" leaves a prediction out. With normals, the solver starts
+once for each of `--domes`, the factor on the height that they integrate to; else as usual.
+Errors are geometric means over objects and noises, relative to no prediction at all.
 
 Limits: errors of the three predictions are independent here; a network's are not.
 """

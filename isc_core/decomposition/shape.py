@@ -198,6 +198,12 @@ def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, float | N
     """The weights for what was predicted, and the optimiser's tolerance if it is another."""
     normals = task.normal_estimate is not None
     weights = isc_weights(task.settings.illumination, channels, normals_predicted=normals)
+    if (
+        task.settings.uses_predicted_normals
+        and task.shading_estimate is None
+        and task.light_coefficients is None
+    ):
+        return weights, None  # the shape network's normals, whose weight and starts were chosen
     return task.options.prediction_weights.applied(
         weights,
         normals=normals,

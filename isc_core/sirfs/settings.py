@@ -131,18 +131,18 @@ class PredictionWeights:
     Attributes
     ----------
     normals : float
-        Weight of predicted normals (`normal_prior`) that come with either of the other two.
+        Weight of predicted normals (`normal_prior`).
     shading : float
         Weight of predicted log shading (`shading_term`).
     light_temperature : float
         Factor of the predicted light's covariance (`priors.light_posterior`).
     starts : tuple of Start
-        Where both normals and light are predicted, the solver starts here. By default once, with a
-        flat shape under the expected light: errors of predicted normals add up when integrated, and
+        Where normals are predicted, the solver starts here. By default once, with a flat shape
+        under the expected light: errors of predicted normals add up when integrated, and
         from their height the solver found worse minima in fifteen of fifteen comparisons
         (`benchmarks.sirfs.soft_terms`).
     loss_tolerance : float
-        Then the optimiser's, see `LbfgsOptions`.
+        The optimiser's where both normals and light are predicted, see `LbfgsOptions`.
     """
 
     normals: float = 1.5
@@ -161,24 +161,22 @@ class PredictionWeights:
         weights : Weights
             The set without them.
         normals, shading, light : bool
-            What was predicted: normals, log shading and the light's coefficients.
+            What was predicted: normals, log shading and the light's coefficients. The last needs no
+            weight here, since it enters the priors.
 
         Returns
         -------
         weights : Weights
-            Unchanged if neither shading nor light was predicted.
+            The changed set.
         loss_tolerance : float or None
             The optimiser's; None for its own.
         """
-        if not (shading or light):
-            return weights, None
-        if normals:
-            weights = replace(weights, silhouette=self.normals)
         if shading:
             weights = replace(weights, predicted_shading=self.shading)
-        if normals and light:
-            return replace(weights, starts=self.starts), self.loss_tolerance
-        return weights, None
+        if not normals:
+            return weights, None
+        weights = replace(weights, silhouette=self.normals, starts=self.starts)
+        return weights, self.loss_tolerance if light else None
 
 
 def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:

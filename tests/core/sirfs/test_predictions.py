@@ -104,11 +104,12 @@ def test_expected_shading_of_a_prediction() -> None:
     assert expected_shading(None, 3) is None
 
 
-def test_weights_change_only_with_a_new_prediction() -> None:
+def test_weights_follow_what_was_predicted() -> None:
     belief = PredictionWeights(normals=1.5, shading=0.7, loss_tolerance=0.01)
     for illumination, usual in (("natural", ISC_NATURAL), ("laboratory", ISC_LABORATORY)):
         old = isc_weights(illumination, 3, normals_predicted=True)
-        assert belief.applied(old, normals=True, shading=False, light=False) == (old, None)
+        alone = belief.applied(old, normals=True, shading=False, light=False)
+        assert alone == (replace(old, silhouette=1.5, starts=belief.starts), None)
         full, tolerance = belief.applied(old, normals=True, shading=True, light=True)
         assert (full.silhouette, full.predicted_shading, tolerance) == (1.5, 0.7, 0.01)
         assert full.starts == (Start(light=1),)
