@@ -267,7 +267,7 @@ def main() -> None:
     options.add_argument("--shading", type=float, default=0.15, help="of log shading")
     options.add_argument("--light", type=float, default=0.3, help="of light coefficients")
     options.add_argument("--domes", default="0", help="starts: factors on the normals' height")
-    options.add_argument("--tolerance", type=float, default=5e-4, help="of the loss, then")
+    options.add_argument("--tolerance", type=float, default=2e-4, help="of the loss, then")
     options.add_argument("--processes", type=int, default=2, help="parallel processes")
     options.add_argument("--json", type=Path, help="JSON file to write")
     given = options.parse_args()

@@ -149,7 +149,7 @@ class PredictionWeights:
     shading: float = 3.0
     light_temperature: float = 1.0
     starts: tuple[Start, ...] = (Start(light=1),)
-    loss_tolerance: float = 5e-4
+    loss_tolerance: float = 2e-4
 
     def applied(
         self, weights: Weights, *, normals: bool, shading: bool, light: bool
