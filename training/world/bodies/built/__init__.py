@@ -11,7 +11,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..geometry.surface import Surface
+from ..geometry.surface import Surface, in_fixed_order
 from . import (
     booleans,
     boxes,
@@ -79,4 +79,5 @@ def build(kind: str, number: int) -> Surface:
     """
     if kind not in _MAKERS:
         raise InputError(f"unknown kind of body {kind!r}: choose {', '.join(_MAKERS)}")
-    return _MAKERS[kind](np.random.default_rng([crc32(b"built"), crc32(kind.encode()), number]))
+    rng = np.random.default_rng([crc32(b"built"), crc32(kind.encode()), number])
+    return in_fixed_order(_MAKERS[kind](rng))

@@ -14,6 +14,7 @@ import numpy as np
 
 TOLERANCE = 1e-5  # relative to the longest side
 _NO_AREA = 1e-12  # relative to the longest side squared
+_DECIMALS = 6
 
 
 @dataclass(frozen=True)
@@ -128,3 +129,29 @@ def together(surfaces: Sequence[Surface]) -> Surface:
     starts = np.cumsum([0, *(len(one.vertices) for one in surfaces)])
     faces = [one.faces + start for one, start in zip(surfaces, starts, strict=False)]
     return Surface(np.concatenate([one.vertices for one in surfaces]), np.concatenate(faces))
+
+
+def in_fixed_order(surface: Surface) -> Surface:
+    """Round the vertices and order them and the faces by their values.
+
+    Libraries that work on several threads return the same triangles in another order each time,
+    with other last digits.
+
+    Parameters
+    ----------
+    surface : Surface
+        Of about unit size.
+
+    Returns
+    -------
+    Surface
+        The same triangles, each from its lowest vertex on.
+    """
+    vertices = np.round(surface.vertices, _DECIMALS) + 0.0  # no negative zeros
+    order = np.lexsort(vertices.T)
+    place = np.empty(len(order), int)
+    place[order] = np.arange(len(order))
+    faces = place[surface.faces]
+    turn = (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3
+    faces = np.take_along_axis(faces, turn, 1)
+    return Surface(vertices[order], faces[np.lexsort(faces.T)])
