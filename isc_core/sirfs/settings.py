@@ -139,7 +139,7 @@ class PredictionWeights:
     starts : tuple of Start
         Where normals are predicted, the solver starts here. By default once, with a flat shape
         under the expected light: errors of predicted normals add up when integrated, and
-        from their height the solver found worse minima in fifteen of fifteen comparisons
+        from their height the solver ended with larger errors in fifteen of fifteen comparisons
         (`benchmarks.sirfs.soft_terms`).
     loss_tolerance : float
         The optimiser's where both normals and light are predicted, see `LbfgsOptions`.
