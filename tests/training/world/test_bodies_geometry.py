@@ -10,7 +10,13 @@ from training.world.bodies.geometry.forms import ball, placed, revolved, rounded
 from training.world.bodies.geometry.implicit import Ellipsoid, Limb, blended
 from training.world.bodies.geometry.noise import cells, facets, fractal, noise
 from training.world.bodies.geometry.parts import largest_piece
-from training.world.bodies.geometry.surface import Surface, fitted, together, welded
+from training.world.bodies.geometry.surface import (
+    Surface,
+    fitted,
+    in_fixed_order,
+    together,
+    welded,
+)
 from training.world.bodies.geometry.winding import consistently_wound
 
 CUBE = rounded_box(np.ones(3), 0.0, 1)
@@ -121,3 +127,15 @@ def test_cells_are_distances() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (500, 3))
     nearest, gap = cells(points, 0.2, np.random.default_rng(1))
     assert (nearest >= 0).all() and (gap >= 0).all() and nearest.max() < np.sqrt(3) * 1.5
+
+
+def test_a_fixed_order_undoes_any_other() -> None:
+    surface, rng = ball(5), np.random.default_rng(0)
+    order = rng.permutation(len(surface.vertices))
+    vertices = np.empty_like(surface.vertices)
+    vertices[order] = surface.vertices + 1e-12
+    faces = np.roll(order[surface.faces][rng.permutation(len(surface.faces))], 1, axis=1)
+    first, second = in_fixed_order(surface), in_fixed_order(Surface(vertices, faces))
+    assert np.array_equal(first.vertices, second.vertices)
+    assert np.array_equal(first.faces, second.faces)
+    assert volume(first) == pytest.approx(volume(surface), rel=1e-4)
