@@ -11,10 +11,10 @@ surroundings around l_k times the solid angle, and the lamps' irradiance I_j at 
 
 V_k max(n.l_k, 0) is the same in every light: it is computed once for each view and kept in 8 bits.
 
-with D, G of a GGX lobe widened by the lamp's radius, o the Oren-Nayar factor, F Schlick's, E what
-the lobe reflects of uniform light (`training.world.reflectance`), and R the surroundings smoothed
-as wide as the lobe, in the mirror direction. The bounce is a diffuse
-estimate from how much of the hemisphere the body itself covers. A coat is a second, sharp lobe.
+with D, G of a GGX lobe, D averaged over the lamp's disc, o the Oren-Nayar factor, F Schlick's, E
+what the lobe reflects of uniform light (`training.world.reflectance`), and R the surroundings
+smoothed as wide as the lobe, in the mirror direction. The bounce is a diffuse estimate from how
+much of the hemisphere the body itself covers. A coat is a second, sharp lobe.
 Light may also be given as harmonics of the log shading, as SIRFS assumes it: S = exp(Y(n) L).
 
 Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (GGX); C. Schlick 1994,
@@ -22,7 +22,8 @@ doi:10.1111/1467-8659.1330233 (F); M. Oren, S. K. Nayar 1994, doi:10.1145/192161
 surroundings smoothed beforehand: W. Heidrich, H.-P. Seidel 1999, doi:10.1145/311535.311554.
 
 Limits: lamps cast the shadow of the nearest stored direction; Oren-Nayar holds for lamps alone;
-what mirrors see of the body itself is estimated from the hemisphere that the body covers.
+what mirrors see of the body itself is estimated from the hemisphere that the body covers; lobes of
+mirrored surroundings do not end at the surface's horizon.
 """
 
 import math
@@ -374,7 +375,7 @@ def _as_given(
 
 def _irradiances(views: ViewBatch, lights: Lights) -> torch.Tensor:
     """Irradiance over pi (B, DIRECTIONS, 3) of each stored direction: surroundings, wide lamps."""
-    last = torch.full_like(lights.given, len(lights.alphas) - 1).long()
+    last = torch.full_like(lights.given, len(lights.alphas) - 1)[:, None]
     around = _looked_up(lights, views.directions, last) * (_SOLID_ANGLE / math.pi)
     for k in range(lights.lamp.shape[1]):
         wide = (_is_wide(lights, k) & (lights.power[:, k].amax(-1) > 0)).nonzero()[:, 0]
@@ -408,17 +409,26 @@ def _nearness(directions: torch.Tensor, lights: Lights, k: int) -> torch.Tensor:
 
 
 def _looked_up(lights: Lights, directions: torch.Tensor, level: torch.Tensor) -> torch.Tensor:
-    """Radiance (B, M, 3) of the surroundings, smoothed to a level (B,), in directions (B, M, 3)."""
-    maps = lights.surroundings[torch.arange(len(level), device=level.device), level]
-    rows, columns = maps.shape[2:]
+    """Radiance (B, M, 3) of the surroundings in directions (B, M, 3), smoothed to levels (B, M)."""
+    maps = lights.surroundings.transpose(1, 2)
+    levels, rows, columns = maps.shape[2:]
     maps = torch.cat([maps[..., -1:], maps, maps[..., :1]], dim=-1)
     x, y, z = (directions @ lights.turn.mT).unbind(-1)
     row = torch.acos(y.clamp(-1, 1)) * (2 / math.pi) - 1
     column = torch.remainder(torch.atan2(x, -z) * (rows / math.pi), columns)
-    place = torch.stack([(column + 1) * (2 / (columns + 2)) - 1, row], dim=-1)
+    depth = (level.expand_as(row) + 0.5) * (2 / levels) - 1
+    place = torch.stack([(column + 1) * (2 / (columns + 2)) - 1, row, depth], dim=-1)
     return functional.grid_sample(
-        maps, place[:, :, None], padding_mode="border", align_corners=False
-    )[..., 0].mT
+        maps, place[:, :, None, None], padding_mode="border", align_corners=False
+    )[..., 0, 0].mT
+
+
+def _level_of(alpha: torch.Tensor, alphas: torch.Tensor) -> torch.Tensor:
+    """Level, between two in general, that is smoothed for a roughness."""
+    known, wanted = torch.log(alphas), torch.log(alpha)
+    above = torch.bucketize(wanted, known).clamp(1, len(known) - 1)
+    low, high = known[above - 1], known[above]
+    return above - 1 + ((wanted - low) / (high - low)).clamp(0, 1)
 
 
 def _mirrored(
@@ -427,8 +437,8 @@ def _mirrored(
     """Gloss (B, P, 3) of the surroundings: of the surface and of its coat."""
     cosine = _cosine(views)
     mirror = 2 * cosine * views.normal - views.toward
-    steps = torch.log(material.alpha.mean(1, keepdim=True) / lights.alphas[:-1])
-    level = steps.abs().argmin(1)
+    # mirrored, a facet's turn sideways counts less the more the surface is inclined
+    level = _level_of(material.alpha * torch.sqrt(cosine[..., 0]), lights.alphas[:-1])
     # S. Lagarde, C. de Rousiers 2014: a sharp mirror sees less of what hides half the hemisphere
     power = torch.exp2(-16 * material.alpha.unsqueeze(-1) - 1)
     free = ((cosine + open_share) ** power - 1 + open_share).clamp(0, 1)
@@ -436,7 +446,7 @@ def _mirrored(
     gloss = share * _looked_up(lights, mirror, level) * free
     which = (material.coat > 0).nonzero()[:, 0]
     if len(which):
-        sharp = _looked_up(lights.chosen(which), mirror[which], torch.zeros_like(which))
+        sharp = _looked_up(lights.chosen(which), mirror[which], torch.zeros_like(cosine[:1, :, 0]))
         coat = _fresnel(material.coat[which, None, None], cosine[which])
         gloss = gloss.index_add(0, which, coat * sharp * open_share[which])
     return gloss
@@ -461,15 +471,15 @@ def _lamp(
     rough = _oren_nayar(material.sigma[:, None, None], aside, torch.maximum(level, cosine))
     leaning = (views.normal * half).sum(-1, keepdim=True).clamp(0, 1) ** 2
     incidence = (views.toward * half).sum(-1, keepdim=True)
-    spread = torch.tan(lights.radius[:, k, None, None]) ** 2 / 4
+    spread = torch.tan(lights.radius[:, k, None, None]) ** 2 / (4 * incidence.clamp(min=0.1))
     lobes = [(material.alpha.unsqueeze(-1), material.front)]
     if bool((material.coat > 0).any()):
         lobes.append((torch.full_like(cosine, _COAT), material.coat[:, None, None]))
     gloss = torch.zeros_like(power)
     for alpha, front in lobes:
-        square = alpha**2 + spread
-        shape = square / (leaning * (square - 1) + 1) ** 2
+        square = alpha**2
         hidden = _masking(cosine, square) * _masking(level.clamp(min=_STEEPEST), square)
+        shape = _facing_disc(square, leaning, spread)
         gloss = gloss + _fresnel(front, incidence) * (shape * hidden / (4 * cosine))
     alone = (~_is_wide(lights, k)).to(power.dtype)[:, None, None]
     return alone * power * (level * rough), power * gloss
@@ -488,6 +498,22 @@ def _masking(cosine: torch.Tensor, square: torch.Tensor) -> torch.Tensor:
     return 2 * cosine / (cosine + torch.sqrt(square + (1 - square) * cosine**2))
 
 
+def _facing_disc(square: torch.Tensor, leaning: torch.Tensor, spread: torch.Tensor) -> torch.Tensor:
+    """pi times the density of GGX facets, averaged over a disc of slopes.
+
+    `square` is the squared roughness, `leaning` the squared cosine of the half vector, `spread` the
+    disc's squared radius. The integral of square / (pi (square + t^2)^2) is closed; its two forms
+    avoid differences of nearly equal numbers in and around the disc.
+    """
+    slope = 1 / leaning.clamp(min=1e-4) - 1
+    width = square + slope
+    root = torch.sqrt((width + spread) ** 2 - 4 * slope * spread)
+    apart = width - spread
+    outside = 2 * square / (root * (root + apart.clamp(min=0)))
+    inside = (root - apart) / (2 * root * spread)
+    return torch.where(apart > 0, outside, inside) / leaning.clamp(min=1e-4) ** 2
+
+
 def _oren_nayar(sigma: torch.Tensor, aside: torch.Tensor, steep: torch.Tensor) -> torch.Tensor:
     square = sigma**2
     first, second = 1 - 0.5 * square / (square + 0.33), 0.45 * square / (square + 0.09)
@@ -498,7 +524,7 @@ def _seen_through(views: ViewBatch, material: Material, lights: Lights) -> torch
     """Surroundings (B, P, 3) behind a body of glass, bent by its front and tinted by its depth."""
     bent = -views.toward - 0.4 * views.normal
     bent = bent / bent.norm(dim=-1, keepdim=True)
-    behind = _looked_up(lights, bent, torch.zeros_like(lights.lamp[:, 0]))
+    behind = _looked_up(lights, bent, torch.zeros_like(bent[..., 0]))
     return behind * torch.exp(-2 * views.thickness.unsqueeze(-1) * (1 - material.albedo))
 
 
