@@ -179,6 +179,8 @@ def shipped_files(source: Path) -> Iterator[Path]:
 def renamed_project(text: str) -> str:
     """Return pyproject.toml with the names of the wheel in its entry points.
 
+    Entry points of packages that the wheel leaves out are left out with them.
+
     Parameters
     ----------
     text : str
@@ -189,8 +191,10 @@ def renamed_project(text: str) -> str:
     str
     """
     for group in tomllib.loads(text)["project"]["entry-points"].values():
-        for reference in group.values():
-            folder, dot, rest = reference.partition(".")
+        for command, reference in group.items():
+            folder, dot, rest = re.match(r"(\w+)([.:])(.*)", reference).groups()
+            if folder not in PACKAGES:
+                text = text.replace(f'{command} = "{reference}"\n', "")
             name = _RENAMED.get(folder, folder)
             text = text.replace(f'"{reference}"', f'"{name}{dot}{rest}"')
     return text

@@ -1,9 +1,11 @@
-"""How strong should predicted normals, shading and light be in SIRFS? With simulated predictions.
+"""How strong should predicted normals, shading and light be in SIRFS?
 
   python -m benchmarks.sirfs.soft_terms --data FOLDER --names cup1,frog1 --json weights.json
+  python -m benchmarks.sirfs.soft_terms --data FOLDER --names all --weights SCENE.npz
 
 FOLDER is `mit_berkeley_train`. Each object is solved by the protocol of the reference, with priors
-fitted to the other nine. Predictions are the truth with smooth Gaussian errors: normals off by
+fitted to the other nine. With `--weights`, predictions are those of a scene network from these
+weights. Else they are simulated: the truth with smooth Gaussian errors, normals off by
 `--degrees` on average, log shading by `--shading`, light coefficients by `--light`. Their stated
 deviations are right for each pixel; neighbouring errors are correlated, as those of networks are,
 so the weights that are found are those of predictions calibrated pixel by pixel.
@@ -28,6 +30,7 @@ from isc_core.decomposition.models import solve
 from isc_core.decomposition.task import DecompositionTask
 from isc_core.evaluation.metrics import score, truth_normal
 from isc_core.evaluation.runner import RunnerOptions, reference_task
+from isc_core.networks.scene_network import SceneNetwork, predict_scene
 from isc_core.prior_fitting.fit import FitOptions, fit_priors
 from isc_core.prior_fitting.statistics import collect_statistics
 from isc_core.prior_fitting.training_objects import read_training_objects
@@ -80,6 +83,7 @@ class Job:
     starts: tuple[Start, ...]
     tolerance: float
     priors: PriorSet
+    weights: Path | None = None
 
 
 def run_job(job: Job) -> tuple[Job, list[float], int]:
@@ -120,14 +124,14 @@ def run_job(job: Job) -> tuple[Job, list[float], int]:
 def with_predictions(
     task: DecompositionTask, truth: MitBerkeleyObject, job: Job
 ) -> DecompositionTask:
-    """Add the simulated predictions of a job's way to a task.
+    """Add the predictions of a job's way to a task.
 
     Parameters
     ----------
     task : DecompositionTask
         Without predictions.
     truth : MitBerkeleyObject
-        The truth that they are near.
+        The object.
     job : Job
         Way and noise.
 
@@ -135,19 +139,9 @@ def with_predictions(
     -------
     DecompositionTask
     """
-    rng = np.random.default_rng([job.number, LIGHTS.index(job.illumination)])
-    normal = truth_normal(truth.height)
-    known = truth.valid & np.isfinite(normal).all(axis=-1) & (truth.shading > 0).all(axis=-1)
-    normal = np.where(known[..., None], normal, 0)
-    seen = noisy_normals(normal, known, job.noise.degrees, rng)
-    light = light_from_reference(truth.light)
-    error = job.noise.shading * _smooth(known, 3, rng)
-    exact = np.log(np.where(known[..., None], truth.shading, 1))  # shadows and all
-    shading = np.where(known[..., None], exact + error, 0)
-    predicted = ShadingEstimate(shading, np.where(known, job.noise.shading, 0))
-    covariance = job.noise.light**2 * np.kron(0.8 + 0.2 * np.eye(3), np.eye(9))
-    off = np.linalg.cholesky(covariance) @ rng.standard_normal(27)
-    lit = LightCoefficientsEstimate(light + off.reshape(3, 9).T, covariance)
+    seen, predicted, lit = (
+        simulated(truth, job) if job.weights is None else of_network(truth, job.weights)
+    )
     parts = [None if part == "-" else float(part) for part in job.way.split(":")]
     of, given = task.options.prediction_weights, [part is not None for part in parts]
     chosen = replace(
@@ -165,6 +159,56 @@ def with_predictions(
         light_coefficients=lit if given[2] else None,
         options=replace(task.options, prediction_weights=chosen),
     )
+
+
+def of_network(
+    truth: MitBerkeleyObject, weights: Path
+) -> tuple[NormalEstimate, ShadingEstimate, LightCoefficientsEstimate]:
+    """Predict normals, shading and light by a scene network.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        Its image is read.
+    weights : Path
+        Archive of the network.
+
+    Returns
+    -------
+    NormalEstimate, ShadingEstimate, LightCoefficientsEstimate
+    """
+    found = predict_scene(truth.image, truth.mask, SceneNetwork.read(weights))
+    return found.normals, found.shading, found.light
+
+
+def simulated(
+    truth: MitBerkeleyObject, job: Job
+) -> tuple[NormalEstimate, ShadingEstimate, LightCoefficientsEstimate]:
+    """Simulate predictions near the truth.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+    job : Job
+        Number and size of the noise.
+
+    Returns
+    -------
+    NormalEstimate, ShadingEstimate, LightCoefficientsEstimate
+    """
+    rng = np.random.default_rng([job.number, LIGHTS.index(job.illumination)])
+    normal = truth_normal(truth.height)
+    known = truth.valid & np.isfinite(normal).all(axis=-1) & (truth.shading > 0).all(axis=-1)
+    normal = np.where(known[..., None], normal, 0)
+    seen = noisy_normals(normal, known, job.noise.degrees, rng)
+    light = light_from_reference(truth.light)
+    error = job.noise.shading * _smooth(known, 3, rng)
+    exact = np.log(np.where(known[..., None], truth.shading, 1))  # shadows and all
+    shading = np.where(known[..., None], exact + error, 0)
+    predicted = ShadingEstimate(shading, np.where(known, job.noise.shading, 0))
+    covariance = job.noise.light**2 * np.kron(0.8 + 0.2 * np.eye(3), np.eye(9))
+    off = np.linalg.cholesky(covariance) @ rng.standard_normal(27)
+    return seen, predicted, LightCoefficientsEstimate(light + off.reshape(3, 9).T, covariance)
 
 
 def noisy_normals(
@@ -229,7 +273,18 @@ def jobs(given: argparse.Namespace) -> list[Job]:
     for name in statistics if given.names == "all" else names:
         priors = fit_priors(without(statistics, name), lights, FitOptions())
         made += [
-            Job(given.data, name, illumination, way, number, noise, starts, stop, priors)
+            Job(
+                given.data,
+                name,
+                illumination,
+                way,
+                number,
+                noise,
+                starts,
+                stop,
+                priors,
+                given.weights,
+            )
             for illumination in LIGHTS
             for way in given.ways.split(",")
             for number in range(given.noises if way != "-:-:-" else 1)
@@ -261,6 +316,7 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--data", type=Path, required=True, help="folder mit_berkeley_train")
     options.add_argument("--names", default="cup1,frog1,panther", help='objects, or "all"')
+    options.add_argument("--weights", type=Path, help="archive of a scene network")
     options.add_argument("--ways", default=WAYS, help="comma-separated, see above")
     options.add_argument("--noises", type=int, default=1, help="noises per object and light")
     options.add_argument("--degrees", type=float, default=18.0, help="of normals")

@@ -28,10 +28,10 @@ from isc_core.io.npy import read_arrays
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
 from ..world.environments import read_panoramas
-from ..world.files import Split, views_in
+from ..world.files import Split, read_patterns, views_in
 from ..world.invented_environments import invented_room, invented_sky, studio
 from ..world.lighting import PreparedView, prepared
-from ..world.patterns import Atlas, make_atlas
+from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
 from ..world.samples import Draw, Sample, draw_batch, finish_batch
@@ -42,7 +42,6 @@ SCHEDULE = Schedule(
 )
 _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
-_PATTERNS = 1500
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
     "prints": {"printed": 0.0},
@@ -156,7 +155,7 @@ def read_world(
     invented = [
         make(rng) for _ in range(_INVENTED) for make in (invented_room, invented_sky, studio)
     ]
-    atlas = make_atlas(seed, _PATTERNS)
+    atlas = read_patterns(folders[0])
     bank = bank_of([*(one.radiance for one in found), *invented], atlas)
     judged = np.array([one.judged for one in found] + [False] * len(invented))
     photographed = np.flatnonzero(~judged[: len(found)])

@@ -20,7 +20,18 @@ from isc_core.io.atomic import new_file
 from isc_core.progress import Monitor
 
 from .bodies.sources import BodyFolders, BodyReference, body_names
-from .files import CREDITS, VIEWS, WorldSettings, claim_folder, read_views, write_views
+from .files import (
+    CREDITS,
+    PATTERN_COUNT,
+    PATTERNS,
+    VIEWS,
+    WorldSettings,
+    claim_folder,
+    read_views,
+    write_patterns,
+    write_views,
+)
+from .patterns import make_atlas
 from .views import View, trace_view
 
 _TASKS = 200  # of a worker process, before a fresh one takes over: Blender's memory grows
@@ -66,6 +77,9 @@ def build_world(
         raise InputError("the list of bodies is empty: name a folder of bodies or a number")
     claim_folder(folder, settings)
     paths = [folder / VIEWS / f"{k:05d}.npz" for k in range(len(references))]
+    if not (folder / PATTERNS).exists():
+        monitor.report("patterns", 0)
+        write_patterns(folder, make_atlas(settings.seed, PATTERN_COUNT))
     missing = [k for k, path in enumerate(paths) if not path.exists()]
     done = len(references) - len(missing)
     for _ in _built(missing, references, paths, settings, workers, monitor):

@@ -2,6 +2,7 @@
 
     DIR/world.json            format, seed, number of views of a body
     DIR/views/NUMBER.npz      the views of one reference, `View` by `View`; or why it has none
+    DIR/patterns.npz          the patterns that bodies are painted with
     DIR/CREDITS.txt           authors and licences of all bodies with views
 
 Splits: all that one reference gives lies in one set. `SOURCE` holds sources that nothing learns
@@ -23,10 +24,12 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
+from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
 FORMAT = 1
 SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
+PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
 HELD_OUT_SOURCES = ("scan/", "furniture/Reallusion", "furniture/KatorLegaz")
 _PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions")
@@ -110,6 +113,45 @@ def claim_folder(folder: Path, settings: WorldSettings) -> None:
             f"{folder} holds a world of other settings ({found}, not {settings.as_json()}): "
             "choose another folder or the same settings"
         )
+
+
+def write_patterns(folder: Path, atlas: Atlas) -> None:
+    """Write the patterns of a world.
+
+    Parameters
+    ----------
+    folder : Path
+    atlas : Atlas
+    """
+    with new_file(folder / PATTERNS) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, maps=atlas.maps, kinds=atlas.kinds, tileable=atlas.tileable)
+
+
+def read_patterns(folder: Path) -> Atlas:
+    """Read the patterns of a world.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    Atlas
+
+    Raises
+    ------
+    InputError
+        If there are none, or the file is damaged.
+    """
+    path = folder / PATTERNS
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            atlas = Atlas(data["maps"], data["kinds"], data["tileable"])
+    except (ValueError, KeyError, OSError, BadZipFile, EOFError) as error:
+        raise InputError(f"{path} cannot be read: {error}; delete it and build again") from error
+    if atlas.maps.ndim != 3 or len(atlas.kinds) != len(atlas.maps) or not len(atlas.maps):
+        raise InputError(f"{path} holds no patterns: delete it and build again")
+    return atlas
 
 
 def write_views(path: Path, reference: str, views: list[View], reason: str) -> None:
