@@ -6,13 +6,14 @@ do to a picture has to vary as it does outside.
 Equation: light is scaled by the exposure, blurred and sharpened by an unsharp mask, gets noise of
 variance (a I + b)^2, is clipped to [0, 1], and passed through sRGB's curve with a contrast
 t -> t + c t (1 - t) (2 t - 1). JPEG quantises the discrete cosine transform of blocks of 8 x 8 with
-the tables of its standard's annex K, scaled by the quality. Then sRGB is undone, as a reader of the
-file does.
+the tables of its standard's annex K, scaled by the quality; subsampled colours are averaged over
+2 x 2 pixels and interpolated, as most programs do. Then sRGB is undone, as a reader of the file
+does.
 
 Citation: ITU-T T.81 (1992), annex K (quantisation tables); E. Hamilton, "JPEG File Interchange
 Format" (1992) (colour transform and scaling); IEC 61966-2-1 (sRGB).
 
-Limits: noise is Gaussian and white. Subsampled colours are averaged 2 x 2 and repeated.
+Limits: noise is Gaussian and white.
 """
 
 import math
@@ -218,17 +219,17 @@ def through_jpeg(
     (B, 3, H, W) tensor
         In [0, 1], 8 bits.
     """
-    colours = torch.einsum("dc,bchw->bdhw", _ycc().to(tone), tone * 255)
+    colours = torch.einsum("dc,bchw->bdhw", _ycc().to(tone), tone * 255).round()
     luma, chroma = colours[:, :1] - 128, colours[:, 1:]
     coarse = functional.avg_pool2d(chroma, 2)
     scale = torch.where(quality < 50, 5000 / quality, 200 - 2 * quality)[:, None] / 100
     luma = _quantised(luma, _table(_LUMA).to(tone), scale) + 128
     table = _table(_CHROMA).to(tone)
     fine, coarse = _quantised(chroma, table, scale), _quantised(coarse, table, scale)
-    coarse = functional.interpolate(coarse, scale_factor=2, mode="nearest")
+    coarse = functional.interpolate(coarse, scale_factor=2, mode="bilinear", align_corners=False)
     chroma = torch.where(subsampled[:, None, None, None] > 0, coarse, fine)
     found = torch.einsum(
-        "dc,bchw->bdhw", torch.linalg.inv(_ycc()).to(tone), torch.cat([luma, chroma], 1)
+        "dc,bchw->bdhw", torch.linalg.inv(_ycc()).to(tone), torch.cat([luma, chroma], 1).round()
     )
     return found.round().clamp(0, 255) / 255
 
@@ -236,7 +237,8 @@ def through_jpeg(
 def _quantised(layers: torch.Tensor, table: torch.Tensor, scale: torch.Tensor) -> torch.Tensor:
     batch, channels, rows, columns = layers.shape
     cosine = _cosines().to(layers)
-    step = (table * scale).clamp(min=1, max=255).view(batch, 1, 1, 1, BLOCK, BLOCK)
+    whole = torch.floor(table * scale + 0.5001)  # whole numbers, as files hold them
+    step = whole.clamp(min=1, max=255).view(batch, 1, 1, 1, BLOCK, BLOCK)
     # both transforms as long products with one small matrix: fast, unlike one a block
     blocks = layers.reshape(-1, columns // BLOCK, BLOCK) @ cosine.T
     blocks = blocks.view(batch, channels, rows // BLOCK, BLOCK, columns // BLOCK, BLOCK)
