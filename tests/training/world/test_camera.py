@@ -70,7 +70,7 @@ def test_a_camera_that_does_nothing_changes_nothing() -> None:
 def test_a_file_of_high_quality_keeps_the_light() -> None:
     light, mask = picture(), torch.ones(1, 1, 64, 64)
     filed = photographed(light, mask, attributes(CameraDraw(1, 0, 0, 0, 0, 0, 100, 0, 1)))
-    assert (filed - light).abs().max() < 0.04 and (filed - light).abs().mean() < 0.003
+    assert (filed - light).abs().max() < 0.04 and (filed - light).abs().mean() < 0.006
 
 
 @pytest.mark.parametrize(

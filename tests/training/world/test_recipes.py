@@ -1,0 +1,123 @@
+"""Recipes are those that the shares ask for, and paint what they say."""
+
+import math
+from enum import IntEnum
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+import torch
+
+from tests.training.world.analytic_views import ellipsoid_view
+from training.world.lighting import batch_of, prepared
+from training.world.patterns import Atlas
+from training.world.pictures import Bank, lights_of, lit_pictures, material_of, stacked
+from training.world.recipes import (
+    LAMPS,
+    Kind,
+    LightKind,
+    Paint,
+    Recipe,
+    Shares,
+    draw_recipe,
+    lamp_places,
+)
+from training.world.views import spread_directions
+
+MAPS = 14
+DIRECTIONS = spread_directions(np.random.default_rng(0))
+GREY = np.random.default_rng(0).integers(0, 256, (MAPS, 8, 8)).astype(np.uint8)
+ATLAS = Atlas(GREY, np.arange(MAPS).astype(np.uint8), np.ones(MAPS, bool))
+
+
+def bank() -> Bank:
+    maps = torch.rand(3, 6, 3, 8, 16, generator=torch.Generator().manual_seed(0))
+    return Bank(maps, torch.from_numpy(ATLAS.maps[:, None]).float() / 255)
+
+
+def only(kind: type[IntEnum], one: int) -> tuple[float, ...]:
+    return tuple(float(each == one) for each in kind)
+
+
+def drawn(seed: int, shares: Shares, count: int = 40) -> list[Recipe]:
+    rng = np.random.default_rng(seed)
+    return [draw_recipe(DIRECTIONS, ATLAS, np.array([0, 2]), rng, shares) for _ in range(count)]
+
+
+def test_recipes_are_possible_and_repeat_with_the_seed() -> None:
+    for one, again in zip(drawn(1, Shares()), drawn(1, Shares()), strict=True):
+        for name, value in vars(one).items():
+            np.testing.assert_array_equal(value, getattr(again, name))
+        for name in ("base", "colours", "strengths", "front"):
+            assert (getattr(one, name) >= 0).all() and (getattr(one, name) <= 1).all()
+        assert 0.02 < one.alpha < 0.7 and one.environment in (0, 2)
+        assert (one.maps < MAPS).all() and np.isfinite(one.frames).all()
+        np.testing.assert_allclose(one.turn @ one.turn.T, np.eye(3), atol=1e-9)
+        assert (one.power >= 0).all() and (one.ambient > 0).all() and (one.distance > 1.5).all()
+
+
+@pytest.mark.parametrize("light", LightKind)
+def test_lamps_are_as_many_as_the_kind_of_light_says(light: LightKind) -> None:
+    counts = {
+        LightKind.HARMONICS: {0},
+        LightKind.AROUND: {0},
+        LightKind.ONE_LAMP: {1},
+        LightKind.LAMPS: {2, 3, 4},
+        LightKind.LABORATORY: {1},
+    }
+    recipes = drawn(2, Shares(kinds=(1, 0, 0), lights=only(LightKind, light)))
+    found = {int((one.power.max(1) > 0).sum()) for one in recipes}
+    assert found == counts[light]
+    assert {one.given for one in recipes} == {float(light == LightKind.HARMONICS)}
+
+
+def test_what_an_ablation_sets_to_zero_does_not_occur() -> None:
+    plain = Shares(kinds=(1, 0, 0), paints=only(Paint, Paint.FEW), printed=0, matte=1, coated=0)
+    for one in drawn(3, plain):
+        assert one.kind == Kind.OPAQUE and one.strengths[2] == 0
+        assert not one.front.any() and one.coat == 0
+
+
+def test_mirrors_and_glass_are_lit_by_their_surroundings() -> None:
+    for kind in (Kind.MIRROR, Kind.GLASS):
+        for one in drawn(4, Shares(kinds=only(Kind, kind))):
+            assert one.kind == kind and one.given == 0 and one.coat == 0
+    assert all(one.front.min() > 0.1 for one in drawn(4, Shares(kinds=only(Kind, Kind.MIRROR))))
+
+
+def test_lamps_are_apart_and_the_first_is_in_front() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        places = lamp_places(DIRECTIONS, rng, LAMPS)
+        towards = DIRECTIONS[places]
+        assert len(set(places.tolist())) == LAMPS and towards[0, 2] > 0.17
+        apart = (towards @ towards.T)[np.triu_indices(LAMPS, 1)]
+        assert apart.max() < math.cos(math.radians(30)) and towards[:, 2].min() > -0.3
+
+
+def test_painted_views_are_what_the_recipes_say() -> None:
+    recipes = drawn(5, Shares(), 6)
+    views = batch_of([prepared(ellipsoid_view(np.random.default_rng(k))) for k in range(6)])
+    numbers = stacked(recipes)
+    material, lights = material_of(views, numbers, bank()), lights_of(numbers, bank())
+    assert material.albedo.min() >= 0 and material.albedo.max() <= 0.95
+    assert material.alpha.min() >= 0.03 and material.alpha.max() <= 0.8
+    for k, one in enumerate(recipes):
+        if one.kind == Kind.MIRROR:
+            assert not material.albedo[k].any()
+        elif not one.strengths.any():
+            np.testing.assert_allclose(material.albedo[k, 0], one.base, rtol=1e-6)
+            assert (material.albedo[k] == material.albedo[k, :1]).all()
+        np.testing.assert_allclose(lights.power[k], one.power, rtol=1e-6)
+    lit = lit_pictures(views, numbers, bank())
+    for part in (lit.diffuse, lit.specular, lit.shading, lit.coefficients):
+        assert part.isfinite().all()
+    assert lit.diffuse.min() >= 0 and lit.specular.min() >= 0
+
+
+def test_recipes_without_patterns_at_hand_still_work() -> None:
+    atlas = Atlas(GREY[:1], np.zeros(1, np.uint8), np.ones(1, bool))
+    one = draw_recipe(DIRECTIONS, atlas, np.array([0]), np.random.default_rng(0), Shares())
+    assert (one.maps == 0).all()
