@@ -138,6 +138,8 @@ class SceneNetwork(Network):
     def _fits(self) -> bool:
         if len(self.weights) < 7 or len(self.weights) % 4 != 3:
             return False
+        if any(w.ndim != 3 for w in self.weights) or any(m.ndim != 2 for m in self.dense):
+            return False
         down = 2 * self._levels
         wide = [w.shape[-1] for w in self.weights[1:down:2]]
         shapes, inputs = list[tuple[int, ...]](), 4 * INPUTS
