@@ -13,7 +13,8 @@ each averaged over the object. Batch normalisation follows each convolution and 
 when the weights are written.
 
 Citation: S. Ioffe, C. Szegedy, "Batch normalization", 2015, arXiv:1502.03167; deviations: A.
-Kendall, Y. Gal 2017, arXiv:1703.04977; initial weights: K. He et al. 2015, doi:10.1109/ICCV.2015.123.
+Kendall, Y. Gal 2017, arXiv:1703.04977; initial weights: K. He et al. 2015,
+doi:10.1109/ICCV.2015.123.
 
 Limits: one deviation for both components of a normal, one scale for three colours.
 """
@@ -44,7 +45,8 @@ from ..world.samples import Sample
 
 WIDTHS = (32, 64, 128, 192, 256)
 HIDDEN = 192
-_MARGIN = 2.0  # as in isc_core.networks.scene_network
+MARGIN = 2.0  # as in isc_core.networks.scene_network
+FACTOR_SCALE = 0.1  # as in isc_core.networks.scene_network
 _DARK = 0.03  # as in isc_core.networks.layers
 
 
@@ -194,6 +196,25 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
         return found
 
+    @classmethod
+    def of(cls, arrays: dict[str, np.ndarray]) -> "SceneNetworkModule":
+        """Build the network of an archive.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            As `arrays` returns them.
+
+        Returns
+        -------
+        SceneNetworkModule
+        """
+        convolutions = sum(name.startswith("weight") for name in arrays)
+        levels = (convolutions + 1) // 4
+        network = cls(tuple(arrays[f"weight{2 * k:02d}"].shape[2] for k in range(levels)))
+        network.load_arrays(arrays)
+        return network
+
     def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:
         """Start from weights in the core's layout.
 
@@ -277,7 +298,7 @@ def _normal_terms(
 def _layer_terms(
     part: dict[Head, torch.Tensor], batch: Sample, share: torch.Tensor
 ) -> dict[str, torch.Tensor]:
-    ratio = functional.softplus(part[Head.RATIO] - _MARGIN)
+    ratio = functional.softplus(part[Head.RATIO] - MARGIN)
     ratio_error = (ratio - batch.ratio).abs()
     difference = part[Head.SHADING] - batch.log_shading
     known = batch.known
@@ -316,7 +337,7 @@ def _light_terms(
     mean, log_scale, factors, counts, places, kinds = vector.split(sizes, dim=1)
     gauss = torch.distributions.LowRankMultivariateNormal(
         mean,
-        0.1 * factors.reshape(-1, LIGHT, FACTORS),
+        FACTOR_SCALE * factors.reshape(-1, LIGHT, FACTORS),
         torch.exp(2 * log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)),
     )
     distance = -gauss.log_prob(batch.light) / LIGHT
