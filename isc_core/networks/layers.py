@@ -146,42 +146,45 @@ def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.concatenate([log_light, mask[..., None].astype(np.float32)], axis=2)
 
 
-def space_to_depth(layer: np.ndarray) -> np.ndarray:
-    """Rearrange each block of 2 x 2 pixels into the channels of one pixel.
+def space_to_depth(layer: np.ndarray, block: int = BLOCK) -> np.ndarray:
+    """Rearrange each block of pixels into the channels of one pixel.
 
     Parameters
     ----------
     layer : (H, W, C) ndarray
-        H and W even.
+        H and W are multiples of `block`.
+    block : int
+        Side of a block, b.
 
     Returns
     -------
-    (H / 2, W / 2, 4 C) ndarray
-        The four pixels of a channel follow each other, row by row; channels come first in the
-        order.
+    (H / b, W / b, b b C) ndarray
+        The pixels of a channel follow each other, row by row; channels come first in the order.
     """
     rows, columns, channels = layer.shape
-    blocks = layer.reshape(rows // 2, 2, columns // 2, 2, channels)
+    blocks = layer.reshape(rows // block, block, columns // block, block, channels)
     return np.ascontiguousarray(blocks.transpose(0, 2, 4, 1, 3)).reshape(
-        rows // 2, columns // 2, 4 * channels
+        rows // block, columns // block, block**2 * channels
     )
 
 
-def depth_to_space(layer: np.ndarray) -> np.ndarray:
-    """Rearrange the channels of each pixel into a block of 2 x 2; inverse of `space_to_depth`.
+def depth_to_space(layer: np.ndarray, block: int = BLOCK) -> np.ndarray:
+    """Rearrange the channels of each pixel into a block of pixels; inverse of `space_to_depth`.
 
     Parameters
     ----------
-    layer : (H, W, 4 C) ndarray
+    layer : (H, W, b b C) ndarray
+    block : int
+        Side of a block, b.
 
     Returns
     -------
-    (2 H, 2 W, C) ndarray
+    (b H, b W, C) ndarray
     """
     rows, columns, channels = layer.shape
-    blocks = layer.reshape(rows, columns, channels // 4, 2, 2)
+    blocks = layer.reshape(rows, columns, channels // block**2, block, block)
     return np.ascontiguousarray(blocks.transpose(0, 3, 1, 4, 2)).reshape(
-        2 * rows, 2 * columns, channels // 4
+        block * rows, block * columns, channels // block**2
     )
 
 

@@ -5,15 +5,15 @@ many lights helps with all of them, and what helps one helps the others: one net
 together, each with its uncertainty.
 
 Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo, each
-half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Each pixel
-gets m (3,), the mean of the probable unit normals, and the deviation of n_x and n_y from it; the
-log ratio y (3,) of image and diffuse image, and its scale; the log shading (3,) of a photo whose
-mean light is 1, and its scale; and the log odds of a depth edge. The coarse feature maps, averaged
-over the object, and their maxima give the light: mean l and covariance D^2 + F F' of the 27
-coefficients of the log shading, the number of lamps, the direction of the strongest, and what the
-object is made of. Photo and mirror image are averaged. y and the shading have Laplace
-distributions, the normals and the light normal ones. Each scale is multiplied by a factor fitted on
-bodies that the weights have not seen.
+half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Pixels go
+in and come out in blocks of 4 x 4 (space to depth). Each pixel gets m (3,), the mean of the
+probable unit normals, and the deviation of n_x and n_y from it; the log ratio y (3,) of image and
+diffuse image, and its scale; the log shading (3,) of a photo whose mean light is 1, and its scale;
+and the log odds of a depth edge. The coarse feature maps, averaged over the object, and their
+maxima give the light: mean l and covariance D^2 + F F' of the 27 coefficients of the log shading,
+the number of lamps, the direction of the strongest, and what the object is made of. Photo and
+mirror image are averaged. y and the shading have Laplace distributions, the normals and the light
+normal ones. Each scale is multiplied by a factor fitted on bodies that the weights have not seen.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; uncertainties: A. Kendall, Y. Gal, "What uncertainties do we need
@@ -52,7 +52,7 @@ from .loader import Network, Parameters
 from .network_input import NetworkInput
 
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
-INPUTS = 6
+INPUTS, BLOCK = 6, 4
 LIGHT, FACTORS = 27, 3
 COUNTS, PLACE_COUNT, KIND_COUNT = 3, 256, 3
 GLOBAL = LIGHT * (2 + FACTORS) + COUNTS + PLACE_COUNT + KIND_COUNT
@@ -142,14 +142,14 @@ class SceneNetwork(Network):
             return False
         down = 2 * self._levels
         wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), 4 * INPUTS
+        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * INPUTS
         for width in wide:
             shapes += [(9, inputs, width), (9, width, width)]
             inputs = width
         for width in wide[-2::-1]:
             shapes += [(9, width + inputs, width), (9, width, width)]
             inputs = width
-        shapes.append((9, inputs, 4 * CHANNELS))
+        shapes.append((9, inputs, BLOCK**2 * CHANNELS))
         hidden = self.dense[0].shape[-1]
         light = [(2 * sum(wide[-COARSE:]), hidden), (hidden, GLOBAL)]
         return (
@@ -204,7 +204,7 @@ class SceneNetwork(Network):
         RawPrediction
         """
         steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, skips = space_to_depth(channels_of(image, mask)), []
+        layer, skips = space_to_depth(channels_of(image, mask), BLOCK), []
         for level in range(self._levels):
             layer = conv_block(layer if level == 0 else average_pool(layer), steps)
             skips.append(layer)
@@ -213,11 +213,11 @@ class SceneNetwork(Network):
             layer = conv_block(
                 np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
             )
-        return RawPrediction(depth_to_space(convolved(layer, *next(steps))), vector)
+        return RawPrediction(depth_to_space(convolved(layer, *next(steps)), BLOCK), vector)
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
-        cover, features = mask.astype(np.float64)[..., None], []
+        cover, features = average_pool(mask.astype(np.float64)[..., None]), []
         for level, layer in enumerate(skips):
             cover = average_pool(cover)
             if level < len(skips) - COARSE:

@@ -78,8 +78,6 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         raise InputError("--views and --workers must be at least 1")
     settings = WorldSettings(options.seed, options.views, options.built, options.families)
     folders = BodyFolders(options.furniture, options.urdfs, options.scans)
-    lines = build_world(
-        options.output, folders, settings, options.count, options.workers, monitor
-    )
+    lines = build_world(options.output, folders, settings, options.count, options.workers, monitor)
     program = "python -m training.networks.scene_network"
     return hints(options, *lines, f"next: {program} {options.output} --panoramas DIR -o SCENE.npz")

@@ -18,7 +18,7 @@ from ..world.lighting import PreparedView, prepared
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
-from ..world.samples import Draw, Sample, draw_batch, finish_batch
+from ..world.samples import PHOTOS, Draw, Sample, draw_batch, finish_batch
 
 _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
@@ -63,7 +63,7 @@ class SceneBatches:
         -------
         Draw or Sample
         """
-        around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, self.size)
+        around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, self.size // PHOTOS)
         chosen = [self.views[int(k) % len(self.views)] for k in around]
         draw = draw_batch(
             chosen, self.atlas, self.environments, rng, self.shares, self.plain_camera

@@ -25,6 +25,7 @@ from torch import nn
 from torch.nn import functional
 
 from isc_core.networks.scene_network import (
+    BLOCK,
     CHANNELS,
     COARSE,
     COUNTS,
@@ -43,7 +44,7 @@ from isc_core.networks.scene_network import (
 
 from ..world.samples import Sample
 
-WIDTHS = (32, 64, 128, 192, 256)
+WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
 MARGIN = 2.0  # as in isc_core.networks.scene_network
 FACTOR_SCALE = 0.1  # as in isc_core.networks.scene_network
@@ -97,13 +98,13 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
         super().__init__()
-        fine = (4 * INPUTS, *widths[:-1])
+        fine = (BLOCK**2 * INPUTS, *widths[:-1])
         self.down = nn.ModuleList(
             [Block(inputs, outputs) for inputs, outputs in zip(fine, widths, strict=True)]
         )
         pairs = list(zip(widths[-2::-1], widths[:0:-1], strict=True))
         self.up = nn.ModuleList([Block(skip + inputs, skip) for skip, inputs in pairs])
-        self.out = nn.Conv2d(widths[0], 4 * CHANNELS, 3, padding=1)
+        self.out = nn.Conv2d(widths[0], BLOCK**2 * CHANNELS, 3, padding=1)
         self.hidden = nn.Linear(2 * sum(widths[-COARSE:]), HIDDEN)
         self.light = nn.Linear(HIDDEN, GLOBAL)
         for module in self.modules():
@@ -128,8 +129,10 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         vector : (B, GLOBAL) tensor
             As `RawPrediction` describes them.
         """
-        cover = inputs[:, 3:4]
-        layer = functional.pixel_unshuffle(inputs, 2).contiguous(memory_format=torch.channels_last)
+        cover = functional.avg_pool2d(inputs[:, 3:4], BLOCK // 2)
+        layer = functional.pixel_unshuffle(inputs, BLOCK).contiguous(
+            memory_format=torch.channels_last
+        )
         skips, features = [], []
         device = inputs.device.type
         with torch.autocast(device, torch.bfloat16, enabled=self.training):
@@ -142,7 +145,7 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
             for block, skip in zip(self.up, skips[-2::-1], strict=True):
                 finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
                 layer = block(torch.cat([skip, finer], 1))
-            maps = functional.pixel_shuffle(self.out(layer), 2).float()
+            maps = functional.pixel_shuffle(self.out(layer), BLOCK).float()
         hidden = functional.relu(self.hidden(torch.cat(features, 1)))
         return maps, self.light(hidden)
 
@@ -286,12 +289,16 @@ def _normal_terms(
     log_scale = part[Head.NORMAL_SCALE].clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)
     squared = error[:, :2].mean(1, keepdim=True).detach()
     likelihood = 0.5 * squared * torch.exp(-2 * log_scale) + log_scale
-    cosine = functional.cosine_similarity(part[Head.NORMAL], batch.normal, dim=1, eps=1e-4)
-    angle = torch.rad2deg(torch.acos(cosine.clamp(-0.9999, 0.9999)))[:, None]
+    with torch.no_grad():  # only to report: one pixel in nine says it as well
+        found, true, known = (
+            one[..., 1::3, 1::3] for one in (part[Head.NORMAL], batch.normal, batch.known)
+        )
+        cosine = functional.cosine_similarity(found, true, dim=1, eps=1e-4)
+        angle = torch.rad2deg(torch.acos(cosine.clamp(-0.9999, 0.9999)))[:, None]
     return {
         "normal": (3 * _mean_over(error, batch.known) * share).mean(),
         "normal_scale": (_mean_over(likelihood, batch.known) * share).mean(),
-        "degrees": _mean_over(angle, batch.known).mean().detach(),
+        "degrees": _mean_over(angle, known).mean(),
     }
 
 

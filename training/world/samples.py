@@ -8,7 +8,7 @@ Limits: resampling is bilinear.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -26,6 +26,7 @@ from .views import SIDE
 
 OUTPUT = 128  # pixels of the network's input
 OBJECT = 112  # longer side of an object as the network sees it
+PHOTOS = 2  # of each lit view, placed and taken differently: lighting is most of the work
 _CLEARANCE = (OUTPUT - OBJECT) // 2
 _LEAST_LAMP = 0.12  # of all lamps' light in the picture: below, a lamp does not count
 _LEAST_LIT = 0.2  # of all light: below, the strongest lamp is not looked for
@@ -151,7 +152,7 @@ def draw_batch(
     Parameters
     ----------
     views : list of PreparedView
-        One for each photo.
+        `PHOTOS` photos are taken of each.
     atlas : Atlas
     environments : (N,) ndarray of int
         Those of the bank that may be used.
@@ -165,8 +166,9 @@ def draw_batch(
     Draw
     """
     recipes = [draw_recipe(view.directions, atlas, environments, rng, shares) for view in views]
-    cameras = [draw_camera(rng, plain_camera) for _ in views]
-    placements = [draw_placement(rng) for _ in views]
+    photos = PHOTOS * len(views)
+    cameras = [draw_camera(rng, plain_camera) for _ in range(photos)]
+    placements = [draw_placement(rng) for _ in range(photos)]
     return Draw(batch_of(views), stacked(recipes), _attributes(cameras), _attributes(placements))
 
 
@@ -221,7 +223,7 @@ def finish_batch(draw: Draw, bank: Bank) -> Sample:
     -------
     Sample
     """
-    lit = lit_pictures(draw.views, draw.recipes, bank)
+    draw, lit = _repeated(draw, lit_pictures(draw.views, draw.recipes, bank))
     layers, known, cover = _placed(draw.views, lit, draw.placements)
     diffuse, gloss, shading, normal, depth = layers.split([3, 3, 3, 3, 1], dim=1)
     normal = functional.normalize(_turned(normal, draw.placements), dim=1)
@@ -251,6 +253,15 @@ def finish_batch(draw: Draw, bank: Bank) -> Sample:
         place,
         draw.recipes["kind"],
     )
+
+
+def _repeated(draw: Draw, lit: LitViews) -> tuple[Draw, LitViews]:
+    """Each view as often as photos are taken of it."""
+    count = len(draw.views.index)
+    which = torch.arange(count, device=draw.views.index.device).repeat_interleave(PHOTOS)
+    recipes = {name: part[which] for name, part in draw.recipes.items()}
+    again = {name: part[which] for name, part in vars(lit).items()}
+    return replace(draw, views=draw.views.chosen(which), recipes=recipes), LitViews(**again)
 
 
 def _placed(
