@@ -18,6 +18,7 @@ from enum import StrEnum
 from pathlib import Path
 from zipfile import BadZipFile
 from zlib import crc32
+from zlib import error as UnpackingError
 
 import numpy as np
 
@@ -32,6 +33,7 @@ SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
 PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
 HELD_OUT_SOURCES = ("scan/", "furniture/Reallusion", "furniture/KatorLegaz")
+_DAMAGES = (ValueError, TypeError, KeyError, OSError, BadZipFile, EOFError, UnpackingError)
 _PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions")
 
 
@@ -98,7 +100,7 @@ def claim_folder(folder: Path, settings: WorldSettings) -> None:
     """
     path = folder / SETTINGS
     if not path.exists():
-        if folder.exists() and any(folder.iterdir()):
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise InputError(f"{folder} is not empty and no world: choose another folder")
         (folder / VIEWS).mkdir(parents=True, exist_ok=True)
         with new_file(path) as temporary:
@@ -147,7 +149,7 @@ def read_patterns(folder: Path) -> Atlas:
     try:
         with np.load(path, allow_pickle=False) as data:
             atlas = Atlas(data["maps"], data["kinds"], data["tileable"])
-    except (ValueError, KeyError, OSError, BadZipFile, EOFError) as error:
+    except _DAMAGES as error:
         raise InputError(f"{path} cannot be read: {error}; delete it and build again") from error
     if atlas.maps.ndim != 3 or len(atlas.kinds) != len(atlas.maps) or not len(atlas.maps):
         raise InputError(f"{path} holds no patterns: delete it and build again")
@@ -208,12 +210,12 @@ def read_views(path: Path) -> tuple[str, list[View]]:
                 )
                 for k, name in enumerate(data["names"])
             ]
-    except (ValueError, KeyError, OSError, BadZipFile, EOFError) as error:
+    except _DAMAGES as error:
         raise InputError(f"{path} is not an archive of views: {error}; delete it") from error
     for view in views:
         count = int(view.mask.sum())
-        shapes = (view.mask.shape, view.normal.shape, view.visible.shape)
-        if shapes != ((SIDE, SIDE), (count, 3), (count, DIRECTIONS // 8)):
+        wanted = ((SIDE, SIDE), (count, 3), (count,), (count,), (count, DIRECTIONS // 8))
+        if tuple(getattr(view, part).shape for part in _PARTS) != (*wanted, (DIRECTIONS, 3)):
             raise InputError(f"{path} holds views of another shape: delete it and build it again")
     return reference, views
 
