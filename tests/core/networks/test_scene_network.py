@@ -9,6 +9,7 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from isc_core.errors import InputError
 from isc_core.networks.light_network import mirrored_places
 from isc_core.networks.scene_network import (
+    BLOCK,
     CHANNELS,
     COARSE,
     GLOBAL,
@@ -25,14 +26,14 @@ FLIPPED = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])[:, None]  # harmonics odd i
 
 def shapes() -> list[tuple[int, int]]:
     """Inputs and outputs of each convolution."""
-    found, inputs = [], 4 * INPUTS
+    found, inputs = [], BLOCK**2 * INPUTS
     for width in WIDTHS:
         found += [(inputs, width), (width, width)]
         inputs = width
     for width in WIDTHS[-2::-1]:
         found += [(width + inputs, width), (width, width)]
         inputs = width
-    return [*found, (inputs, 4 * CHANNELS)]
+    return [*found, (inputs, BLOCK**2 * CHANNELS)]
 
 
 def weights(seed: int) -> dict[str, np.ndarray]:

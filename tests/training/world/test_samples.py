@@ -20,6 +20,7 @@ from training.world.recipes import Shares
 from training.world.samples import (
     OBJECT,
     OUTPUT,
+    PHOTOS,
     Draw,
     Sample,
     draw_batch,
@@ -85,7 +86,7 @@ def test_samples_are_finite_and_their_normals_unit(seed: int) -> None:
         assert part.isfinite().all(), name
     length = sample.normal.norm(dim=1, keepdim=True)[sample.known > 0]
     assert (length - 1).abs().max() < 1e-4
-    assert sample.photo.shape == (3, 3, OUTPUT, OUTPUT) and (sample.photo >= 0).all()
+    assert sample.photo.shape == (3 * PHOTOS, 3, OUTPUT, OUTPUT) and (sample.photo >= 0).all()
     assert set(sample.mask.unique().tolist()) <= {0.0, 1.0} and (sample.known <= sample.mask).all()
     assert not (sample.photo * (1 - sample.mask)).any()
     assert (sample.ratio >= 0).all()
@@ -122,7 +123,7 @@ def test_normals_turn_with_the_picture(angle: float, mirror: float) -> None:
     # The slim ellipsoid's long axis, y, is where its cover reaches farthest.
     c, s = math.cos(math.radians(angle)), math.sin(math.radians(angle))
     axis = np.array([-s * mirror, c])
-    rows, columns = np.nonzero(where[1])
+    rows, columns = np.nonzero(where[PHOTOS])
     place = np.stack([columns + 0.5 - OUTPUT / 2, OUTPUT / 2 - rows - 0.5], 1)
     spread = np.linalg.eigh(np.cov(place.T))[1][:, 1]
     assert abs(spread @ axis) > 0.999
@@ -159,7 +160,7 @@ def test_lamps_turn_with_the_picture() -> None:
     one = replace(one, recipes=one.recipes | {"ambient": 0.02 * one.recipes["ambient"]})
     one = replace(one, recipes=one.recipes | {"bounce": 0 * one.recipes["bounce"]})
     sample = finished(one)
-    for k in range(0, 6, 3):  # the balls
+    for k in (k for k in range(6 * PHOTOS) if k // PHOTOS % 3 == 0):  # the balls
         assert sample.count[k] == 1
         shading = np.where(inner(sample.known[k : k + 1])[0], sample.log_shading[k].mean(0), -9)
         row, column = np.unravel_index(shading.argmax(), shading.shape)
@@ -213,7 +214,7 @@ def test_the_mean_light_of_what_the_light_is_told_for_is_one() -> None:
     }
     sample = finished(replace(one, recipes=white))
     where = inner(sample.known)
-    for k in range(3):
+    for k in range(len(sample.photo)):
         known = sample.mask[k, 0] > 0
         image = sample.photo[k] / sample.photo[k].mean(0)[known].mean()
         ratio = (torch.log(image) - sample.log_shading[k]).numpy()[:, where[k]]
