@@ -355,7 +355,7 @@ def _optimizer(network: Net, schedule: Schedule) -> tuple[Any, tuple[float, floa
     groups = [
         {"params": group, "lr": rate} for group, rate in zip((encoder, heads), rates, strict=True)
     ]
-    return torch.optim.AdamW(groups, weight_decay=schedule.weight_decay), rates
+    return torch.optim.AdamW(groups, weight_decay=schedule.weight_decay, fused=True), rates
 
 
 def _rate_share(step: int, progress: float, warm_up: int) -> float:
