@@ -36,7 +36,7 @@ from isc_core.networks.scene_network import (
 from ..world.files import Split
 from ..world.recipes import Shares
 from ..world.samples import Sample
-from .scene_batches import SceneBatches, read_world
+from .scene_batches import SceneBatches, SceneDraws, read_world
 from .scene_module import FACTOR_SCALE, MARGIN, SceneNetworkModule, network_channels
 
 _NORMAL, _LAPLACE = 0.6827, 1 - np.exp(-1)  # shares within one scale
@@ -122,10 +122,13 @@ def main() -> None:
     arrays = dict(read_arrays(given.weights))
     network = SceneNetworkModule.of(arrays)
     world = read_world(given.worlds, given.panoramas, (Split.BODY,), given.seed)
-    draw = SceneBatches(world.views[Split.BODY], world.atlas, world.judged, _SIZE, Shares())
+    draw = SceneBatches(
+        SceneDraws(world.views[Split.BODY], world.atlas, world.judged, _SIZE, Shares()),
+        world.bank,
+    )
     rng = np.random.default_rng([given.seed, 5])
     torch.manual_seed(given.seed)
-    found = temperatures(network, draw.samples(rng, world.bank, _BATCHES))
+    found = temperatures(network, (draw(rng) for _ in range(_BATCHES)))
     print(", ".join(f"{name} {value:.3f}" for name, value in zip(TEMPERATURES, found, strict=True)))
     with new_file(given.output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **{**arrays, "temperatures": found})

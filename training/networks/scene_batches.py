@@ -1,10 +1,11 @@
 """Batches of photos from worlds, panoramas and patterns, for whoever fits or measures networks.
 
-Limits: a batch consists of views of about one size, so that lighting wastes little.
+Limits: views lit together are of about one size, so that lighting wastes little; the pool mixes
+them.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -18,15 +19,17 @@ from ..world.lighting import PreparedView, prepared
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
-from ..world.samples import PHOTOS, Draw, Sample, draw_batch, finish_batch
+from ..world.samples import OUTPUT, Darkroom, Draw, Sample, draw_batch
 
 _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
-_ALIKE = 400  # views of a batch are so near in size: less is filled up
+PHOTOS = 4  # taken of each lit view, on average
+POOL = 256  # lit views
+_ALIKE = 400  # views lit together are so near in size: less is filled up
 
 
 @dataclass(frozen=True)
-class SceneBatches:
+class SceneDraws:
     """Draws batches of photos.
 
     Attributes
@@ -40,8 +43,6 @@ class SceneBatches:
         Photos of a batch.
     shares : Shares
     plain_camera : bool
-    finish : Bank or None
-        Light and photograph right here, in the worker process; None: leave it to the device.
     """
 
     views: list[PreparedView]
@@ -50,9 +51,8 @@ class SceneBatches:
     size: int
     shares: Shares
     plain_camera: bool = False
-    finish: Bank | None = None
 
-    def __call__(self, rng: np.random.Generator) -> Draw | Sample:
+    def __call__(self, rng: np.random.Generator) -> Draw:
         """Draw a batch.
 
         Parameters
@@ -61,34 +61,53 @@ class SceneBatches:
 
         Returns
         -------
-        Draw or Sample
+        Draw
         """
-        around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, self.size // PHOTOS)
+        fresh = max(1, self.size // PHOTOS)
+        around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, fresh)
         chosen = [self.views[int(k) % len(self.views)] for k in around]
-        draw = draw_batch(
-            chosen, self.atlas, self.environments, rng, self.shares, self.plain_camera
+        return draw_batch(
+            chosen,
+            self.size,
+            self.atlas,
+            self.environments,
+            rng,
+            self.shares,
+            self.plain_camera,
         )
-        return draw if self.finish is None else finish_batch(draw, self.finish)
 
-    def samples(self, rng: np.random.Generator, bank: Bank, count: int) -> Iterator[Sample]:
-        """Draw and finish batches one after the other.
+
+class SceneBatches:
+    """Draws and finishes batches on one device, in a worker process or not.
+
+    Parameters
+    ----------
+    draw : SceneDraws
+    bank : Bank
+    side : int
+        Of the photos, pixels.
+    """
+
+    def __init__(self, draw: SceneDraws, bank: Bank, side: int = OUTPUT) -> None:
+        self._draw, self._darkroom = draw, Darkroom(bank, POOL, side)
+        self._filled = False
+
+    def __call__(self, rng: np.random.Generator) -> Sample:
+        """Return the next batch; the first one fills the pool.
 
         Parameters
         ----------
         rng : numpy.random.Generator
-        bank : Bank
-        count : int
-            Batches.
 
-        Yields
-        ------
+        Returns
+        -------
         Sample
         """
-        drawing = replace(self, finish=None)
-        for _ in range(count):
-            draw = drawing(rng)
-            assert isinstance(draw, Draw)
-            yield finish_batch(draw, bank)
+        if not self._filled:
+            self._filled = True
+            for _ in range(PHOTOS):
+                self._darkroom(self._draw(rng))
+        return self._darkroom(self._draw(rng))
 
 
 @dataclass(frozen=True)

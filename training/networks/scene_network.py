@@ -3,9 +3,10 @@
   python -m training.networks.scene_network WORLD... --panoramas DIR [--weights NPZ]
   [--device cuda] [--minutes N] -o SCENE.npz
 
-WORLD are folders of `isc world build`. Every photo is lit anew (`training.world.samples`), so none
-is seen twice. `--weights` starts from an archive that an earlier run wrote, `--resume` continues an
-interrupted one. Held-out bodies under held-out panoramas are measured every thousand steps.
+WORLD are folders of `isc world build`. Every photo is taken anew (`training.world.samples`), so
+none is seen twice. `--weights` starts from an archive that an earlier run wrote, `--resume`
+continues an interrupted one; `--side 96` sees photos smaller, which is half the work. Held-out
+bodies under held-out panoramas are measured every thousand steps.
 
 Equation: see `training.networks.scene_module`.
 
@@ -26,12 +27,12 @@ from isc_core.io.npy import read_arrays
 from ..loop import Schedule, add_run_arguments, fit, run_options
 from ..world.files import Split
 from ..world.recipes import Shares
-from ..world.samples import finish_batch
-from .scene_batches import SceneBatches, read_world
+from ..world.samples import OUTPUT, Darkroom, Draw, Sample
+from .scene_batches import POOL, SceneBatches, SceneDraws, read_world
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(
-    rate=1.5e-3, head_rate=1e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998
+    rate=1.5e-3, head_rate=1.5e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998
 )
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
@@ -52,6 +53,8 @@ def main() -> None:
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas, .exr or .hdr")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--widths", type=int, nargs="+", default=WIDTHS, metavar="N", help="channels by level")
+    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
+    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
     add("--without", nargs="+", default=[], choices=sorted(_ABLATIONS), help="leave out, to ablate")
     add_run_arguments(parser, steps=100_000, batch=32)
     arguments = parser.parse_args()
@@ -64,27 +67,33 @@ def main() -> None:
         network = SceneNetworkModule(tuple(arguments.widths))
     else:
         network = SceneNetworkModule.of(dict(read_arrays(arguments.weights)))
+    schedule = replace(SCHEDULE, rate=arguments.rate, head_rate=arguments.rate)
     shares = Shares()
     for name in arguments.without:
         shares = replace(shares, **_ABLATIONS[name])
-    on_cpu = options.device == "cpu"
-    draw = SceneBatches(
+    draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,
         world.learned,
         options.batch,
         shares,
         "camera" in arguments.without,
-        world.bank if on_cpu else None,
     )
-    held_out = replace(draw, views=world.views[Split.BODY], environments=world.judged)
-    bank = world.bank.to(options.device)
-    prepare = (
-        (lambda drawn: drawn)
-        if on_cpu
-        else (lambda drawn: finish_batch(drawn.to(options.device), bank))
-    )
-    fit(network, draw, SCHEDULE, options, held_out, prepare)
+    judged = replace(draw, views=world.views[Split.BODY], environments=world.judged)
+    side = arguments.side
+    held_out = SceneBatches(judged, world.bank, side)
+    if options.device == "cpu":
+        fit(network, SceneBatches(draw, world.bank, side), schedule, options, held_out)
+        return
+    # Workers draw, the device lights: it holds the bank and the pool.
+    darkroom = Darkroom(world.bank.to(options.device), POOL, side)
+
+    def prepare(drawn: Draw | Sample) -> Sample:
+        if isinstance(drawn, Sample):
+            return drawn.to(options.device)
+        return darkroom(drawn.to(options.device))
+
+    fit(network, draw, schedule, options, held_out, prepare)
 
 
 if __name__ == "__main__":

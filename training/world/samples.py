@@ -8,7 +8,7 @@ Limits: resampling is bilinear.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -18,18 +18,16 @@ from isc_core.scene.light_estimate import PLACES
 
 from ..data.random_draws import log_uniform
 from .camera import CameraDraw, draw_camera, exposed, photographed
-from .lighting import LitViews, PreparedView, ViewBatch, basis_of, batch_of
+from .lighting import PreparedView, ViewBatch, basis_of, batch_of
+from .lit_pictures import LitPictures, Pool, make_pictures
 from .patterns import Atlas
-from .pictures import Bank, lit_pictures, stacked
+from .pictures import Bank, stacked
 from .recipes import Shares, draw_recipe
 from .views import SIDE
 
 OUTPUT = 128  # pixels of the network's input
 OBJECT = 112  # longer side of an object as the network sees it
-PHOTOS = 2  # of each lit view, placed and taken differently: lighting is most of the work
 _CLEARANCE = (OUTPUT - OBJECT) // 2
-_LEAST_LAMP = 0.12  # of all lamps' light in the picture: below, a lamp does not count
-_LEAST_LIT = 0.2  # of all light: below, the strongest lamp is not looked for
 _EDGE = 0.12  # of the picture's half side: a step in depth between neighbours that is an edge
 _LEAST = 1e-4
 _MOST_RATIO = 5.0  # of log ratios
@@ -73,12 +71,18 @@ class Draw:
     Attributes
     ----------
     views : ViewBatch
-    recipes, cameras, placements : dict of str to tensor
-        The attributes of `Recipe`, `CameraDraw` and `Placement`, stacked.
+        To be lit for this batch.
+    recipes : dict of str to tensor
+        The attributes of `Recipe`, stacked, one for each view.
+    shares : (B,) tensor
+        Which pictures of the pool are photographed, see `Pool.picked`.
+    cameras, placements : dict of str to tensor
+        The attributes of `CameraDraw` and `Placement`, stacked, one for each photo.
     """
 
     views: ViewBatch
     recipes: dict[str, torch.Tensor]
+    shares: torch.Tensor
     cameras: dict[str, torch.Tensor]
     placements: dict[str, torch.Tensor]
 
@@ -93,14 +97,22 @@ class Draw:
         -------
         Draw
         """
-        parts = (self.recipes, self.cameras, self.placements)
-        moved = [{name: part.to(device) for name, part in parts_.items()} for parts_ in parts]
-        return Draw(self.views.to(torch.device(device)), *moved)
+
+        def moved(parts: dict[str, torch.Tensor]) -> dict[str, torch.Tensor]:
+            return {name: part.to(device) for name, part in parts.items()}
+
+        return Draw(
+            self.views.to(torch.device(device)),
+            moved(self.recipes),
+            self.shares.to(device),
+            moved(self.cameras),
+            moved(self.placements),
+        )
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A batch of photos with their truth, side by side `OUTPUT` pixels.
+    """A batch of photos with their truth.
 
     Attributes
     ----------
@@ -138,9 +150,23 @@ class Sample:
     place: torch.Tensor
     kind: torch.Tensor
 
+    def to(self, device: str) -> "Sample":
+        """Return the batch on a device.
+
+        Parameters
+        ----------
+        device : str
+
+        Returns
+        -------
+        Sample
+        """
+        return Sample(**{name: part.to(device) for name, part in vars(self).items()})
+
 
 def draw_batch(
     views: list[PreparedView],
+    photos: int,
     atlas: Atlas,
     environments: np.ndarray,
     rng: np.random.Generator,
@@ -152,7 +178,9 @@ def draw_batch(
     Parameters
     ----------
     views : list of PreparedView
-        `PHOTOS` photos are taken of each.
+        To be lit.
+    photos : int
+        To be taken of pictures in the pool.
     atlas : Atlas
     environments : (N,) ndarray of int
         Those of the bank that may be used.
@@ -166,10 +194,15 @@ def draw_batch(
     Draw
     """
     recipes = [draw_recipe(view.directions, atlas, environments, rng, shares) for view in views]
-    photos = PHOTOS * len(views)
     cameras = [draw_camera(rng, plain_camera) for _ in range(photos)]
     placements = [draw_placement(rng) for _ in range(photos)]
-    return Draw(batch_of(views), stacked(recipes), _attributes(cameras), _attributes(placements))
+    return Draw(
+        batch_of(views),
+        stacked(recipes),
+        torch.from_numpy(rng.random(photos)),
+        _attributes(cameras),
+        _attributes(placements),
+    )
 
 
 def _attributes(drawn: list[CameraDraw] | list[Placement]) -> dict[str, torch.Tensor]:
@@ -210,36 +243,71 @@ def draw_placement(rng: np.random.Generator) -> Placement:
     )
 
 
-def finish_batch(draw: Draw, bank: Bank) -> Sample:
-    """Light, place and photograph a batch.
+class Darkroom:
+    """Lights what is drawn, and photographs a pool of what was lit.
 
     Parameters
     ----------
-    draw : Draw
     bank : Bank
-        Both on one device.
+        On the device that lights.
+    pool : int
+        Pictures that are kept; at least as many as one batch lights.
+    side : int
+        Of the photos, pixels; a multiple of 32.
+    """
+
+    def __init__(self, bank: Bank, pool: int, side: int = OUTPUT) -> None:
+        self._bank, self._pool, self._side = bank, Pool(pool), side
+
+    def __call__(self, draw: Draw) -> Sample:
+        """Finish a batch.
+
+        Parameters
+        ----------
+        draw : Draw
+            On the device of the bank.
+
+        Returns
+        -------
+        Sample
+        """
+        self._pool.exchange(make_pictures(draw.views, draw.recipes, self._bank))
+        return photograph(self._pool.picked(draw.shares), draw.cameras, draw.placements, self._side)
+
+
+def photograph(
+    pictures: LitPictures,
+    cameras: dict[str, torch.Tensor],
+    placements: dict[str, torch.Tensor],
+    side: int = OUTPUT,
+) -> Sample:
+    """Place and photograph pictures.
+
+    Parameters
+    ----------
+    pictures : LitPictures
+    cameras, placements : dict of str to tensor
+        One of each for each picture.
+    side : int
+        Of the photos, pixels; a multiple of 32.
 
     Returns
     -------
     Sample
     """
-    draw, lit = _repeated(draw, lit_pictures(draw.views, draw.recipes, bank))
-    layers, known, cover = _placed(draw.views, lit, draw.placements)
+    layers, known, cover = _placed(pictures, placements, side)
     diffuse, gloss, shading, normal, depth = layers.split([3, 3, 3, 3, 1], dim=1)
-    normal = functional.normalize(_turned(normal, draw.placements), dim=1)
-    mask = _mistaken(cover, draw.placements)
-    gain = exposed(diffuse + gloss, known, draw.cameras["exposure"])
-    ground = _background(lit, draw.recipes)[..., None, None] * torch.ones_like(diffuse)
+    normal = functional.normalize(_turned(normal, placements), dim=1)
+    mask = _mistaken(cover, placements)
+    gain = exposed(diffuse + gloss, known, cameras["exposure"])
+    ground = pictures.ground[..., None, None] * torch.ones_like(diffuse)
     light = torch.where(known > 0, diffuse + gloss, ground)
-    photo = photographed(light * gain, known, draw.cameras) * mask
-    seen = (diffuse + gloss) * gain
-    limit = torch.where(draw.cameras["clips"] > 0, 1.0, math.inf)[:, None, None, None]
-    ratio = torch.log(torch.minimum(seen, limit).clamp(min=_LEAST)) - torch.log(
-        (diffuse * gain).clamp(min=_LEAST)
-    )
+    photo = photographed(light * gain, known, cameras) * mask
+    limit = torch.where(cameras["clips"] > 0, 1.0, math.inf)[:, None, None, None]
+    seen = torch.minimum((diffuse + gloss) * gain, limit)
+    ratio = torch.log(seen.clamp(min=_LEAST)) - torch.log((diffuse * gain).clamp(min=_LEAST))
     mean = (photo.mean(1, keepdim=True) * mask).sum((1, 2, 3)) / mask.sum((1, 2, 3)).clamp(min=1)
     brightness = torch.log(gain.flatten() / mean.clamp(min=1e-6))
-    count, place = _lamps(draw)
     return Sample(
         photo,
         mask,
@@ -248,39 +316,26 @@ def finish_batch(draw: Draw, bank: Bank) -> Sample:
         ratio.clamp(0, _MOST_RATIO),
         torch.log(shading.clamp(min=_LEAST)) + brightness[:, None, None, None],
         _edges(depth, known),
-        _light_of(lit, brightness, draw.placements),
-        count,
-        place,
-        draw.recipes["kind"],
+        _light_of(pictures.coefficients, brightness, placements),
+        pictures.lamps,
+        _place_of(pictures, placements),
+        pictures.kind,
     )
 
 
-def _repeated(draw: Draw, lit: LitViews) -> tuple[Draw, LitViews]:
-    """Each view as often as photos are taken of it."""
-    count = len(draw.views.index)
-    which = torch.arange(count, device=draw.views.index.device).repeat_interleave(PHOTOS)
-    recipes = {name: part[which] for name, part in draw.recipes.items()}
-    again = {name: part[which] for name, part in vars(lit).items()}
-    return replace(draw, views=draw.views.chosen(which), recipes=recipes), LitViews(**again)
-
-
 def _placed(
-    views: ViewBatch, lit: LitViews, placements: dict[str, torch.Tensor]
+    pictures: LitPictures, placements: dict[str, torch.Tensor], side: int
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Layers (B, 13, side, side) of what is seen, where it is known, and the share covered."""
-    rows = [lit.diffuse, lit.specular, lit.shading, views.normal, views.position[..., 2:]]
-    values = torch.cat([*rows, torch.ones_like(views.thickness)[..., None]], dim=-1)
-    batch, _, channels = values.shape
-    canvas = torch.zeros(batch, SIDE * SIDE + 1, channels, device=values.device)
-    canvas.scatter_(1, views.index[..., None].expand(-1, -1, channels), values)
-    picture = canvas[:, :-1].mT.reshape(batch, channels, SIDE, SIDE)
-    found = functional.grid_sample(picture, _grid(picture[:, -1], placements), align_corners=False)
+    picture = torch.cat([pictures.layers, pictures.cover], dim=1).float()
+    grid = _grid(picture[:, -1], placements, side)
+    found = functional.grid_sample(picture, grid, align_corners=False)
     cover = found[:, -1:]
-    known = (cover > 0.5).float() * _frame(placements)
+    known = (cover > 0.5).float() * _frame(placements, side)
     return found[:, :-1] / cover.clamp(min=0.25), known, cover
 
 
-def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch.Tensor:
+def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -> torch.Tensor:
     """Where each pixel of the network's frame lies in the view, for `grid_sample`."""
     angle, mirror = placements["angle"], placements["mirror"]
     inverse = _turn(-angle)
@@ -296,17 +351,17 @@ def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch.Ten
     high = turned.masked_fill(outside, -9).amax(1)
     scale = (high - low).amax(1) / 2 * (OUTPUT / placements["length"])
     middle = (((low + high) / 2)[:, None] @ inverse.mT)[:, 0]
-    pixels = (torch.arange(OUTPUT, device=cover.device) + 0.5) * (2 / OUTPUT) - 1
+    pixels = (torch.arange(side, device=cover.device) + 0.5) * (2 / side) - 1
     rows, columns = torch.meshgrid(pixels, pixels, indexing="ij")
     frame = torch.stack([columns, rows], dim=-1).reshape(1, -1, 2)
     frame = frame - placements["shift"][:, None] * (2 / OUTPUT)
     found = (frame @ inverse.mT) * scale[:, None, None] + middle[:, None]
-    return found.reshape(-1, OUTPUT, OUTPUT, 2)
+    return found.reshape(-1, side, side, 2)
 
 
-def _frame(placements: dict[str, torch.Tensor]) -> torch.Tensor:
+def _frame(placements: dict[str, torch.Tensor], side: int) -> torch.Tensor:
     """1 (B, 1, side, side) inside the photo's frame."""
-    pixels = torch.arange(OUTPUT, device=placements["cut"].device) + 0.5
+    pixels = (torch.arange(side, device=placements["cut"].device) + 0.5) * (OUTPUT / side)
     cut = placements["cut"][:, :, None]
     columns = (pixels > cut[:, 0]) & (pixels < OUTPUT - cut[:, 2])
     rows = (pixels > cut[:, 1]) & (pixels < OUTPUT - cut[:, 3])
@@ -337,40 +392,19 @@ def _mistaken(cover: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch
     narrow = -functional.max_pool2d(-moved, 5, 1, 2)
     share = (error.abs() / 2)[:, None, None, None]
     target = torch.where(error[:, None, None, None] > 0, wide, narrow)
-    return (torch.lerp(moved, target, share) > 0.5).float() * _frame(placements)
+    return (torch.lerp(moved, target, share) > 0.5).float() * _frame(placements, cover.shape[-1])
 
 
-def _background(lit: LitViews, recipes: dict[str, torch.Tensor]) -> torch.Tensor:
-    """A colour (B, 3) behind the object, from black to as bright as its brightest parts."""
-    level = (recipes["shifts"][:, 0, :1] * 2).clamp(0, 2)
-    return level * lit.diffuse.mean(1)
-
-
-def _lamps(draw: Draw) -> tuple[torch.Tensor, torch.Tensor]:
-    """How many lamps count (B,), and the place (B,) of the strongest in `PLACES`, or -1."""
-    power = draw.recipes["power"].mean(-1)
-    picked = draw.recipes["lamp"][..., None].expand(-1, -1, 3)
-    toward = draw.views.directions.gather(1, picked)
-    lamps = draw.recipes["lamp"][:, None].expand(-1, draw.views.normal.shape[1], -1)
-    light = power * draw.views.reached.gather(2, lamps).float().mean(1) / 255
-    ambient = draw.recipes["ambient"].mean(-1)
-    counts = light > _LEAST_LAMP * light.sum(1, keepdim=True).clamp(min=1e-6)
-    counts &= light > 0.1 * _LEAST_LIT * ambient[:, None]
-    number = counts.sum(1).clamp(max=2) * (draw.recipes["given"] == 0)
-    best = light.argmax(1)
-    strongest = toward[torch.arange(len(best), device=best.device), best]
-    across = torch.einsum("bij,bj->bi", _turn(draw.placements["angle"]), strongest[:, :2])
-    across = across * torch.stack(
-        [draw.placements["mirror"], torch.ones_like(draw.placements["mirror"])], -1
-    )
-    strongest = torch.cat([across, strongest[:, 2:]], -1)
+def _place_of(pictures: LitPictures, placements: dict[str, torch.Tensor]) -> torch.Tensor:
+    """The place (B,) of the strongest lamp in `PLACES`, or -1."""
+    strongest = _turned(pictures.strongest[..., None, None], placements)[..., 0, 0]
     places = torch.tensor(PLACES, dtype=strongest.dtype, device=strongest.device)
     nearest = (strongest @ places.T).argmax(1)
-    return number, torch.where(number > 0, nearest, -1)
+    return torch.where(pictures.lamps > 0, nearest, -1)
 
 
 def _light_of(
-    lit: LitViews, brightness: torch.Tensor, placements: dict[str, torch.Tensor]
+    coefficients: torch.Tensor, brightness: torch.Tensor, placements: dict[str, torch.Tensor]
 ) -> torch.Tensor:
     """Coefficients (B, 27) of the light in the network's frame, for a photo of mean light 1."""
     angle, mirror = placements["angle"], placements["mirror"]
@@ -385,7 +419,7 @@ def _light_of(
         -1,
     ) @ _turn(angle)
     came = torch.cat([back, probe[None, :, 2:].expand(len(angle), -1, -1)], -1)
-    values = basis_of(came) @ lit.coefficients
+    values = basis_of(came) @ coefficients
     found = torch.linalg.pinv(basis_of(probe)) @ values
     found[:, 0] += brightness[:, None] * math.sqrt(4 * math.pi)
     return found.mT.flatten(1)

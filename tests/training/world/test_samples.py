@@ -11,23 +11,26 @@ pytest.importorskip("torch")
 
 import torch
 from scipy import ndimage
+from torch.nn import functional
 
 from isc_core.networks import scene_network as core
 from isc_core.scene.light_estimate import PLACES
 from tests.training.world.analytic_views import ellipsoid_view
 from tests.training.world.test_recipes import ATLAS, bank
 from training.world.lighting import PreparedView, basis_of, prepared
+from training.world.lit_pictures import Pool, make_pictures
 from training.world.recipes import Shares
 from training.world.samples import (
     OBJECT,
     OUTPUT,
-    PHOTOS,
+    Darkroom,
     Draw,
     Sample,
     draw_batch,
     draw_placement,
-    finish_batch,
 )
+
+PHOTOS = 2  # of each picture, one after the other
 
 HARMONICS = Shares(kinds=(1, 0, 0), lights=(1, 0, 0, 0, 0))
 LAMP = Shares(kinds=(1, 0, 0), lights=(0, 0, 1, 0, 0))
@@ -52,12 +55,14 @@ def some_views(count: int) -> list[PreparedView]:
 
 def draw(seed: int, shares: Shares, count: int = 3, plain: bool = False) -> Draw:
     rng = np.random.default_rng(seed)
-    return draw_batch(some_views(count), ATLAS, np.array([0, 1, 2]), rng, shares, plain)
+    views, places = some_views(count), np.array([0, 1, 2])
+    one = draw_batch(views, PHOTOS * count, ATLAS, places, rng, shares, plain)
+    return replace(one, shares=(torch.arange(PHOTOS * count) // PHOTOS + 0.5) / count)
 
 
 def finished(one: Draw, seed: int = 0) -> Sample:
     torch.manual_seed(seed)
-    return finish_batch(one, bank())
+    return Darkroom(bank(), 16)(one)
 
 
 def placed(one: Draw, **changes: float | list[float]) -> Draw:
@@ -230,6 +235,34 @@ def test_the_mean_light_of_what_the_light_is_told_for_is_one() -> None:
         ratio = (torch.log(image) - sample.log_shading[k]).numpy()[:, where[k]]
         np.testing.assert_allclose(ratio, math.log(0.5), atol=0.01)
         assert (sample.ratio[k] < 1e-3).all()
+
+
+def test_a_smaller_photo_shows_the_same() -> None:
+    one = placed(draw(2, HARMONICS, 3, plain=True), **STRAIGHT)
+    torch.manual_seed(0)
+    small = Darkroom(bank(), 16, OUTPUT // 2)(one)
+    large = finished(one)
+    both = inner(functional.avg_pool2d(large.known, 2).floor()) & inner(small.known)
+    off = (functional.avg_pool2d(large.normal, 2) - small.normal).norm(dim=1).numpy()
+    assert np.quantile(off[both], 0.99) < 0.03
+    torch.testing.assert_close(small.light[:, 1:9], large.light[:, 1:9])
+
+
+def test_a_pool_keeps_the_latest_pictures() -> None:
+    parts = [make_pictures(one.views, one.recipes, bank()) for one in map(numbered, range(4))]
+    pool = Pool(4)
+    with pytest.raises(ValueError, match="empty"):
+        pool.picked(torch.zeros(1))
+    for part in parts:
+        pool.exchange(part)
+    kept = pool.picked(torch.arange(4) / 4 + 0.1)
+    assert {tuple(one) for one in kept.coefficients[:, 0].tolist()} == {
+        tuple(one) for part in parts[2:] for one in part.coefficients[:, 0].tolist()
+    }
+
+
+def numbered(number: int) -> Draw:
+    return draw(number, HARMONICS, 2)
 
 
 def test_placements_fit_the_frame() -> None:

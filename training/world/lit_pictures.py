@@ -1,0 +1,198 @@
+"""Lit views as pictures, and a pool of them that photos are taken of.
+
+Problem: lighting a view takes several times as long as photographing it. A pool of lit pictures, of
+which a few are exchanged for new ones before each batch, gives every batch many bodies in many
+lights at a fraction of the work.
+
+Limits: a picture stays in the pool for pool size over exchange steps, and is photographed about
+photos over exchange times, each time placed and taken differently.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+
+import torch
+
+from .lighting import LitViews, ViewBatch
+from .pictures import Bank, lit_pictures
+from .views import SIDE
+
+_LEAST_LAMP = 0.12  # of all lamps' light in the picture: below, a lamp does not count
+_BRIGHTEST = 6e4
+_LEAST_LIT = 0.02  # of the surroundings' light: below, a lamp does not count
+
+
+@dataclass(frozen=True)
+class LitPictures:
+    """Pictures of B lit views, before any camera.
+
+    Attributes
+    ----------
+    layers : (B, 13, SIDE, SIDE) float16 tensor
+        Diffuse and specular light, shading, normal, depth; 0 off the body.
+    cover : (B, 1, SIDE, SIDE) float16 tensor
+        1 on the body.
+    coefficients : (B, 9, 3) tensor
+        Of the log shading.
+    ground : (B, 3) tensor
+        Light of the background.
+    lamps : (B,) int64 tensor
+        How many count: 0, 1, or 2 for several.
+    strongest : (B, 3) tensor
+        Unit vector to the lamp that gives most light.
+    kind : (B,) int64 tensor
+    """
+
+    layers: torch.Tensor
+    cover: torch.Tensor
+    coefficients: torch.Tensor
+    ground: torch.Tensor
+    lamps: torch.Tensor
+    strongest: torch.Tensor
+    kind: torch.Tensor
+
+    def __len__(self) -> int:
+        return len(self.kind)
+
+    def chosen(self, which: torch.Tensor) -> "LitPictures":
+        """Return some of the pictures.
+
+        Parameters
+        ----------
+        which : (b,) int64 tensor
+
+        Returns
+        -------
+        LitPictures
+        """
+        return LitPictures(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
+
+
+def joined(parts: Sequence[LitPictures]) -> LitPictures:
+    """Concatenate pictures.
+
+    Parameters
+    ----------
+    parts : sequence of LitPictures
+        Not empty.
+
+    Returns
+    -------
+    LitPictures
+    """
+    return LitPictures(
+        **{
+            one.name: torch.cat([getattr(part, one.name) for part in parts])
+            for one in fields(LitPictures)
+        }
+    )
+
+
+def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank) -> LitPictures:
+    """Paint and light views.
+
+    Parameters
+    ----------
+    views : ViewBatch
+    recipes : dict of str to tensor
+        See `pictures.stacked`.
+    bank : Bank
+        All on one device.
+
+    Returns
+    -------
+    LitPictures
+    """
+    lit = lit_pictures(views, recipes, bank)
+    rows = [lit.diffuse, lit.specular, lit.shading, views.normal, views.position[..., 2:]]
+    values = torch.cat([*rows, torch.ones_like(views.thickness)[..., None]], dim=-1)
+    batch, _, channels = values.shape
+    canvas = torch.zeros(batch, SIDE * SIDE + 1, channels, device=values.device)
+    canvas.scatter_(1, views.index[..., None].expand(-1, -1, channels), values)
+    picture = canvas[:, :-1].mT.reshape(batch, channels, SIDE, SIDE)
+    # half floats end at 65504; a lamp mirrored in metal may be brighter
+    picture = picture.clamp(max=_BRIGHTEST).half()
+    lamps, strongest = _lamps(views, recipes)
+    return LitPictures(
+        picture[:, :-1],
+        picture[:, -1:],
+        lit.coefficients,
+        _background(lit, recipes),
+        lamps,
+        strongest,
+        recipes["kind"],
+    )
+
+
+def _background(lit: LitViews, recipes: dict[str, torch.Tensor]) -> torch.Tensor:
+    """A colour (B, 3) behind the object, from black to as bright as its brightest parts."""
+    level = (recipes["shifts"][:, 0, :1] * 2).clamp(0, 2)
+    return level * lit.diffuse.mean(1)
+
+
+def _lamps(views: ViewBatch, recipes: dict[str, torch.Tensor]) -> tuple[torch.Tensor, torch.Tensor]:
+    """How many lamps count (B,), and the direction (B, 3) of the strongest."""
+    power = recipes["power"].mean(-1)
+    toward = views.directions.gather(1, recipes["lamp"][..., None].expand(-1, -1, 3))
+    lamps = recipes["lamp"][:, None].expand(-1, views.normal.shape[1], -1)
+    light = power * views.reached.gather(2, lamps).float().mean(1) / 255
+    ambient = recipes["ambient"].mean(-1)
+    counts = light > _LEAST_LAMP * light.sum(1, keepdim=True).clamp(min=1e-6)
+    counts &= light > _LEAST_LIT * ambient[:, None]
+    number = counts.sum(1).clamp(max=2) * (recipes["given"] == 0)
+    best = light.argmax(1)
+    return number, toward[torch.arange(len(best), device=best.device), best]
+
+
+class Pool:
+    """Lit pictures, the oldest of which make room for new ones.
+
+    Parameters
+    ----------
+    size : int
+        Most pictures.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size, self._next = size, 0
+        self._pictures: LitPictures | None = None
+
+    def exchange(self, fresh: LitPictures) -> None:
+        """Add pictures; once the pool is full, in place of the oldest.
+
+        Parameters
+        ----------
+        fresh : LitPictures
+            At most as many as the pool holds.
+        """
+        if self._pictures is None:
+            self._pictures = fresh
+        elif len(self._pictures) + len(fresh) <= self._size:
+            self._pictures = joined([self._pictures, fresh])
+        else:
+            count = len(self._pictures)
+            place = (torch.arange(len(fresh)) + self._next) % count
+            for one in fields(fresh):
+                getattr(self._pictures, one.name)[place] = getattr(fresh, one.name)
+            self._next = (self._next + len(fresh)) % count
+
+    def picked(self, shares: torch.Tensor) -> LitPictures:
+        """Return pictures of the pool.
+
+        Parameters
+        ----------
+        shares : (b,) tensor
+            Places in the pool, as shares of its length, in [0, 1).
+
+        Returns
+        -------
+        LitPictures
+
+        Raises
+        ------
+        ValueError
+            If the pool is empty.
+        """
+        if self._pictures is None:
+            raise ValueError("the pool is empty")
+        return self._pictures.chosen((shares * len(self._pictures)).long())
