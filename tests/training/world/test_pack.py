@@ -1,0 +1,88 @@
+"""A pack gives back what was put in, as exactly as it says."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from isc_core.errors import InputError
+from tests.training.world.analytic_views import ellipsoid_view
+from training.world.environments import Panorama
+from training.world.files import Split
+from training.world.pack import PackedWorld, chosen_views, read_pack, write_pack
+from training.world.patterns import Atlas
+
+RNG = np.random.default_rng(0)
+VIEWS = [
+    ellipsoid_view(np.random.default_rng(k), half)
+    for k, half in enumerate([(0.9, 0.9, 0.9), (0.4, 0.9, 0.8), (0.9, 0.5, 0.2)])
+]
+PANORAMAS = [
+    Panorama(name, RNG.random((32, 64, 3)).astype(np.float16).astype(np.float32), name == "b")
+    for name in ("a", "b")
+]
+ATLAS = Atlas(
+    RNG.integers(0, 256, (5, 16, 16), np.uint8),
+    np.arange(5).astype(np.uint8),
+    np.array([True, False, True, False, False]),
+)
+WORLD = PackedWorld({Split.TRAIN: VIEWS[:2], Split.BODY: VIEWS[2:]}, PANORAMAS, ATLAS)
+
+
+def unit(vectors: np.ndarray) -> np.ndarray:
+    long = vectors.astype(float)
+    return np.asarray(long / (np.linalg.norm(long, axis=1, keepdims=True) + 1e-9))
+
+
+@pytest.fixture
+def pack(tmp_path: Path) -> Path:
+    path = tmp_path / "world.isw"
+    assert write_pack(path, WORLD) == path.stat().st_size
+    return path
+
+
+def test_a_pack_gives_back_its_world(pack: Path) -> None:
+    found = read_pack(pack)
+    assert [len(found.views[split]) for split in Split] == [2, 1, 0]
+    for seen, view in zip(
+        [*found.views[Split.TRAIN], *found.views[Split.BODY]], VIEWS, strict=True
+    ):
+        assert (seen.name, seen.source, seen.distance) == (view.name, view.source, view.distance)
+        for exact in ("mask", "visible", "directions"):
+            np.testing.assert_array_equal(getattr(seen, exact), getattr(view, exact))
+        assert np.degrees(np.arccos((unit(seen.normal) * unit(view.normal)).sum(1))).max() < 0.7
+        assert np.abs(seen.depth.astype(float) - view.depth).max() < 0.002
+        assert np.abs(seen.thickness.astype(float) - view.thickness).max() < 0.012
+    for seen_light, light in zip(found.panoramas, PANORAMAS, strict=True):
+        assert (seen_light.name, seen_light.judged) == (light.name, light.judged)
+        np.testing.assert_array_equal(seen_light.radiance, light.radiance)
+    for part in ("maps", "kinds", "tileable"):
+        np.testing.assert_array_equal(getattr(found.atlas, part), getattr(ATLAS, part))
+
+
+@pytest.mark.parametrize("kept", [0, 10, 3000])
+def test_a_truncated_pack_is_refused_in_one_line(pack: Path, kept: int) -> None:
+    pack.write_bytes(pack.read_bytes()[:kept])
+    with pytest.raises(InputError, match="no pack of a world") as error:
+        read_pack(pack)
+    assert "\n" not in str(error.value)
+
+
+def test_a_pack_of_another_version_is_refused(pack: Path) -> None:
+    with np.load(pack) as data:
+        arrays = {**data, "format": np.array(99)}
+    with pack.open("wb") as file:
+        np.savez(file, **arrays)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="another version"):
+        read_pack(pack)
+
+
+def test_every_body_is_chosen_once_before_any_is_chosen_twice() -> None:
+    views = [replace(VIEWS[0], name=name) for name in ("a", "a", "a", "b", "b", "c")]
+    rng = np.random.default_rng(0)
+    assert sorted(one.name for one in chosen_views(views, 3, rng)) == ["a", "b", "c"]
+    assert sorted(one.name for one in chosen_views(views, 5, rng)) == ["a", "a", "b", "b", "c"]
+    assert len(chosen_views(views, 9, rng)) == 6
