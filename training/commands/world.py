@@ -1,16 +1,17 @@
-"""`isc world build`: trace the bodies that the networks learn from."""
+"""`isc world build` and `isc world pack`: the bodies that the networks learn from."""
 
 import argparse
 from pathlib import Path
 
 from isc_core.cli.interface.parser import describe, hints
-from isc_core.cli.interface.values import count
+from isc_core.cli.interface.values import count, positive
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..world.bodies.sources import BodyFolders
 from ..world.build import build_world
 from ..world.files import WorldSettings
+from ..world.pack import pack_worlds
 
 SUMMARY = "trace bodies from random sides"
 
@@ -30,6 +31,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         Changed in place.
     """
     jobs = parser.add_subparsers(metavar="JOB", required=True)
+    _declare_pack(jobs.add_parser("pack", help="put a part of a world into one small file"))
     build = jobs.add_parser("build", help=SUMMARY)
     describe(build, run, "Trace bodies from random sides, to train on.", examples=_EXAMPLES)
     add = build.add_argument
@@ -54,8 +56,49 @@ def declare(parser: argparse.ArgumentParser) -> None:
         )
 
 
+def _declare_pack(parser: argparse.ArgumentParser) -> None:
+    describe(
+        parser,
+        run_pack,
+        "Put views, panoramas and patterns into one file, to fit on another machine.",
+        examples="  isc world pack WORLD --panoramas HDRI -o world.isw --megabytes 50",
+    )
+    add = parser.add_argument
+    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders of isc world build")
+    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas, .exr or .hdr")
+    add("-o", "--output", type=Path, required=True, metavar="FILE", help="the pack")
+    add("--megabytes", type=positive, default=50.0, metavar="N", help="default: %(default)g")
+    add("--seed", type=count, default=0, metavar="N", help="default: %(default)s")
+
+
+def run_pack(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Run `isc world pack`.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        The parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+
+    Raises
+    ------
+    InputError
+        For invalid input.
+    """
+    monitor.report("packing", 0)
+    most = int(1e6 * options.megabytes)
+    lines = pack_worlds(options.worlds, options.panoramas, options.output, most, options.seed)
+    return hints(options, *lines)
+
+
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command.
+    """Run `isc world build`.
 
     Parameters
     ----------

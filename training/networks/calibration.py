@@ -113,8 +113,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders of isc world build")
-    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas, .exr or .hdr")
+    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
     add("--weights", type=Path, required=True, metavar="NPZ", help="what was fitted")
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
     add("--seed", type=int, default=0, help="seed of the fit (default: %(default)s)")

@@ -16,6 +16,7 @@ from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
 from ..world.invented_environments import invented_room, invented_sky, studio
 from ..world.lighting import PreparedView, prepared
+from ..world.pack import read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
@@ -132,15 +133,16 @@ class World:
 
 
 def read_world(
-    folders: Sequence[Path], panoramas: Path, splits: Sequence[Split], seed: int
+    paths: Sequence[Path], panoramas: Path | None, splits: Sequence[Split], seed: int
 ) -> World:
     """Read views and panoramas, and invent the rest.
 
     Parameters
     ----------
-    folders : sequence of Path
-        Worlds.
-    panoramas : Path
+    paths : sequence of Path
+        Folders of worlds, and packs.
+    panoramas : Path or None
+        Folder of panoramas; None: those of the first pack.
     splits : sequence of Split
         What to read.
     seed : int
@@ -152,22 +154,34 @@ def read_world(
     Raises
     ------
     InputError
-        If a folder is no world, or holds nothing to learn from.
+        If a folder is no world, or there is nothing to learn from.
     """
+    packs = [read_pack(path) for path in paths if path.is_file()]
+    folders = [path for path in paths if not path.is_file()]
     views = {
         split: sorted(
-            (prepared(view) for folder in folders for view in views_in(folder, split)),
+            (
+                prepared(view)
+                for part in (
+                    *(pack.views[split] for pack in packs),
+                    *(views_in(folder, split) for folder in folders),
+                )
+                for view in part
+            ),
             key=lambda view: len(view.index),
         )
         for split in splits
     }
     if not all(views.values()):
-        raise InputError(f"{folders[0]} has no views to learn from: build more bodies")
-    rng, found = np.random.default_rng([seed, 7]), read_panoramas(panoramas, seed)
+        raise InputError(f"{paths[0]} has no views to learn from: build more bodies")
+    if panoramas is None and not packs:
+        raise InputError("name a folder of panoramas with --panoramas; only packs have their own")
+    found = packs[0].panoramas if panoramas is None else read_panoramas(panoramas, seed)
+    rng = np.random.default_rng([seed, 7])
     invented = [
         make(rng) for _ in range(_INVENTED) for make in (invented_room, invented_sky, studio)
     ]
-    atlas = read_patterns(folders[0])
+    atlas = packs[0].atlas if packs else read_patterns(folders[0])
     bank = bank_of([*(one.radiance for one in found), *invented], atlas)
     judged = np.array([one.judged for one in found] + [False] * len(invented))
     photographed = np.flatnonzero(~judged[: len(found)])

@@ -1,12 +1,12 @@
 """Fit the network of `isc_core.networks.scene_network`.
 
-  python -m training.networks.scene_network WORLD... --panoramas DIR [--weights NPZ]
+  python -m training.networks.scene_network WORLD... [--panoramas DIR] [--weights NPZ]
   [--device cuda] [--minutes N] -o SCENE.npz
 
-WORLD are folders of `isc world build`. Every photo is taken anew (`training.world.samples`), so
-none is seen twice. `--weights` starts from an archive that an earlier run wrote, `--resume`
-continues an interrupted one; `--side 96` sees photos smaller, which is half the work. Held-out
-bodies under held-out panoramas are measured every thousand steps.
+WORLD are folders of `isc world build`, or packs of `isc world pack`. Every photo is taken anew
+(`training.world.samples`), so none is seen twice. `--weights` starts from an archive that an
+earlier run wrote, `--resume` continues an interrupted one; `--side 96` sees photos smaller, which
+is half the work. Held-out bodies under held-out panoramas are measured every thousand steps.
 
 Equation: see `training.networks.scene_module`.
 
@@ -49,8 +49,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders of isc world build")
-    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas, .exr or .hdr")
+    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--widths", type=int, nargs="+", default=WIDTHS, metavar="N", help="channels by level")
     add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")

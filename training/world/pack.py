@@ -26,14 +26,16 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
-from .environments import Panorama
-from .files import Split
+from .environments import Panorama, read_panoramas
+from .files import Split, read_patterns, views_in
 from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
 FORMAT = 1
 SUFFIX = ".isw"
 _DEPTH, _THICKNESS = 1024.0, 100.0  # steps per unit
+_SHARES = {Split.TRAIN: 0.9, Split.BODY: 0.08, Split.SOURCE: 0.02}
+_PATTERNS, _FIRST_GUESS, _GUESSES, _NEARLY, _MOST_GROWTH = 600, 200, 8, 0.9, 20.0
 _STREAMS = ("normal", "depth", "thickness", "visible")
 
 
@@ -122,6 +124,56 @@ def read_pack(path: Path) -> PackedWorld:
         lzma.LZMAError,
     ) as error:
         raise InputError(f"{path} is no pack of a world: {error}; make it again") from error
+
+
+def pack_worlds(
+    folders: Sequence[Path], panoramas: Path, path: Path, most: int, seed: int
+) -> list[str]:
+    """Pack as many views of worlds as fit into a file.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        Worlds.
+    panoramas : Path
+        Their folder.
+    path : Path
+        The file to write.
+    most : int
+        Bytes that it may have.
+    seed : int
+        Chooses views, and which panoramas are judged.
+
+    Returns
+    -------
+    list of str
+        A line that describes the pack.
+
+    Raises
+    ------
+    InputError
+        If a folder is no world, or not even a few views fit.
+    """
+    views = {split: [v for one in folders for v in views_in(one, split)] for split in Split}
+    atlas = read_patterns(folders[0])
+    few = slice(_PATTERNS)
+    atlas = Atlas(atlas.maps[few], atlas.kinds[few], atlas.tileable[few])
+    found, count, size, whole = read_panoramas(panoramas, seed), _FIRST_GUESS, 0, 0
+    everything = sum(map(len, views.values()))
+    for _ in range(_GUESSES):
+        chosen = {
+            split: chosen_views(views[split], round(count * share), np.random.default_rng(seed))
+            for split, share in _SHARES.items()
+        }
+        size = write_pack(path, PackedWorld(chosen, found, atlas))
+        whole = sum(map(len, chosen.values()))
+        if size <= most and (size > _NEARLY * most or whole == everything):
+            break
+        count = max(1, int(count * min(_MOST_GROWTH, 0.97 * most / size)))
+    if size > most:
+        path.unlink()
+        raise InputError(f"{most} bytes are too few for a pack: allow more")
+    return [f"{path}: {whole} views, {len(found)} panoramas, {size / 1e6:.1f} MB"]
 
 
 def chosen_views(views: Sequence[View], count: int, rng: np.random.Generator) -> list[View]:

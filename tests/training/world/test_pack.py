@@ -10,9 +10,21 @@ pytest.importorskip("torch")
 
 from isc_core.errors import InputError
 from tests.training.world.analytic_views import ellipsoid_view
+from tests.training.world.test_environments import photo, write
+from training.networks.scene_batches import read_world
 from training.world.environments import Panorama
-from training.world.files import Split
-from training.world.pack import PackedWorld, chosen_views, read_pack, write_pack
+from training.world.files import (
+    VIEWS as FOLDER,
+)
+from training.world.files import (
+    Split,
+    WorldSettings,
+    claim_folder,
+    split_of,
+    write_patterns,
+    write_views,
+)
+from training.world.pack import PackedWorld, chosen_views, pack_worlds, read_pack, write_pack
 from training.world.patterns import Atlas
 
 RNG = np.random.default_rng(0)
@@ -86,3 +98,48 @@ def test_every_body_is_chosen_once_before_any_is_chosen_twice() -> None:
     assert sorted(one.name for one in chosen_views(views, 3, rng)) == ["a", "b", "c"]
     assert sorted(one.name for one in chosen_views(views, 5, rng)) == ["a", "a", "b", "b", "c"]
     assert len(chosen_views(views, 9, rng)) == 6
+
+
+def world_folder(root: Path) -> Path:
+    """A world of bodies to learn from and of held-out ones, and panoramas beside it."""
+    claim_folder(root / "world", WorldSettings(0, 1, 0, 0))
+    write_patterns(root / "world", ATLAS)
+    for k in range(24):
+        view = replace(VIEWS[k % 3], name=f"family/ball/{k:04d}")
+        write_views(root / "world" / FOLDER / f"{k:05d}.npz", view.name, [view], "")
+    (root / "hdri").mkdir()
+    for k in range(6):
+        write(root / "hdri" / f"place{k}.exr", photo(seed=k))
+    return root / "world"
+
+
+def test_worlds_are_packed_into_the_bytes_that_are_allowed(tmp_path: Path) -> None:
+    world, path = world_folder(tmp_path), tmp_path / "world.isw"
+    most = 400_000
+    (line,) = pack_worlds([world], tmp_path / "hdri", path, most, seed=0)
+    assert path.stat().st_size <= most and str(path) in line
+    found = read_pack(path)
+    assert len(found.views[Split.TRAIN]) > len(found.views[Split.BODY]) > 0
+    assert all(split_of(one.name) == split for split in Split for one in found.views[split])
+    assert sum(one.judged for one in found.panoramas) == 1
+
+
+def test_too_few_bytes_for_a_pack_are_refused_and_leave_nothing(tmp_path: Path) -> None:
+    world, path = world_folder(tmp_path), tmp_path / "world.isw"
+    with pytest.raises(InputError, match="too few"):
+        pack_worlds([world], tmp_path / "hdri", path, 10_000, seed=0)
+    assert not path.exists()
+
+
+def test_a_fit_reads_a_pack_as_it_reads_a_folder(tmp_path: Path) -> None:
+    world, path = world_folder(tmp_path), tmp_path / "world.isw"
+    pack_worlds([world], tmp_path / "hdri", path, 10**8, seed=0)
+    splits = (Split.TRAIN, Split.BODY)
+    packed = read_world([path], None, splits, 0)
+    plain = read_world([world], tmp_path / "hdri", splits, 0)
+    assert {s: len(v) for s, v in packed.views.items()} == {
+        s: len(v) for s, v in plain.views.items()
+    }
+    assert packed.bank.maps.shape == plain.bank.maps.shape
+    with pytest.raises(InputError, match="--panoramas"):
+        read_world([world], None, splits, 0)
