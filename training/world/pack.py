@@ -11,7 +11,7 @@ Surroundings are kept as half floats at the size that the lighting uses.
 Citation: Z. H. Cigolle et al., "A survey of efficient representations for independent unit
 vectors", Journal of Computer Graphics Techniques 3(2), 2014 (octahedral coordinates).
 
-Limits: normals are off by up to .6 degrees.
+Limits: normals are off by up to a degree.
 """
 
 import lzma
@@ -81,7 +81,7 @@ def write_pack(path: Path, world: PackedWorld) -> int:
         "panorama_names": np.array([one.name for one in world.panoramas]),
         "judged": np.array([one.judged for one in world.panoramas]),
         "radiance": np.stack([one.radiance for one in world.panoramas]).astype(np.float16),
-        "patterns": _stream([np.diff(one, axis=1, prepend=0) for one in world.atlas.maps]),
+        "patterns": _stream([np.diff(one, axis=1, prepend=np.uint8(0)) for one in world.atlas.maps]),
         "kinds": world.atlas.kinds,
         "tileable": world.atlas.tileable,
         "side": np.array(world.atlas.maps.shape[-1]),

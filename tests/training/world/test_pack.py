@@ -65,7 +65,7 @@ def test_a_pack_gives_back_its_world(pack: Path) -> None:
         assert (seen.name, seen.source, seen.distance) == (view.name, view.source, view.distance)
         for exact in ("mask", "visible", "directions"):
             np.testing.assert_array_equal(getattr(seen, exact), getattr(view, exact))
-        assert np.degrees(np.arccos((unit(seen.normal) * unit(view.normal)).sum(1))).max() < 0.7
+        assert np.degrees(np.arccos((unit(seen.normal) * unit(view.normal)).sum(1))).max() < 1
         assert np.abs(seen.depth.astype(float) - view.depth).max() < 0.002
         assert np.abs(seen.thickness.astype(float) - view.thickness).max() < 0.012
     for seen_light, light in zip(found.panoramas, PANORAMAS, strict=True):
@@ -113,6 +113,7 @@ def world_folder(root: Path) -> Path:
     return root / "world"
 
 
+@pytest.mark.slow
 def test_worlds_are_packed_into_the_bytes_that_are_allowed(tmp_path: Path) -> None:
     world, path = world_folder(tmp_path), tmp_path / "world.isw"
     most = 400_000
@@ -124,6 +125,7 @@ def test_worlds_are_packed_into_the_bytes_that_are_allowed(tmp_path: Path) -> No
     assert sum(one.judged for one in found.panoramas) == 1
 
 
+@pytest.mark.slow
 def test_too_few_bytes_for_a_pack_are_refused_and_leave_nothing(tmp_path: Path) -> None:
     world, path = world_folder(tmp_path), tmp_path / "world.isw"
     with pytest.raises(InputError, match="too few"):
@@ -131,6 +133,7 @@ def test_too_few_bytes_for_a_pack_are_refused_and_leave_nothing(tmp_path: Path) 
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_a_fit_reads_a_pack_as_it_reads_a_folder(tmp_path: Path) -> None:
     world, path = world_folder(tmp_path), tmp_path / "world.isw"
     pack_worlds([world], tmp_path / "hdri", path, 10**8, seed=0)
