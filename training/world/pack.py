@@ -81,7 +81,9 @@ def write_pack(path: Path, world: PackedWorld) -> int:
         "panorama_names": np.array([one.name for one in world.panoramas]),
         "judged": np.array([one.judged for one in world.panoramas]),
         "radiance": np.stack([one.radiance for one in world.panoramas]).astype(np.float16),
-        "patterns": _stream([np.diff(one, axis=1, prepend=np.uint8(0)) for one in world.atlas.maps]),
+        "patterns": _stream(
+            [np.diff(one, axis=1, prepend=np.uint8(0)) for one in world.atlas.maps]
+        ),
         "kinds": world.atlas.kinds,
         "tileable": world.atlas.tileable,
         "side": np.array(world.atlas.maps.shape[-1]),
