@@ -166,7 +166,7 @@ def test_commands_and_options_exist() -> None:
             for words in re.findall(r"^\s*(?:\.venv/bin/)?isc ([a-z-]+.*)$", block, re.M):
                 command, *rest = words.split()
                 names = (command, *(rest[:2] if command == "edit" else ()))
-                if command in {"synth", "thesis"} and rest and not rest[0].startswith("-"):
+                if command in {"synth", "thesis", "world"} and rest and not rest[0].startswith("-"):
                     names = (command, rest[0])
                 known.setdefault(names, options_of(*names))
                 wrong += [

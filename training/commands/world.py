@@ -30,7 +30,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser : argparse.ArgumentParser
         Changed in place.
     """
-    jobs = parser.add_subparsers(metavar="JOB", required=True)
+    describe(
+        parser,
+        run,
+        "Bodies that networks learn from: traced once, lit anew for every photo.",
+        examples=_EXAMPLES,
+    )
+    jobs = parser.add_subparsers(title="jobs", metavar="JOB", required=True)
     _declare_pack(jobs.add_parser("pack", help="put a part of a world into one small file"))
     build = jobs.add_parser("build", help=SUMMARY)
     describe(build, run, "Trace bodies from random sides, to train on.", examples=_EXAMPLES)
