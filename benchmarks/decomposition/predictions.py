@@ -1,6 +1,6 @@
 """What the scene network alone says of the MIT-Berkeley objects, which it has not seen.
 
-  python -m benchmarks.decomposition.predictions --data ROOT [--weights NPZ] [--json FILE]
+  python -m benchmarks.decomposition.predictions --data ROOT --weights NPZ [--json FILE]
 
 For each of the twenty images without highlights: the mean angular error of the normals, the mean
 absolute error of the log shading up to a constant, the root mean square of the light that the log
@@ -20,6 +20,7 @@ import numpy as np
 
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
 from isc_core.decomposition.settings import Illumination
+from isc_core.errors import InputError
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
 from isc_core.shading.spherical_harmonics import light_from_reference
@@ -92,10 +93,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
-    parser.add_argument("--weights", type=Path, help="of the network (default: the shipped ones)")
+    parser.add_argument("--weights", type=Path, required=True, help="archive of the network")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     given = parser.parse_args()
-    network = SceneNetwork.read(given.weights) if given.weights else SceneNetwork.shipped()
+    try:
+        network = SceneNetwork.read(given.weights)
+    except InputError as error:
+        parser.error(str(error))
     rows: dict[str, dict[str, dict[str, float]]] = {}
     for light in (Illumination.NATURAL, Illumination.LABORATORY):
         rows[light] = {}

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
 from isc_core.networks.scene_network import (
@@ -119,9 +120,12 @@ def main() -> None:
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
     add("--seed", type=int, default=0, help="seed of the fit (default: %(default)s)")
     given = parser.parse_args()
-    arrays = dict(read_arrays(given.weights))
+    try:
+        arrays = dict(read_arrays(given.weights))
+        world = read_world(given.worlds, given.panoramas, (Split.BODY,), given.seed)
+    except InputError as error:
+        parser.error(str(error))
     network = SceneNetworkModule.of(arrays)
-    world = read_world(given.worlds, given.panoramas, (Split.BODY,), given.seed)
     draw = SceneBatches(
         SceneDraws(world.views[Split.BODY], world.atlas, world.judged, _SIZE, Shares()),
         world.bank,

@@ -22,6 +22,7 @@ from typing import Any
 
 import torch
 
+from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
@@ -60,13 +61,14 @@ def main() -> None:
     arguments = parser.parse_args()
     options = run_options(arguments)
     torch.manual_seed(options.seed)
-    world = read_world(
-        arguments.worlds, arguments.panoramas, (Split.TRAIN, Split.BODY), options.seed
-    )
-    if arguments.weights is None:
-        network = SceneNetworkModule(tuple(arguments.widths))
-    else:
-        network = SceneNetworkModule.of(dict(read_arrays(arguments.weights)))
+    try:
+        start = None if arguments.weights is None else dict(read_arrays(arguments.weights))
+        splits = (Split.TRAIN, Split.BODY)
+        world = read_world(arguments.worlds, arguments.panoramas, splits, options.seed)
+    except InputError as error:
+        parser.error(str(error))
+    widths = tuple(arguments.widths)
+    network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
     schedule = replace(SCHEDULE, rate=arguments.rate, head_rate=arguments.rate)
     shares = Shares()
     for name in arguments.without:
