@@ -54,11 +54,12 @@ from .network_input import NetworkInput
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
 INPUTS, BLOCK = 6, 4
 LIGHT, FACTORS = 27, 3
+FACTOR_SCALE = 0.1  # of the covariance's factors, so that they begin small
 COUNTS, PLACE_COUNT, KIND_COUNT = 3, 256, 3
 GLOBAL = LIGHT * (2 + FACTORS) + COUNTS + PLACE_COUNT + KIND_COUNT
 MIN_LOG_SCALE, MAX_LOG_SCALE = -5.0, 1.5
 COARSE = 3  # levels that the light is read from, the coarsest ones
-_MARGIN = 2.0  # offset of the log ratio: its prior is a small one
+MARGIN = 2.0  # offset of the log ratio: its prior is a small one
 _LEAST = 1e-6
 
 
@@ -355,7 +356,7 @@ def _settled(maps: np.ndarray) -> np.ndarray:
     """Maps with the log ratio as it is meant, so that they can be averaged."""
     found = maps.copy()
     ratio = HEADS[Head.RATIO]
-    found[..., ratio] = np.logaddexp(0, maps[..., ratio] - np.float32(_MARGIN))
+    found[..., ratio] = np.logaddexp(0, maps[..., ratio] - np.float32(MARGIN))
     return found
 
 
@@ -379,7 +380,6 @@ def _scale(log_scale: np.ndarray, mask: np.ndarray, factor: float) -> np.ndarray
 
 
 _FLIPPED = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])  # signs of the harmonics in a mirror
-_FACTOR_SCALE = 0.1  # as in the trainer
 
 
 def _light_of(
@@ -410,7 +410,7 @@ def _split_vector(vector: np.ndarray) -> list[np.ndarray]:
 
 def _covariance(parts: list[np.ndarray]) -> np.ndarray:
     scale = np.exp(np.clip(parts[1], MIN_LOG_SCALE, MAX_LOG_SCALE))
-    factors = _FACTOR_SCALE * parts[2].reshape(LIGHT, FACTORS)
+    factors = FACTOR_SCALE * parts[2].reshape(LIGHT, FACTORS)
     return np.diag(scale**2) + np.einsum("if,jf->ij", factors, factors)
 
 

@@ -25,9 +25,11 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
 from isc_core.networks.scene_network import (
+    FACTOR_SCALE,
     FACTORS,
     HEADS,
     LIGHT,
+    MARGIN,
     MAX_LOG_SCALE,
     MIN_LOG_SCALE,
     TEMPERATURES,
@@ -38,7 +40,7 @@ from ..world.files import Split
 from ..world.recipes import Shares
 from ..world.samples import Sample
 from .scene_batches import SceneBatches, SceneDraws, read_world
-from .scene_module import FACTOR_SCALE, MARGIN, SceneNetworkModule, network_channels
+from .scene_module import SceneNetworkModule, network_channels
 
 _NORMAL, _LAPLACE = 0.6827, 1 - np.exp(-1)  # shares within one scale
 _BATCHES, _SIZE = 24, 32

@@ -29,12 +29,14 @@ from isc_core.networks.scene_network import (
     CHANNELS,
     COARSE,
     COUNTS,
+    FACTOR_SCALE,
     FACTORS,
     GLOBAL,
     HEADS,
     INPUTS,
     KIND_COUNT,
     LIGHT,
+    MARGIN,
     MAX_LOG_SCALE,
     MIN_LOG_SCALE,
     PLACE_COUNT,
@@ -43,12 +45,10 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
+from .torch_layers import network_input
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
-MARGIN = 2.0  # as in isc_core.networks.scene_network
-FACTOR_SCALE = 0.1  # as in isc_core.networks.scene_network
-_DARK = 0.03  # as in isc_core.networks.layers
 
 
 class Block(nn.Module):  # type: ignore[misc]
@@ -264,12 +264,9 @@ def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
     (B, INPUTS, H, W) tensor
     """
     rows, columns = photo.shape[2:]
-    count = mask.sum((2, 3), keepdim=True).clamp(min=1)
-    mean = (photo.mean(1, keepdim=True) * mask).sum((2, 3), keepdim=True) / count
-    light = torch.log(photo / mean.clamp(min=1e-9) + _DARK) * mask
     right = (torch.arange(columns, device=photo.device) + 0.5) * (2 / columns) - 1
     up = 1 - (torch.arange(rows, device=photo.device) + 0.5) * (2 / rows)
-    return torch.cat([light, mask, right * mask, up[:, None] * mask], 1)
+    return torch.cat([network_input(photo, mask), right * mask, up[:, None] * mask], 1)
 
 
 def _thinned(maps: torch.Tensor, batch: Sample, *, random: bool) -> tuple[torch.Tensor, Sample]:

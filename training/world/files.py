@@ -211,7 +211,7 @@ def read_views(path: Path) -> tuple[str, list[View]]:
                 for k, name in enumerate(data["names"])
             ]
     except _DAMAGES as error:
-        raise InputError(f"{path} is not an archive of views: {error}; delete it") from error
+        raise _damaged(path, error) from error
     for view in views:
         count = int(view.mask.sum())
         wanted = ((SIDE, SIDE), (count, 3), (count,), (count,), (count, DIRECTIONS // 8))
@@ -241,6 +241,18 @@ def views_in(folder: Path, split: Split) -> Iterator[View]:
     if not (folder / SETTINGS).is_file():
         raise InputError(f"{folder} is no world: make one with isc world build")
     for path in sorted((folder / VIEWS).glob("*.npz")):
-        reference, views = read_views(path)
-        if split_of(reference) == split:
-            yield from views
+        if split_of(_reference_of(path)) == split:
+            yield from read_views(path)[1]
+
+
+def _reference_of(path: Path) -> str:
+    """The reference of an archive, without unpacking its views."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            return str(data["reference"])
+    except _DAMAGES as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path} is not an archive of views: {error}; delete it")
