@@ -258,6 +258,22 @@ def _as_integers(values: np.ndarray) -> tuple[np.ndarray, float]:
     return np.rint(values.astype(np.float64) / step), step
 
 
+def softmax(score: np.ndarray) -> np.ndarray:
+    """Turn scores into probabilities.
+
+    Parameters
+    ----------
+    score : (n,) ndarray
+
+    Returns
+    -------
+    (n,) ndarray
+        They sum to 1.
+    """
+    shares = np.exp(score - score.max())
+    return np.asarray(shares / shares.sum())
+
+
 def pad_to_stride(
     image: np.ndarray, mask: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:

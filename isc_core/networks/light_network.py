@@ -30,7 +30,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scene.light_estimate import PLACES, LightEstimate
-from .layers import encoded, is_encoder
+from .layers import encoded, is_encoder, softmax
 from .loader import Network, Parameters
 from .network_input import standardise_input
 
@@ -158,8 +158,8 @@ class LightNetwork(Network):
         whole = self._layer("whole", np.concatenate([mean, spread, most])[None], rectified=True)
         counts, places, light = (self._layer(name, whole)[0] for name in _LAYERS[2:])
         return (
-            _softmax(counts),
-            _softmax(places),
+            softmax(counts),
+            softmax(places),
             np.concatenate(
                 [
                     light[:_SHADING],
@@ -237,11 +237,6 @@ def _cell_positions(inside: np.ndarray, weight: np.ndarray) -> np.ndarray:
     )
     x, y = (offset / np.sqrt(max(float(np.einsum("c,cd->", weight, offset**2)), _LEAST))).T
     return np.stack([x, y, x * x, y * y, x * y], axis=1)
-
-
-def _softmax(score: np.ndarray) -> np.ndarray:
-    shares = np.exp(score - score.max())
-    return np.asarray(shares / shares.sum())
 
 
 def _mirror(places: np.ndarray) -> np.ndarray:

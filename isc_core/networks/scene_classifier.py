@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .layers import average_pool, encoded, is_encoder
+from .layers import average_pool, encoded, is_encoder, softmax
 from .loader import Network, Parameters
 from .network_input import standardise_input
 
@@ -98,8 +98,7 @@ class SceneClassifier(Network):
         """Return the probabilities (4,) of `KINDS` for an input of `standardise_input`."""
         features = (np.sqrt(self._moments(image, mask)) - self.middle) / self.scale
         score = np.einsum("n,nk->k", features, self.head) + self.odds
-        shares = np.exp(score - score.max())
-        return np.asarray(shares / shares.sum())
+        return softmax(score)
 
     def _moments(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         steps = iter(zip(self.weights, self.biases, strict=True))

@@ -45,6 +45,7 @@ from .layers import (
     depth_to_space,
     inputs_of,
     is_chain,
+    softmax,
     space_to_depth,
 )
 from .light_network import mirrored_places
@@ -391,9 +392,7 @@ def _light_of(
     mean = (first[0] + signs * second[0]) / 2
     covariance = (_covariance(first) + signs[:, None] * _covariance(second) * signs) / 2
     estimate = LightCoefficientsEstimate(mean.reshape(3, 9).T, factor**2 * covariance)
-    counts, places, kinds = (
-        (_softmax(first[k]), _softmax(second[k])) for k in range(3, len(first))
-    )
+    counts, places, kinds = ((softmax(first[k]), softmax(second[k])) for k in range(3, len(first)))
     flipped = places[1][mirrored_places()]
     return (
         estimate,
@@ -412,8 +411,3 @@ def _covariance(parts: list[np.ndarray]) -> np.ndarray:
     scale = np.exp(np.clip(parts[1], MIN_LOG_SCALE, MAX_LOG_SCALE))
     factors = FACTOR_SCALE * parts[2].reshape(LIGHT, FACTORS)
     return np.diag(scale**2) + np.einsum("if,jf->ij", factors, factors)
-
-
-def _softmax(score: np.ndarray) -> np.ndarray:
-    shares = np.exp(score - score.max())
-    return np.asarray(shares / shares.sum())
