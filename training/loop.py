@@ -4,8 +4,9 @@ Equation: the learning rate at step k of K is rate * min(1, (k + 1) / warm_up) *
 / 2. The exported weights are a running average w' <- w' + (1 - d) (w - w') with
 d = min(d_max, (k + 1) / (k + delay)).
 
-Citation: optimiser: I. Loshchilov and F. Hutter, "Decoupled Weight Decay Regularization", 2019,
-arXiv:1711.05101.
+Citation: optimisers: I. Loshchilov and F. Hutter, "Decoupled Weight Decay Regularization", 2019,
+arXiv:1711.05101; for matrices: K. Jordan et al., "Muon", 2024, with the rates of J. Liu et al.
+2025, arXiv:2502.16982.
 
 With a limit of minutes, k / K is the share of the time that has passed.
 
@@ -31,7 +32,7 @@ from isc_core.io.atomic import new_file
 
 _REPORT_EVERY, _CHECKPOINT_EVERY = 100, 1000  # steps
 _VALIDATION_BATCHES = 8
-_CHECKPOINT_KEYS = {"step", "network", "average", "optimizer"}
+_CHECKPOINT_KEYS = {"step", "network", "average", "optimizers"}
 
 Batch = tuple[torch.Tensor, ...]
 DrawBatch = Callable[[np.random.Generator], Any]
@@ -290,29 +291,30 @@ def fit(
     if options.threads:
         torch.set_num_threads(options.threads)
     network.to(options.device)
-    optimizer, rates = _optimizer(network, schedule)
+    optimizers = _optimizers(network, schedule)
     if options.start is not None:
         network.load_state_dict(_checkpoint(options.start)["average"])
     average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
-        clock.resume(_restore(_checkpoint(options.resume), network, average, optimizer))
+        clock.resume(_restore(_checkpoint(options.resume), network, average, optimizers))
     batches = _loader(draw, options, clock.step)
     held_out = [prepare(batch) for batch in _validation_batches(draw_validation, options)]
     report = _Report()
     while not clock.over:
         share = _rate_share(clock.step, clock.progress, schedule.warm_up)
-        for group, rate in zip(optimizer.param_groups, rates, strict=True):
-            group["lr"] = share * rate + schedule.floor
+        for group in chain(*(one.param_groups for one in optimizers)):
+            group["lr"] = share * group["peak"] + schedule.floor
         loss, terms = network.loss(prepare(next(batches)))
-        optimizer.zero_grad()
+        network.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
+        for optimizer in optimizers:
+            optimizer.step()
         _follow(average, network, clock.step, schedule)
         clock.tick()
         report.add(clock.step, loss, terms, clock.over)
         if clock.step % _CHECKPOINT_EVERY == 0 or clock.over:
-            _write(average, network, optimizer, clock, options.output)
+            _write(average, network, optimizers, clock, options.output)
             if held_out:
                 print(f"  held out: {_shown(_mean_terms(average, held_out))}", flush=True)
     return average
@@ -347,15 +349,27 @@ class _Clock:
         self.step += 1
 
 
-def _optimizer(network: Net, schedule: Schedule) -> tuple[Any, tuple[float, float]]:
+def _optimizers(network: Net, schedule: Schedule) -> list[Any]:
+    """Muon for the encoder's matrices, if it has any, and AdamW for all other parameters."""
     encoder = list(network.encoder_parameters())
+    matrices = [weights for weights in encoder if weights.ndim == 2]
+    others = [weights for weights in encoder if weights.ndim != 2]
     known = {id(weights) for weights in encoder}
     heads = [weights for weights in network.parameters() if id(weights) not in known]
-    rates = (schedule.rate, schedule.head_rate)
+    rates, decay = (schedule.rate, schedule.head_rate), schedule.weight_decay
     groups = [
-        {"params": group, "lr": rate} for group, rate in zip((encoder, heads), rates, strict=True)
+        {"params": group, "lr": rate, "peak": rate}
+        for group, rate in zip((others, heads), rates, strict=True)
     ]
-    return torch.optim.AdamW(groups, weight_decay=schedule.weight_decay, fused=True), rates
+    found = [torch.optim.AdamW(groups, weight_decay=decay, fused=True)]
+    if matrices:
+        group = {"params": matrices, "peak": schedule.rate}
+        found.append(
+            torch.optim.Muon(
+                [group], lr=schedule.rate, weight_decay=decay, adjust_lr_fn="match_rms_adamw"
+            )
+        )
+    return found
 
 
 def _rate_share(step: int, progress: float, warm_up: int) -> float:
@@ -434,18 +448,21 @@ def _checkpoint(path: Path) -> dict[str, Any]:
     return found
 
 
-def _restore(kept: dict[str, Any], network: Net, average: Net, optimizer: Any) -> tuple[int, float]:
+def _restore(
+    kept: dict[str, Any], network: Net, average: Net, optimizers: list[Any]
+) -> tuple[int, float]:
     """Restore a run; return the number of steps already done, and the seconds they took."""
     try:
         network.load_state_dict(kept["network"])
         average.load_state_dict(kept["average"])
-        optimizer.load_state_dict(kept["optimizer"])
-    except RuntimeError as error:
+        for optimizer, state in zip(optimizers, kept["optimizers"], strict=True):
+            optimizer.load_state_dict(state)
+    except (RuntimeError, ValueError) as error:
         raise ValueError(f"the checkpoint is of another network: {error}") from error
     return int(kept["step"]), float(kept.get("seconds", 0))
 
 
-def _write(average: Net, network: Net, optimizer: Any, clock: _Clock, output: Path) -> None:
+def _write(average: Net, network: Net, optimizers: list[Any], clock: _Clock, output: Path) -> None:
     """Write the averaged weights (.npz), and beside them the state to resume from (.pt)."""
     output.parent.mkdir(parents=True, exist_ok=True)
     with new_file(output) as temporary, temporary.open("wb") as file:
@@ -455,7 +472,7 @@ def _write(average: Net, network: Net, optimizer: Any, clock: _Clock, output: Pa
         "seconds": clock.seconds,
         "network": network.state_dict(),
         "average": average.state_dict(),
-        "optimizer": optimizer.state_dict(),
+        "optimizers": [optimizer.state_dict() for optimizer in optimizers],
     }
     with new_file(output.with_suffix(".pt")) as temporary, temporary.open("wb") as file:
         torch.save(state, file)

@@ -51,6 +51,42 @@ WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
 
 
+class Convolution(nn.Module):  # type: ignore[misc]
+    """A 3 x 3 convolution without bias, whose weights are one matrix.
+
+    An optimizer of matrices takes the weights as they are; as a kernel they are a view of the
+    matrix, channels last.
+
+    Parameters
+    ----------
+    inputs, outputs : int
+        Channels.
+    """
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.matrix = nn.Parameter(torch.empty(outputs, 9 * inputs))
+        nn.init.kaiming_normal_(self.matrix, nonlinearity="relu")
+
+    @property
+    def weight(self) -> torch.Tensor:
+        """The kernel (outputs, inputs, 3, 3), a view."""
+        return self.matrix.view(len(self.matrix), 3, 3, -1).permute(0, 3, 1, 2)
+
+    def forward(self, layer: torch.Tensor) -> torch.Tensor:
+        """Convolve.
+
+        Parameters
+        ----------
+        layer : (B, inputs, H, W) tensor
+
+        Returns
+        -------
+        (B, outputs, H, W) tensor
+        """
+        return functional.conv2d(layer, self.weight, padding=1)
+
+
 class Block(nn.Module):  # type: ignore[misc]
     """Two 3 x 3 convolutions, each followed by batch normalisation and max(0, .).
 
@@ -62,9 +98,9 @@ class Block(nn.Module):  # type: ignore[misc]
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
-        self.c1 = nn.Conv2d(inputs, outputs, 3, padding=1, bias=False)
+        self.c1 = Convolution(inputs, outputs)
         self.n1 = nn.BatchNorm2d(outputs)
-        self.c2 = nn.Conv2d(outputs, outputs, 3, padding=1, bias=False)
+        self.c2 = Convolution(outputs, outputs)
         self.n2 = nn.BatchNorm2d(outputs)
 
     def forward(self, layer: torch.Tensor) -> torch.Tensor:
@@ -82,7 +118,7 @@ class Block(nn.Module):  # type: ignore[misc]
         return functional.relu(self.n2(self.c2(layer)))
 
     @property
-    def pairs(self) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
+    def pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
         """The convolutions with their normalisations."""
         return [(self.c1, self.n1), (self.c2, self.n2)]
 
@@ -180,7 +216,7 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         return total, terms
 
     @property
-    def _pairs(self) -> list[tuple[nn.Conv2d, nn.BatchNorm2d]]:
+    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
         return [pair for block in [*self.down, *self.up] for pair in block.pairs]
 
     def arrays(self) -> dict[str, np.ndarray]:

@@ -28,12 +28,14 @@ mirrored surroundings do not end at the surface's horizon.
 
 import math
 from dataclasses import dataclass, fields, replace
+from typing import Self
 
 import numpy as np
 import torch
 from torch.nn import functional
 
 from .reflectance import reflected_share
+from .tensor_batch import TensorBatch
 from .views import DIRECTIONS, LOWEST, SIDE, View
 
 _SOLID_ANGLE = 2 * math.pi * (1 - LOWEST) / DIRECTIONS
@@ -92,7 +94,7 @@ def prepared(view: View) -> PreparedView:
 
 
 @dataclass(frozen=True)
-class ViewBatch:
+class ViewBatch(TensorBatch):
     """B views, their pixels in rows of equal length P; shorter ones are filled up.
 
     Attributes
@@ -117,37 +119,9 @@ class ViewBatch:
     reached: torch.Tensor
     directions: torch.Tensor
 
-    def to(self, device: torch.device) -> "ViewBatch":
-        """Return the batch on a device.
-
-        Parameters
-        ----------
-        device : torch.device
-
-        Returns
-        -------
-        ViewBatch
-        """
-        return replace(
-            self, **{one.name: getattr(self, one.name).to(device) for one in fields(self)}
-        )
-
-    def chosen(self, which: torch.Tensor) -> "ViewBatch":
-        """Return some of the views.
-
-        Parameters
-        ----------
-        which : (b,) int64 tensor
-
-        Returns
-        -------
-        ViewBatch
-        """
-        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)})
-
 
 @dataclass(frozen=True)
-class Material:
+class Material(TensorBatch):
     """The surfaces of B views.
 
     Attributes
@@ -173,19 +147,6 @@ class Material:
     sigma: torch.Tensor
     clear: torch.Tensor
 
-    def chosen(self, which: torch.Tensor) -> "Material":
-        """Return some of the materials.
-
-        Parameters
-        ----------
-        which : (b,) int64 tensor
-
-        Returns
-        -------
-        Material
-        """
-        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)})
-
     def without_diffuse(self, chosen: torch.Tensor) -> "Material":
         """Return the material without diffuse light on the chosen bodies.
 
@@ -201,7 +162,7 @@ class Material:
 
 
 @dataclass(frozen=True)
-class Lights:
+class Lights(TensorBatch):
     """The light on B views.
 
     Attributes
@@ -239,8 +200,8 @@ class Lights:
     given: torch.Tensor
     bounce: torch.Tensor
 
-    def chosen(self, which: torch.Tensor) -> "Lights":
-        """Return some of the lights.
+    def chosen(self, which: torch.Tensor) -> Self:
+        """Return some of the lights; all have the same `alphas`.
 
         Parameters
         ----------
@@ -250,10 +211,8 @@ class Lights:
         -------
         Lights
         """
-        parts = {one.name: getattr(self, one.name) for one in fields(self)}
-        return replace(
-            self, **{name: part[which] for name, part in parts.items() if name != "alphas"}
-        )
+        names = [one.name for one in fields(self) if one.name != "alphas"]
+        return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
 @dataclass(frozen=True)

@@ -1,20 +1,12 @@
-"""Lit views as pictures, and a pool of them that photos are taken of.
+"""Lit views as pictures, from which photos are taken."""
 
-Problem: lighting a view takes several times as long as photographing it. A pool of lit pictures, of
-which a few are exchanged for new ones before each batch, gives every batch many bodies in many
-lights at a fraction of the work.
-
-Limits: a picture stays in the pool for pool size over exchange steps, and is photographed about
-photos over exchange times, each time placed and taken differently.
-"""
-
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import torch
 
 from .lighting import LitViews, ViewBatch
 from .pictures import Bank, lit_pictures
+from .tensor_batch import TensorBatch
 from .views import SIDE
 
 _LEAST_LAMP = 0.12  # of all lamps' light in the picture: below, a lamp does not count
@@ -23,7 +15,7 @@ _LEAST_LIT = 0.02  # of the surroundings' light: below, a lamp does not count
 
 
 @dataclass(frozen=True)
-class LitPictures:
+class LitPictures(TensorBatch):
     """Pictures of B lit views, before any camera.
 
     Attributes
@@ -50,42 +42,6 @@ class LitPictures:
     lamps: torch.Tensor
     strongest: torch.Tensor
     kind: torch.Tensor
-
-    def __len__(self) -> int:
-        return len(self.kind)
-
-    def chosen(self, which: torch.Tensor) -> "LitPictures":
-        """Return some of the pictures.
-
-        Parameters
-        ----------
-        which : (b,) int64 tensor
-
-        Returns
-        -------
-        LitPictures
-        """
-        return LitPictures(**{one.name: getattr(self, one.name)[which] for one in fields(self)})
-
-
-def joined(parts: Sequence[LitPictures]) -> LitPictures:
-    """Concatenate pictures.
-
-    Parameters
-    ----------
-    parts : sequence of LitPictures
-        Not empty.
-
-    Returns
-    -------
-    LitPictures
-    """
-    return LitPictures(
-        **{
-            one.name: torch.cat([getattr(part, one.name) for part in parts])
-            for one in fields(LitPictures)
-        }
-    )
 
 
 def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank) -> LitPictures:
@@ -142,57 +98,3 @@ def _lamps(views: ViewBatch, recipes: dict[str, torch.Tensor]) -> tuple[torch.Te
     number = counts.sum(1).clamp(max=2) * (recipes["given"] == 0)
     best = light.argmax(1)
     return number, toward[torch.arange(len(best), device=best.device), best]
-
-
-class Pool:
-    """Lit pictures, the oldest of which make room for new ones.
-
-    Parameters
-    ----------
-    size : int
-        Most pictures.
-    """
-
-    def __init__(self, size: int) -> None:
-        self._size, self._next = size, 0
-        self._pictures: LitPictures | None = None
-
-    def exchange(self, fresh: LitPictures) -> None:
-        """Add pictures; once the pool is full, in place of the oldest.
-
-        Parameters
-        ----------
-        fresh : LitPictures
-            At most as many as the pool holds.
-        """
-        if self._pictures is None:
-            self._pictures = fresh
-        elif len(self._pictures) + len(fresh) <= self._size:
-            self._pictures = joined([self._pictures, fresh])
-        else:
-            count = len(self._pictures)
-            place = (torch.arange(len(fresh)) + self._next) % count
-            for one in fields(fresh):
-                getattr(self._pictures, one.name)[place] = getattr(fresh, one.name)
-            self._next = (self._next + len(fresh)) % count
-
-    def picked(self, shares: torch.Tensor) -> LitPictures:
-        """Return pictures of the pool.
-
-        Parameters
-        ----------
-        shares : (b,) tensor
-            Places in the pool, as shares of its length, in [0, 1).
-
-        Returns
-        -------
-        LitPictures
-
-        Raises
-        ------
-        ValueError
-            If the pool is empty.
-        """
-        if self._pictures is None:
-            raise ValueError("the pool is empty")
-        return self._pictures.chosen((shares * len(self._pictures)).long())

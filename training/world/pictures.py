@@ -20,6 +20,7 @@ from .environments import smoothed_levels
 from .lighting import Lights, LitViews, Material, ViewBatch, light_coefficients, light_views
 from .patterns import Atlas
 from .recipes import LAYERS, Recipe
+from .tensor_batch import TensorBatch
 
 ALPHAS = (0.06, 0.12, 0.2, 0.33, 0.55)  # roughness of the bank's levels
 _WIDE = 0.16  # the level that serves the stored directions: as wide as they are apart, 20 degrees
@@ -27,7 +28,7 @@ _MOST = 0.95
 
 
 @dataclass(frozen=True)
-class Bank:
+class Bank(TensorBatch):
     """Surroundings and patterns, ready to be looked up.
 
     Attributes
@@ -40,19 +41,6 @@ class Bank:
 
     maps: torch.Tensor
     patterns: torch.Tensor
-
-    def to(self, device: str) -> "Bank":
-        """Return the bank on a device.
-
-        Parameters
-        ----------
-        device : str
-
-        Returns
-        -------
-        Bank
-        """
-        return Bank(self.maps.to(device), self.patterns.to(device))
 
 
 def bank_of(environments: Sequence[np.ndarray], atlas: Atlas) -> Bank:

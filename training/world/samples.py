@@ -8,21 +8,23 @@ Limits: resampling is bilinear.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
 from torch.nn import functional
 
+from isc_core.networks.light_network import mirrored_places
 from isc_core.scene.light_estimate import PLACES
 
 from ..data.random_draws import log_uniform
 from .camera import CameraDraw, draw_camera, exposed, photographed
 from .lighting import PreparedView, ViewBatch, basis_of, batch_of
-from .lit_pictures import LitPictures, Pool, make_pictures
+from .lit_pictures import LitPictures, make_pictures
 from .patterns import Atlas
 from .pictures import Bank, stacked
 from .recipes import Shares, draw_recipe
+from .tensor_batch import Pool, TensorBatch
 from .views import SIDE
 
 OUTPUT = 128  # pixels of the network's input
@@ -111,7 +113,7 @@ class Draw:
 
 
 @dataclass(frozen=True)
-class Sample:
+class Sample(TensorBatch):
     """A batch of photos with their truth.
 
     Attributes
@@ -149,19 +151,6 @@ class Sample:
     count: torch.Tensor
     place: torch.Tensor
     kind: torch.Tensor
-
-    def to(self, device: str) -> "Sample":
-        """Return the batch on a device.
-
-        Parameters
-        ----------
-        device : str
-
-        Returns
-        -------
-        Sample
-        """
-        return Sample(**{name: part.to(device) for name, part in vars(self).items()})
 
 
 def draw_batch(
@@ -246,6 +235,10 @@ def draw_placement(rng: np.random.Generator) -> Placement:
 class Darkroom:
     """Lights what is drawn, and photographs a pool of what was lit.
 
+    Lighting takes several times as long as photographing. A picture stays in the pool for pool size
+    over fresh pictures batches and is photographed about photos over fresh pictures times, each
+    time placed and taken differently.
+
     Parameters
     ----------
     bank : Bank
@@ -257,7 +250,8 @@ class Darkroom:
     """
 
     def __init__(self, bank: Bank, pool: int, side: int = OUTPUT) -> None:
-        self._bank, self._pool, self._side = bank, Pool(pool), side
+        self._bank, self._side = bank, side
+        self._pool = Pool[LitPictures](pool)
 
     def __call__(self, draw: Draw) -> Sample:
         """Finish a batch.
@@ -273,6 +267,40 @@ class Darkroom:
         """
         self._pool.exchange(make_pictures(draw.views, draw.recipes, self._bank))
         return photograph(self._pool.picked(draw.shares), draw.cameras, draw.placements, self._side)
+
+
+_FLIPPED = (1, 1, 1, -1, -1, 1, 1, -1, 1)  # signs of the harmonics, in the order of `basis_of`
+
+
+def mirrored(sample: Sample, chosen: torch.Tensor) -> Sample:
+    """Exchange left and right in some photos.
+
+    Parameters
+    ----------
+    sample : Sample
+    chosen : (B,) bool tensor
+
+    Returns
+    -------
+    Sample
+    """
+    flips, device = chosen[:, None, None, None], chosen.device
+    maps = {
+        name: torch.where(flips, part.flip(-1), part)
+        for name, part in vars(sample).items()
+        if part.ndim == 4
+    }
+    across = torch.tensor([-1.0, 1, 1], device=device)[:, None, None]
+    maps["normal"] = torch.where(flips, maps["normal"] * across, maps["normal"])
+    signs = torch.tensor(_FLIPPED, dtype=sample.light.dtype, device=device).repeat(3)
+    there = torch.from_numpy(mirrored_places()).to(device)[sample.place.clamp(min=0)]
+    place = torch.where(sample.place >= 0, there, sample.place)
+    return replace(
+        sample,
+        **maps,
+        light=torch.where(chosen[:, None], sample.light * signs, sample.light),
+        place=torch.where(chosen, place, sample.place),
+    )
 
 
 def photograph(

@@ -18,7 +18,7 @@ from isc_core.scene.light_estimate import PLACES
 from tests.training.world.analytic_views import ellipsoid_view
 from tests.training.world.test_recipes import ATLAS, bank
 from training.world.lighting import PreparedView, basis_of, prepared
-from training.world.lit_pictures import Pool, make_pictures
+from training.world.lit_pictures import LitPictures, make_pictures
 from training.world.recipes import Shares
 from training.world.samples import (
     OBJECT,
@@ -28,7 +28,9 @@ from training.world.samples import (
     Sample,
     draw_batch,
     draw_placement,
+    mirrored,
 )
+from training.world.tensor_batch import Pool
 
 PHOTOS = 2  # of each picture, one after the other
 
@@ -248,9 +250,29 @@ def test_a_smaller_photo_shows_the_same() -> None:
     torch.testing.assert_close(small.light[:, 1:9], large.light[:, 1:9])
 
 
+def test_photos_can_be_mirrored_afterwards() -> None:
+    one = draw(3, LAMP, 2, plain=True)
+    seen = finished(placed(one, **STRAIGHT))
+    wanted = finished(placed(one, **STRAIGHT | {"mirror": -1.0}))
+    chosen = torch.tensor([True, False, True, False])
+    found = mirrored(seen, chosen)
+    for name in ("normal", "log_shading"):
+        both = (found.known * wanted.known).expand_as(found.normal)[chosen] > 0
+        off = (getattr(found, name) - getattr(wanted, name))[chosen].abs()[both]
+        assert off.quantile(0.98) < 0.02, name
+    torch.testing.assert_close(found.light[chosen], wanted.light[chosen], rtol=1e-3, atol=0.03)
+    places, places_wanted = (torch.from_numpy(PLACES)[of.place[chosen]] for of in (found, wanted))
+    assert float((places - places_wanted).norm(dim=1).max()) < 0.2  # neighbours at most
+    for name, part in vars(found).items():
+        assert torch.equal(part[~chosen], getattr(seen, name)[~chosen]), name
+    twice = mirrored(found, chosen)
+    for name in ("photo", "normal", "light"):
+        torch.testing.assert_close(getattr(twice, name), getattr(seen, name))
+
+
 def test_a_pool_keeps_the_latest_pictures() -> None:
     parts = [make_pictures(one.views, one.recipes, bank()) for one in map(numbered, range(4))]
-    pool = Pool(4)
+    pool = Pool[LitPictures](4)
     with pytest.raises(ValueError, match="empty"):
         pool.picked(torch.zeros(1))
     for part in parts:

@@ -1,0 +1,125 @@
+"""Batches: dataclasses of tensors, and a pool from which batches are drawn several times.
+
+Limits: the tensors of a batch have equal first axes, unless a subclass says otherwise.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Generic, Self, TypeVar
+
+import torch
+
+
+@dataclass(frozen=True)
+class TensorBatch:
+    """Base of dataclasses whose attributes are tensors."""
+
+    def __len__(self) -> int:
+        return len(getattr(self, fields(self)[0].name))
+
+    def to(self, device: str | torch.device) -> Self:
+        """Return the batch on a device.
+
+        Parameters
+        ----------
+        device : str or torch.device
+
+        Returns
+        -------
+        TensorBatch
+            Of the same class.
+        """
+        return replace(
+            self, **{one.name: getattr(self, one.name).to(device) for one in fields(self)}
+        )
+
+    def chosen(self, which: torch.Tensor) -> Self:
+        """Return some rows of the batch.
+
+        Parameters
+        ----------
+        which : (b,) int64 tensor
+
+        Returns
+        -------
+        TensorBatch
+            Of the same class.
+        """
+        return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: Sequence[Self]) -> Self:
+        """Concatenate batches.
+
+        Parameters
+        ----------
+        parts : sequence of TensorBatch
+            Not empty.
+
+        Returns
+        -------
+        TensorBatch
+            Of the same class.
+        """
+        names = [one.name for one in fields(cls)]
+        return cls(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
+
+
+Batch = TypeVar("Batch", bound=TensorBatch)
+
+
+class Pool(Generic[Batch]):
+    """Rows of batches, the oldest of which make room for new ones.
+
+    Parameters
+    ----------
+    size : int
+        Most rows.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._size, self._next = size, 0
+        self._rows: Batch | None = None
+
+    def __len__(self) -> int:
+        return 0 if self._rows is None else len(self._rows)
+
+    def exchange(self, fresh: Batch) -> None:
+        """Add rows; once the pool is full, in place of the oldest.
+
+        Parameters
+        ----------
+        fresh : TensorBatch
+            At most as many rows as the pool holds.
+        """
+        if self._rows is None:
+            self._rows = fresh
+        elif len(self._rows) + len(fresh) <= self._size:
+            self._rows = type(fresh).joined([self._rows, fresh])
+        else:
+            count = len(self._rows)
+            place = (torch.arange(len(fresh)) + self._next) % count
+            for one in fields(fresh):
+                getattr(self._rows, one.name)[place] = getattr(fresh, one.name)
+            self._next = (self._next + len(fresh)) % count
+
+    def picked(self, shares: torch.Tensor) -> Batch:
+        """Return rows of the pool.
+
+        Parameters
+        ----------
+        shares : (b,) tensor
+            Places in the pool, as shares of its length, in [0, 1).
+
+        Returns
+        -------
+        TensorBatch
+
+        Raises
+        ------
+        ValueError
+            If the pool is empty.
+        """
+        if self._rows is None:
+            raise ValueError("the pool is empty")
+        return self._rows.chosen((shares * len(self._rows)).long())
