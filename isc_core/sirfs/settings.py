@@ -118,9 +118,6 @@ ISC_GREY_NATURAL = replace(
     starts=ISC_NATURAL.starts,
 )
 
-# The silhouette term's weight where the expected normals are predicted ones (`normal_prior`).
-PREDICTED_NORMALS_WEIGHT = 0.4
-
 
 @dataclass(frozen=True)
 class PredictionWeights:
@@ -179,7 +176,7 @@ class PredictionWeights:
         return weights, self.loss_tolerance if light else None
 
 
-def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:
+def isc_weights(illumination: str, channels: int) -> Weights:
     """Return our own set of weights.
 
     Parameters
@@ -188,18 +185,14 @@ def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = F
         "natural" or "laboratory".
     channels : int
         3 or 1.
-    normals_predicted : bool
-        Whether the expected normals are predicted by a network.
 
     Returns
     -------
     Weights
     """
     if channels == 1:
-        chosen = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
-    else:
-        chosen = ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
-    return replace(chosen, silhouette=PREDICTED_NORMALS_WEIGHT) if normals_predicted else chosen
+        return ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
+    return ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
 
 
 def published_weights(illumination: str, channels: int) -> Weights:

@@ -33,9 +33,7 @@ from ..world.samples import OUTPUT, Darkroom, Draw, Sample
 from .scene_batches import POOL, REUSE, ReusedPhotos, SceneBatches, SceneDraws, read_world
 from .scene_module import WIDTHS, SceneNetworkModule
 
-SCHEDULE = Schedule(
-    rate=1.5e-3, head_rate=1.5e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998
-)
+SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
     "prints": {"printed": 0.0},
@@ -70,7 +68,7 @@ def main() -> None:
         parser.error(str(error))
     widths = tuple(arguments.widths)
     network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
-    schedule = replace(SCHEDULE, rate=arguments.rate, head_rate=arguments.rate)
+    schedule = replace(SCHEDULE, rate=arguments.rate)
     shares = Shares()
     for name in arguments.without:
         shares = replace(shares, **_ABLATIONS[name])
