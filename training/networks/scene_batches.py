@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from isc_core.errors import InputError
 
@@ -21,14 +20,12 @@ from ..world.pack import read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT, Darkroom, Draw, Sample, draw_batch, mirrored
-from ..world.tensor_batch import Pool
+from ..world.samples import OUTPUT, Darkroom, Draw, Sample, draw_batch
 
 _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
-REUSE = 3  # batches that a photo is in, on average
-PHOTOS = 4  # taken of each lit view, on average
-POOL, ALBUM = 256, 1024  # lit views; photos
+PHOTOS = 8  # taken of each lit view, on average: lighting takes three times as long
+POOL = 512  # lit views
 _ALIKE = 400  # views lit together are so near in size: less is filled up
 
 
@@ -107,42 +104,6 @@ class SceneBatches:
         Sample
         """
         return self._darkroom(self._draw(rng))
-
-
-class ReusedPhotos:
-    """Draws batches of an album of photos, into which a few new ones come before each batch.
-
-    A photo costs about as much as a step of the fit that learns from it, and one step does not
-    exhaust it: each is used `REUSE` times on average, half of the times mirrored.
-
-    Parameters
-    ----------
-    batches : SceneBatches
-        Draws the new photos, a `REUSE`th of a batch.
-    size : int
-        Photos of a batch.
-    """
-
-    def __init__(self, batches: SceneBatches, size: int) -> None:
-        self._batches, self._size, self._album = batches, size, Pool[Sample](ALBUM)
-
-    def __call__(self, rng: np.random.Generator) -> Sample:
-        """Return the next batch.
-
-        Parameters
-        ----------
-        rng : numpy.random.Generator
-
-        Returns
-        -------
-        Sample
-        """
-        self._album.exchange(self._batches(rng))
-        while len(self._album) < self._size:
-            self._album.exchange(self._batches(rng))
-        shares = torch.from_numpy(rng.random(self._size))
-        turned = torch.from_numpy(rng.random(self._size) < 0.5)
-        return mirrored(self._album.picked(shares), turned)
 
 
 @dataclass(frozen=True)

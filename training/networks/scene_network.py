@@ -4,9 +4,9 @@
   [--device cuda] [--minutes N] -o SCENE.npz
 
 WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are taken while the
-network learns (`training.world.samples`); on a CPU each is used a few times (`ReusedPhotos`).
+network learns (`training.world.samples`), and none is used twice.
 `--weights` starts from an archive that an earlier run wrote, `--resume` continues an interrupted
-one; `--side 96` sees photos smaller, which is half the work. Held-out bodies under held-out
+one; `--side 64` sees photos smaller, which is a quarter of the work. Held-out bodies under held-out
 panoramas are measured every thousand steps.
 
 Equation: see `training.networks.scene_module`.
@@ -30,7 +30,7 @@ from ..loop import Schedule, add_run_arguments, fit, run_options
 from ..world.files import Split
 from ..world.recipes import Shares
 from ..world.samples import OUTPUT, Darkroom, Draw, Sample
-from .scene_batches import POOL, REUSE, ReusedPhotos, SceneBatches, SceneDraws, read_world
+from .scene_batches import POOL, SceneBatches, SceneDraws, read_world
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
@@ -84,9 +84,7 @@ def main() -> None:
     side = arguments.side
     held_out = SceneBatches(judged, world.bank, side)
     if options.device == "cpu":
-        few = replace(draw, size=-(-options.batch // REUSE))
-        batches = ReusedPhotos(SceneBatches(few, world.bank, side), options.batch)
-        fit(network, batches, schedule, options, held_out)
+        fit(network, SceneBatches(draw, world.bank, side), schedule, options, held_out)
         return
     # Workers draw, the device lights: it holds the bank and the pool.
     darkroom = Darkroom(world.bank.to(options.device), POOL, side)

@@ -8,13 +8,13 @@ Limits: resampling is bilinear.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch.nn import functional
 
-from isc_core.scene.light_estimate import PLACES, mirrored_places
+from isc_core.scene.light_estimate import PLACES
 
 from .camera import CameraDraw, draw_camera, exposed, photographed
 from .lighting import PreparedView, ViewBatch, basis_of, batch_of
@@ -32,6 +32,7 @@ _CLEARANCE = (OUTPUT - OBJECT) // 2
 _EDGE = 0.12  # of the picture's half side: a step in depth between neighbours that is an edge
 _LEAST = 1e-4
 _MOST_RATIO = 5.0  # of log ratios
+_SPARSE = 2  # pixels: every second row and column says how large an object is
 
 
 @dataclass(frozen=True)
@@ -268,40 +269,6 @@ class Darkroom:
         return photograph(self._pool.picked(draw.shares), draw.cameras, draw.placements, self._side)
 
 
-_FLIPPED = (1, 1, 1, -1, -1, 1, 1, -1, 1)  # signs of the harmonics, in the order of `basis_of`
-
-
-def mirrored(sample: Sample, chosen: torch.Tensor) -> Sample:
-    """Exchange left and right in some photos.
-
-    Parameters
-    ----------
-    sample : Sample
-    chosen : (B,) bool tensor
-
-    Returns
-    -------
-    Sample
-    """
-    flips, device = chosen[:, None, None, None], chosen.device
-    maps = {
-        name: torch.where(flips, part.flip(-1), part)
-        for name, part in vars(sample).items()
-        if part.ndim == 4
-    }
-    across = torch.tensor([-1.0, 1, 1], device=device)[:, None, None]
-    maps["normal"] = torch.where(flips, maps["normal"] * across, maps["normal"])
-    signs = torch.tensor(_FLIPPED, dtype=sample.light.dtype, device=device).repeat(3)
-    there = torch.from_numpy(mirrored_places()).to(device)[sample.place.clamp(min=0)]
-    place = torch.where(sample.place >= 0, there, sample.place)
-    return replace(
-        sample,
-        **maps,
-        light=torch.where(chosen[:, None], sample.light * signs, sample.light),
-        place=torch.where(chosen, place, sample.place),
-    )
-
-
 def photograph(
     pictures: LitPictures,
     cameras: dict[str, torch.Tensor],
@@ -324,7 +291,9 @@ def photograph(
     """
     layers, known, cover = _placed(pictures, placements, side)
     diffuse, gloss, shading, normal, depth = layers.split([3, 3, 3, 3, 1], dim=1)
-    normal = functional.normalize(_turned(normal, placements), dim=1)
+    normal = _turned(normal, placements)
+    # several times as fast as functional.normalize, which walks across the channels
+    normal = normal * torch.rsqrt(normal.square().sum(1, keepdim=True).clamp(min=_LEAST**2))
     mask = _mistaken(cover, placements)
     gain = exposed(diffuse + gloss, known, cameras["exposure"])
     ground = pictures.ground[..., None, None] * torch.ones_like(diffuse)
@@ -369,7 +338,8 @@ def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -
     inverse = torch.stack([inverse[..., 0] * mirror[:, None], inverse[..., 1]], dim=-1)
     down = torch.tensor([1.0, -1], device=cover.device)  # between y up and rows
     inverse = down[:, None] * inverse * down
-    across = torch.linspace(-1, 1, SIDE, device=cover.device)
+    cover = cover[:, ::_SPARSE, ::_SPARSE]
+    across = torch.linspace(-1, 1, SIDE, device=cover.device)[::_SPARSE]
     y, x = torch.meshgrid(across, across, indexing="ij")
     inside = torch.stack([x, y], dim=-1).reshape(1, -1, 2)
     turned = inside @ torch.linalg.inv(inverse).mT

@@ -28,7 +28,6 @@ from training.world.samples import (
     Sample,
     draw_batch,
     draw_placement,
-    mirrored,
 )
 from training.world.tensor_batch import Pool
 
@@ -248,26 +247,6 @@ def test_a_smaller_photo_shows_the_same() -> None:
     off = (functional.avg_pool2d(large.normal, 2) - small.normal).norm(dim=1).numpy()
     assert np.quantile(off[both], 0.99) < 0.03
     torch.testing.assert_close(small.light[:, 1:9], large.light[:, 1:9])
-
-
-def test_photos_can_be_mirrored_afterwards() -> None:
-    one = draw(3, LAMP, 2, plain=True)
-    seen = finished(placed(one, **STRAIGHT))
-    wanted = finished(placed(one, **STRAIGHT | {"mirror": -1.0}))
-    chosen = torch.tensor([True, False, True, False])
-    found = mirrored(seen, chosen)
-    for name in ("normal", "log_shading"):
-        both = (found.known * wanted.known).expand_as(found.normal)[chosen] > 0
-        off = (getattr(found, name) - getattr(wanted, name))[chosen].abs()[both]
-        assert off.quantile(0.98) < 0.02, name
-    torch.testing.assert_close(found.light[chosen], wanted.light[chosen], rtol=1e-3, atol=0.03)
-    places, places_wanted = (torch.from_numpy(PLACES)[of.place[chosen]] for of in (found, wanted))
-    assert float((places - places_wanted).norm(dim=1).max()) < 0.2  # neighbours at most
-    for name, part in vars(found).items():
-        assert torch.equal(part[~chosen], getattr(seen, name)[~chosen]), name
-    twice = mirrored(found, chosen)
-    for name in ("photo", "normal", "light"):
-        torch.testing.assert_close(getattr(twice, name), getattr(seen, name))
 
 
 def test_a_pool_keeps_the_latest_pictures() -> None:
