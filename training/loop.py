@@ -122,8 +122,8 @@ class RunOptions:
     steps: int
     batch: int
     seed: int = 0
-    threads: int = 1
-    workers: int = 1
+    threads: int = 0
+    workers: int = 0
     resume: Path | None = None
     device: str = "cpu"
     minutes: float = 0.0
@@ -144,8 +144,13 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
     add("--steps", type=int, default=steps, help="optimiser steps (default: %(default)s)")
     add("--batch", type=int, default=batch, help="samples per batch (default: %(default)s)")
     add("--seed", type=int, default=0, help="seed of weights and samples (default: %(default)s)")
-    add("--threads", type=int, default=1, help="PyTorch threads (default: %(default)s; 0: all)")
-    add("--workers", type=int, default=1, help="sampling processes (default: %(default)s)")
+    add("--threads", type=int, default=0, help="PyTorch threads (default: all)")
+    add(
+        "--workers",
+        type=int,
+        default=0,
+        help="processes that draw samples; 0, the default: none, the fastest on a CPU",
+    )
     add("--device", default="cpu", choices=("cpu", "cuda"), help="default: %(default)s")
     add("--minutes", type=float, default=0, help="end after so long (default: after --steps)")
     add("--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint")

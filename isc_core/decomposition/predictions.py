@@ -40,9 +40,9 @@ def with_predictions(task: DecompositionTask) -> DecompositionTask:
     )
     light = settings.uses_predicted_light and task.light_coefficients is None
     others = options.check_assumptions or options.fit_lobe or settings.model in SEPARATING_MODELS
-    if task.prediction is None and not (shape or light or others):
-        return task
     seen = task.prediction
+    if not (shape or light) and (seen is not None or not others):
+        return task
     if seen is None:
         photo = task.working
         with task.clock.stage("predict scene"):

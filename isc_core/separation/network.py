@@ -52,7 +52,7 @@ class NetworkOptions:
         How coloured the removed light may be, see `support.light_tint`; at least 1.
     """
 
-    doubt: float = 1.0
+    doubt: float = 1.6
     stands_out: float = 0.3
     tint: float = 1.5
 

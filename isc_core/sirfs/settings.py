@@ -123,7 +123,10 @@ ISC_GREY_NATURAL = replace(
 class PredictionWeights:
     """How far SIRFS trusts what was predicted from the photo.
 
-    The defaults were chosen with simulated predictions, `benchmarks.sirfs.soft_terms`.
+    The defaults are weak: errors of neighbouring pixels are alike, so that what a network says
+    counts less often than the number of pixels. Stronger ones gain more on held-out bodies
+    (`benchmarks.sirfs.prediction_weights`) and do harm where the priors know shapes and lights
+    (`benchmarks.sirfs.soft_terms`); docs/methods/scene_network.md has both.
 
     Attributes
     ----------
@@ -142,9 +145,9 @@ class PredictionWeights:
         The optimiser's where both normals and light are predicted, see `LbfgsOptions`.
     """
 
-    normals: float = 1.5
-    shading: float = 3.0
-    light_temperature: float = 1.0
+    normals: float = 0.3
+    shading: float = 0.3
+    light_temperature: float = 4.0
     starts: tuple[Start, ...] = (Start(light=1),)
     loss_tolerance: float = 2e-4
 

@@ -7,7 +7,7 @@ import pytest
 
 from isc_core.decomposition.predictions import with_predictions
 from isc_core.decomposition.settings import Illumination, LightPrior, ShapePrior
-from isc_core.decomposition.task import DecompositionTask
+from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.known_inputs import SceneConstraints
 from isc_core.scene.light_coefficients_estimate import LightCoefficientsEstimate
@@ -24,7 +24,9 @@ def task() -> DecompositionTask:
     mask = ((y - 20) / 16) ** 2 + ((x - 24) / 20) ** 2 < 1
     image = (0.3 + 0.01 * x[..., None] * np.ones(3)).astype(np.float32) * mask[..., None]
     source = PhotoSource("", (SHAPE[1], SHAPE[0]), 16, "linear", "")
-    return task_of(Photo(image, mask, 1e-4, np.zeros(SHAPE, bool), source))
+    one = task_of(Photo(image, mask, 1e-4, np.zeros(SHAPE, bool), source))
+    alone = SolveOptions(fit_lobe=False, check_assumptions=False)
+    return replace(one, settings=replace(one.settings, model="sirfs"), options=alone)
 
 
 def with_settings(task: DecompositionTask, **changed: str) -> DecompositionTask:
@@ -43,7 +45,7 @@ def test_everything_is_predicted_in_both_lights(task: DecompositionTask, illumin
     assert seen.normal_estimate is not None and seen.shading_estimate is not None
     assert seen.light_coefficients is not None
     assert seen.normal_estimate.normal.shape == (*SHAPE, 3)
-    assert "predict shape and light" in task.clock.seconds
+    assert "predict scene" in task.clock.seconds
     assert with_predictions(seen) is seen
 
 
@@ -74,3 +76,15 @@ def test_what_is_given_or_known_is_not_predicted(task: DecompositionTask) -> Non
         given, light_coefficients=LightCoefficientsEstimate(np.zeros((9, 3)), np.eye(27))
     )
     assert with_predictions(everything) is everything
+
+
+def test_what_else_needs_the_network_gets_its_answer(task: DecompositionTask) -> None:
+    none = with_settings(task, shape_prior=ShapePrior.SILHOUETTE, light_prior=LightPrior.DATASET)
+    for other in (
+        replace(none, options=replace(none.options, check_assumptions=True)),
+        replace(none, options=replace(none.options, fit_lobe=True)),
+        with_settings(none, model="joint"),
+    ):
+        seen = with_predictions(other)
+        assert seen.prediction is not None
+        assert seen.normal_estimate is None and seen.light_coefficients is None
