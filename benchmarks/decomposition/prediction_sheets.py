@@ -1,6 +1,6 @@
 """Sheets of what the scene network predicts, and of results before and after a change.
 
-  python -m benchmarks.decomposition.prediction_sheets bodies WORLD --panoramas DIR [--weights NPZ]
+  python -m benchmarks.decomposition.prediction_sheets bodies WORLD --panoramas DIR --weights NPZ
   -o SHEET.jpg
   python -m benchmarks.decomposition.prediction_sheets results BEFORE AFTER -o SHEET.jpg
 
@@ -65,7 +65,7 @@ def coloured(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def body_rows(
-    world: Path, panoramas: Path, network: SceneNetwork | None, seed: int
+    world: Path, panoramas: Path, network: SceneNetwork, seed: int
 ) -> list[list[np.ndarray]]:
     """Pictures of held-out bodies, a row each.
 
@@ -73,7 +73,7 @@ def body_rows(
     ----------
     world : Path
     panoramas : Path
-    network : SceneNetwork or None
+    network : SceneNetwork
     seed : int
 
     Returns
@@ -175,7 +175,7 @@ def main() -> None:
     bodies = kinds.add_parser("bodies", help="held-out bodies")
     bodies.add_argument("world", type=Path, metavar="WORLD", help="folder of isc world build")
     bodies.add_argument("--panoramas", type=Path, required=True, metavar="DIR")
-    bodies.add_argument("--weights", type=Path, metavar="NPZ", help="default: the shipped network")
+    bodies.add_argument("--weights", type=Path, required=True, metavar="NPZ", help="scene network")
     bodies.add_argument("--seed", type=int, default=0)
     results = kinds.add_parser("results", help="results before and after")
     results.add_argument("before", type=Path, metavar="BEFORE")
@@ -185,7 +185,7 @@ def main() -> None:
     given = parser.parse_args()
     try:
         if given.kind == "bodies":
-            network = None if given.weights is None else SceneNetwork.read(given.weights)
+            network = SceneNetwork.read(given.weights)
             made = sheet(body_rows(given.world, given.panoramas, network, given.seed), 2)
         else:
             made = sheet(result_rows(given.before, given.after), 1)

@@ -1,6 +1,6 @@
 """How far should SIRFS trust what the scene network predicts? Measured on held-out bodies.
 
-  python -m benchmarks.sirfs.prediction_weights WORLD --panoramas DIR [--weights NPZ] [--count N]
+  python -m benchmarks.sirfs.prediction_weights WORLD --panoramas DIR --weights NPZ [--count N]
   [--ways A,B,...] [--illumination NAME] [--seed K] [--json FILE]
 
 WORLD is a folder of `isc world build`. Bodies and panoramas that no fit has seen are lit and
@@ -99,7 +99,7 @@ def lit_bodies(world: Path, panoramas: Path, count: int, seed: int) -> list[Lit]
 
 
 def errors_of(
-    lit: Lit, ways: list[str], illumination: str, network: SceneNetwork | None
+    lit: Lit, ways: list[str], illumination: str, network: SceneNetwork
 ) -> list[list[float]]:
     """Solve one photo in every way.
 
@@ -109,7 +109,7 @@ def errors_of(
     ways : list of str
     illumination : str
         Of the priors.
-    network : SceneNetwork or None
+    network : SceneNetwork
 
     Returns
     -------
@@ -235,7 +235,7 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--weights", type=Path, metavar="NPZ", help="scene network (default: shipped)")
+    add("--weights", type=Path, required=True, metavar="NPZ", help="scene network")
     add("--count", type=int, default=24, help="photos (default: %(default)s)")
     add("--ways", default=WAYS, help="default: %(default)s")
     add("--illumination", default="natural", choices=ILLUMINATIONS, help="priors to use")
@@ -244,7 +244,7 @@ def main() -> None:
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
     ways = given.ways.split(",")
-    network = None if given.weights is None else SceneNetwork.read(given.weights)
+    network = SceneNetwork.read(given.weights)
     photos = lit_bodies(given.world, given.panoramas, given.count, given.seed)
     run = partial(errors_of, ways=ways, illumination=given.illumination, network=network)
     with ProcessPoolExecutor(given.workers) as pool:

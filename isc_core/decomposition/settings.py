@@ -61,8 +61,8 @@ class LightPrior(StrEnum):
     Attributes
     ----------
     PREDICTED
-        That of the data set, multiplied by the light predicted from the photo
-        (`networks.scene_network`); the predicted shading is expected as well.
+        Around the light predicted from the photo (`networks.light_network`); in natural
+        illumination.
     DATASET
         The distribution over all photos of the illumination.
     """
@@ -77,7 +77,8 @@ class ShapePrior(StrEnum):
     Attributes
     ----------
     PREDICTED
-        Normals predicted from the photo (`networks.scene_network`), where no depth is known.
+        Normals predicted from the photo (`networks.normal_network`); in natural illumination, where
+        no depth is known and the frame does not cut the object.
     SILHOUETTE
         Normals that the silhouette suggests.
     """
@@ -180,12 +181,14 @@ class Settings:
     @property
     def uses_predicted_normals(self) -> bool:
         """Whether SIRFS expects the predicted normals."""
-        return self.shape_prior == ShapePrior.PREDICTED
+        natural = self.illumination != Illumination.LABORATORY
+        return natural and self.shape_prior == ShapePrior.PREDICTED
 
     @property
     def uses_predicted_light(self) -> bool:
-        """Whether SIRFS expects the predicted light and shading."""
-        return self.light_prior == LightPrior.PREDICTED
+        """Whether SIRFS expects the predicted light; that of the laboratory is known."""
+        natural = self.illumination != Illumination.LABORATORY
+        return natural and self.light_prior == LightPrior.PREDICTED
 
     def check(self) -> None:
         """Validate the settings.

@@ -243,11 +243,11 @@ class Diagnostics:
     light_colour : LightColourDiagnostics or None
         The colour of the light.
     scene_classes : dict of str to float
-        Probabilities of what the object is made of: "opaque", "mirror" and "glass".
+        Probabilities of the scene classifier.
     light_counts : dict of str to float
         Probabilities of "none", "one" and "several" lights.
     several_lights : float or None
-        Probability of several lights.
+        Probability of several lights, by both networks.
     warnings : tuple of AssumptionWarning
         Violated assumptions.
     """

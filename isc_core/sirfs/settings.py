@@ -118,15 +118,15 @@ ISC_GREY_NATURAL = replace(
     starts=ISC_NATURAL.starts,
 )
 
+# The silhouette term's weight where the expected normals are predicted ones (`normal_prior`).
+PREDICTED_NORMALS_WEIGHT = 0.4
+
 
 @dataclass(frozen=True)
 class PredictionWeights:
     """How far SIRFS trusts what was predicted from the photo.
 
-    The defaults are weak: errors of neighbouring pixels are alike, so that what a network says
-    counts less often than the number of pixels. Stronger ones gain more on held-out bodies
-    (`benchmarks.sirfs.prediction_weights`) and do harm where the priors know shapes and lights
-    (`benchmarks.sirfs.soft_terms`); docs/methods/scene_network.md has both.
+    The defaults were chosen with simulated predictions, `benchmarks.sirfs.soft_terms`.
 
     Attributes
     ----------
@@ -145,9 +145,9 @@ class PredictionWeights:
         The optimiser's where both normals and light are predicted, see `LbfgsOptions`.
     """
 
-    normals: float = 0.3
-    shading: float = 0.3
-    light_temperature: float = 4.0
+    normals: float = 1.5
+    shading: float = 3.0
+    light_temperature: float = 1.0
     starts: tuple[Start, ...] = (Start(light=1),)
     loss_tolerance: float = 2e-4
 
@@ -179,7 +179,7 @@ class PredictionWeights:
         return weights, self.loss_tolerance if light else None
 
 
-def isc_weights(illumination: str, channels: int) -> Weights:
+def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:
     """Return our own set of weights.
 
     Parameters
@@ -188,14 +188,18 @@ def isc_weights(illumination: str, channels: int) -> Weights:
         "natural" or "laboratory".
     channels : int
         3 or 1.
+    normals_predicted : bool
+        Whether the expected normals are predicted by a network.
 
     Returns
     -------
     Weights
     """
     if channels == 1:
-        return ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
-    return ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+        chosen = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
+    else:
+        chosen = ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+    return replace(chosen, silhouette=PREDICTED_NORMALS_WEIGHT) if normals_predicted else chosen
 
 
 def published_weights(illumination: str, channels: int) -> Weights:

@@ -1,0 +1,1 @@
+"""Samples to fit networks on: rendered, traced and relit objects with known ground truth."""
