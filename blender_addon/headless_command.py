@@ -153,8 +153,8 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--illumination",
-        default="natural",
-        choices=("natural", "laboratory"),
+        default="photo",
+        choices=("photo", "natural", "laboratory"),
         help="prior of the light (default: %(default)s)",
     )
     add(

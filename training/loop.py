@@ -1,4 +1,4 @@
-"""The training loop of all networks.
+"""The training loop of the networks.
 
 Equation: the learning rate at step k of K is rate * min(1, (k + 1) / warm_up) * (1 + cos(pi k / K))
 / 2. The exported weights are a running average w' <- w' + (1 - d) (w - w') with
@@ -37,14 +37,13 @@ _CHECKPOINT_KEYS = {"step", "network", "average", "optimizers"}
 Batch = tuple[torch.Tensor, ...]
 DrawBatch = Callable[[np.random.Generator], Any]
 Prepare = Callable[[Any], Any]
-Member = TypeVar("Member")
 
 
 class Trainable(Protocol):
     """What the loop needs of a network besides `torch.nn.Module`."""
 
-    def encoder_parameters(self) -> Sequence[nn.Parameter]:
-        """Return the parameters that start from a fitted encoder."""
+    def matrices(self) -> Sequence[nn.Parameter]:
+        """Return the weights that are matrices: Muon fits them, AdamW all others."""
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its named terms.
@@ -75,15 +74,11 @@ class Schedule:
     Attributes
     ----------
     rate : float
-        Peak learning rate of the encoder.
-    head_rate : float
-        Peak learning rate of all other parameters.
+        Peak learning rate.
     weight_decay : float
         Decoupled weight decay.
     warm_up : int
         Steps over which the rate rises linearly.
-    floor : float
-        Added to every rate.
     average_limit : float
         Largest share of the old weights in the running average.
     average_delay : int
@@ -91,10 +86,8 @@ class Schedule:
     """
 
     rate: float
-    head_rate: float
     weight_decay: float = 1e-2
     warm_up: int = 100
-    floor: float = 0.0
     average_limit: float = 0.995
     average_delay: int = 20
 
@@ -117,12 +110,8 @@ class RunOptions:
         Threads of PyTorch; 0 keeps its default.
     workers : int
         Processes that draw samples; 0 draws them in the main process.
-    validation : float
-        Share of the subjects held out, in [0, 1).
     resume : Path or None
         Checkpoint of an interrupted run to continue.
-    start : Path or None
-        Checkpoint whose averaged weights a new run starts from.
     device : str
         Where the network is fitted: "cpu" or "cuda".
     minutes : float
@@ -135,9 +124,7 @@ class RunOptions:
     seed: int = 0
     threads: int = 0
     workers: int = 0
-    validation: float = 0.0
     resume: Path | None = None
-    start: Path | None = None
     device: str = "cpu"
     minutes: float = 0.0
 
@@ -164,23 +151,9 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
         default=0,
         help="processes that draw samples; 0, the default: none, the fastest on a CPU",
     )
-    add(
-        "--validation",
-        type=float,
-        default=0.0,
-        metavar="SHARE",
-        help="share of subjects to hold out for validation (default: none, as for the shipped "
-        "networks)",
-    )
     add("--device", default="cpu", choices=("cpu", "cuda"), help="default: %(default)s")
     add("--minutes", type=float, default=0, help="end after so long (default: after --steps)")
-    begin = parser.add_mutually_exclusive_group()
-    begin.add_argument(
-        "--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint"
-    )
-    begin.add_argument(
-        "--start", type=Path, metavar="PT", help="start a new run from a checkpoint's weights"
-    )
+    add("--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint")
 
 
 def run_options(arguments: argparse.Namespace) -> RunOptions:
@@ -201,42 +174,9 @@ def run_options(arguments: argparse.Namespace) -> RunOptions:
         arguments.seed,
         arguments.threads,
         arguments.workers,
-        arguments.validation,
         arguments.resume,
-        arguments.start,
         arguments.device,
         arguments.minutes,
-    )
-
-
-def split(
-    members: Sequence[Member], name: Callable[[Member], str], options: RunOptions
-) -> tuple[list[Member], list[Member]]:
-    """Split subjects into a training set and a validation set.
-
-    Subjects of the same name stay together: views of one object never lie in both sets.
-
-    Parameters
-    ----------
-    members : sequence
-        The subjects.
-    name : callable
-        Returns the name of a subject's object or shape family.
-    options : RunOptions
-        `validation` and `seed` are used.
-
-    Returns
-    -------
-    training, validation : list
-        `validation` is empty if the share is 0.
-    """
-    names = sorted({name(member) for member in members})
-    count = math.ceil(options.validation * len(names)) if options.validation else 0
-    order = np.random.default_rng([options.seed, 1]).permutation(len(names))
-    held_out = {names[k] for k in order[: min(count, len(names) - 1)]}
-    return (
-        [member for member in members if name(member) not in held_out],
-        [member for member in members if name(member) in held_out],
     )
 
 
@@ -297,8 +237,6 @@ def fit(
         torch.set_num_threads(options.threads)
     network.to(options.device)
     optimizers = _optimizers(network, schedule)
-    if options.start is not None:
-        network.load_state_dict(_checkpoint(options.start)["average"])
     average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
         clock.resume(_restore(_checkpoint(options.resume), network, average, optimizers))
@@ -308,7 +246,7 @@ def fit(
     while not clock.over:
         share = _rate_share(clock.step, clock.progress, schedule.warm_up)
         for group in chain(*(one.param_groups for one in optimizers)):
-            group["lr"] = share * group["peak"] + schedule.floor
+            group["lr"] = share * schedule.rate
         loss, terms = network.loss(prepare(next(batches)))
         network.zero_grad()
         loss.backward()
@@ -355,26 +293,14 @@ class _Clock:
 
 
 def _optimizers(network: Net, schedule: Schedule) -> list[Any]:
-    """Muon for the encoder's matrices, if it has any, and AdamW for all other parameters."""
-    encoder = list(network.encoder_parameters())
-    matrices = [weights for weights in encoder if weights.ndim == 2]
-    others = [weights for weights in encoder if weights.ndim != 2]
-    known = {id(weights) for weights in encoder}
-    heads = [weights for weights in network.parameters() if id(weights) not in known]
-    rates, decay = (schedule.rate, schedule.head_rate), schedule.weight_decay
-    groups = [
-        {"params": group, "lr": rate, "peak": rate}
-        for group, rate in zip((others, heads), rates, strict=True)
+    matrices = list(network.matrices())
+    known = {id(weights) for weights in matrices}
+    others = [weights for weights in network.parameters() if id(weights) not in known]
+    common = {"lr": schedule.rate, "weight_decay": schedule.weight_decay}
+    return [
+        torch.optim.Muon(matrices, adjust_lr_fn="match_rms_adamw", **common),
+        torch.optim.AdamW(others, fused=True, **common),
     ]
-    found = [torch.optim.AdamW(groups, weight_decay=decay, fused=True)]
-    if matrices:
-        group = {"params": matrices, "peak": schedule.rate}
-        found.append(
-            torch.optim.Muon(
-                [group], lr=schedule.rate, weight_decay=decay, adjust_lr_fn="match_rms_adamw"
-            )
-        )
-    return found
 
 
 def _rate_share(step: int, progress: float, warm_up: int) -> float:

@@ -1,12 +1,11 @@
 """Measure how often photos get assumption warnings, rightly and wrongly.
 
-  python -m benchmarks.decomposition.assumption_checks SCENES... [--photos DIR...] [--data ROOT...]
-  [--only NAME...] [--classifier FILE] [--light-network FILE]
+  python -m benchmarks.decomposition.assumption_checks [--world WORLD --panoramas DIR]
+  [--batches N] [--photos DIR...] [--data ROOT...] [--weights FILE]
 
-SCENES are folders of `training.data.rendered_scenes`; of their rigs, one light and then all lights
-are switched on. `--photos` are folders of photos with masks. `--data` are sets like MIT-Berkeley's:
-their laboratory photos with and without gloss. `--only` keeps these shape families and objects.
-Prints a Markdown table, and below it the photos with warnings.
+WORLD is a folder of `isc world build`: held-out bodies are lit by held-out panoramas. `--photos`
+are folders of photos with masks. `--data` are sets like MIT-Berkeley's: their laboratory photos
+with and without gloss. Prints a Markdown table, and below it the photos with warnings.
 """
 
 import argparse
@@ -20,11 +19,12 @@ import numpy as np
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.decomposition.assumption_checks import check_scene
 from isc_core.errors import InputError
-from isc_core.networks.light_network import LightNetwork, predict_light
-from isc_core.networks.scene_classifier import SceneClassifier, classify_scene
+from isc_core.networks.scene_network import Kind, SceneNetwork, predict_scene
 from isc_core.photo import read_photo
 from isc_core.scene.diagnostics import WarningKind
-from training.data.rendered_scenes import SceneKind, scenes_in
+
+_LAMPS = ("no lamp", "one lamp", "several lamps")
+_SIZE = 32  # photos of a batch
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class CheckedPhoto:
     group : str
         Row of the table.
     name : str
-        Printed if the photo gets a warning; "" for rendered scenes.
+        Printed if the photo gets a warning; "" for lit bodies.
     """
 
     image: np.ndarray
@@ -49,32 +49,37 @@ class CheckedPhoto:
     name: str = ""
 
 
-def rendered(folder: Path, only: Sequence[str]) -> Iterator[CheckedPhoto]:
-    """Read the scenes of `training.data.rendered_scenes`.
+def lit(world: Path, panoramas: Path, batches: int) -> Iterator[CheckedPhoto]:
+    """Light held-out bodies.
 
     Parameters
     ----------
-    folder : Path
-        Their folder.
-    only : sequence of str
-        Shape families to keep; empty: all.
+    world : Path
+        Folder of `isc world build`.
+    panoramas : Path
+        Folder of panoramas.
+    batches : int
+        Photos to take, in batches of 32.
 
     Yields
     ------
     CheckedPhoto
-        One per scene, two per rig.
     """
-    for scene in scenes_in(folder):
-        layers = scene.layers
-        if only and scene.shape not in only:
-            continue
-        if scene.kind == SceneKind.RIG:
-            ambient, count = 0.1 * layers[-1], len(layers) - 1
-            yield CheckedPhoto(layers[0] + ambient, scene.mask, "rig, one light")
-            yield CheckedPhoto(layers[:-1].sum(0) + ambient, scene.mask, f"rig, {count} lights")
-        else:
-            group = f"{scene.kind.value}, {scene.environment}"
-            yield CheckedPhoto(layers.sum(0), scene.mask, group)
+    from training.networks.scene_batches import SceneBatches, SceneDraws, read_world
+    from training.world.files import Split
+    from training.world.recipes import Shares
+
+    found = read_world([world], panoramas, (Split.BODY,), 0)
+    draws = SceneDraws(found.views[Split.BODY], found.atlas, found.judged, _SIZE, Shares())
+    draw, rng = SceneBatches(draws, found.bank), np.random.default_rng(0)
+    for _ in range(batches):
+        sample = draw(rng)
+        for k in range(_SIZE):
+            kind = list(Kind)[int(sample.kind[k])]
+            lamps = _LAMPS[int(sample.count[k])]
+            group = f"lit, {lamps}" if kind == Kind.OPAQUE else f"lit, {kind}"
+            image = sample.photo[k].permute(1, 2, 0).numpy()
+            yield CheckedPhoto(image, sample.mask[k, 0].numpy() > 0, group)
 
 
 def photographed(folder: Path) -> Iterator[CheckedPhoto]:
@@ -95,15 +100,13 @@ def photographed(folder: Path) -> Iterator[CheckedPhoto]:
         yield CheckedPhoto(photo.image, photo.mask, folder.name, path.stem)
 
 
-def laboratory(root: Path, only: Sequence[str]) -> Iterator[CheckedPhoto]:
+def laboratory(root: Path) -> Iterator[CheckedPhoto]:
     """Read the laboratory photos of a set like MIT-Berkeley's.
 
     Parameters
     ----------
     root : Path
         The set.
-    only : sequence of str
-        Objects to keep; empty: all.
 
     Yields
     ------
@@ -112,9 +115,8 @@ def laboratory(root: Path, only: Sequence[str]) -> Iterator[CheckedPhoto]:
     """
     for name in list_objects(root, "laboratory"):
         for kind in ("original", "diffuse"):
-            if not only or name in only:
-                photo = load_object(root, name, "laboratory", kind)
-                yield CheckedPhoto(photo.image, photo.valid, f"{root.name}, {kind}", name)
+            photo = load_object(root, name, "laboratory", kind)
+            yield CheckedPhoto(photo.image, photo.valid, f"{root.name}, {kind}", name)
 
 
 def main() -> None:
@@ -123,46 +125,39 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("scenes", type=Path, nargs="*", help="folders of training.data.rendered_scenes")
+    add("--world", type=Path, metavar="WORLD", help="folder of isc world build")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas, for --world")
+    add("--batches", type=int, default=20, help="of 32 lit photos each (default: %(default)s)")
     add("--photos", type=Path, nargs="+", default=[], metavar="DIR", help="photos with masks")
     add("--data", type=Path, nargs="+", default=[], metavar="ROOT", help="sets of objects")
-    add("--only", nargs="+", default=[], metavar="NAME", help="shapes and objects to keep")
-    add("--classifier", type=Path, metavar="NPZ", help="scene classifier (default: shipped)")
-    add("--light-network", type=Path, metavar="NPZ", help="light network (default: shipped)")
-    arguments = parser.parse_args()
-    classifier, lights = arguments.classifier, arguments.light_network
+    add("--weights", type=Path, metavar="NPZ", help="scene network (default: shipped)")
+    given = parser.parse_args()
+    if given.world and not given.panoramas:
+        parser.error("--world needs --panoramas")
     try:
-        report(
-            list(_photos(arguments)),
-            SceneClassifier.shipped() if classifier is None else SceneClassifier.read(classifier),
-            LightNetwork.shipped() if lights is None else LightNetwork.read(lights),
-        )
+        network = None if given.weights is None else SceneNetwork.read(given.weights)
+        report(list(_photos(given)), network or SceneNetwork.shipped())
     except InputError as error:
         parser.error(str(error))
 
 
-def _photos(arguments: argparse.Namespace) -> Iterator[CheckedPhoto]:
-    for folder in arguments.scenes:
-        yield from rendered(folder, arguments.only)
-    for folder in arguments.photos:
+def _photos(given: argparse.Namespace) -> Iterator[CheckedPhoto]:
+    if given.world:
+        yield from lit(given.world, given.panoramas, given.batches)
+    for folder in given.photos:
         yield from photographed(folder)
-    for root in arguments.data:
-        yield from laboratory(root, arguments.only)
+    for root in given.data:
+        yield from laboratory(root)
 
 
-def report(
-    photos: Sequence[CheckedPhoto], classifier: SceneClassifier, lights: LightNetwork
-) -> None:
+def report(photos: Sequence[CheckedPhoto], network: SceneNetwork) -> None:
     """Print the table, and the photos with warnings.
 
     Parameters
     ----------
     photos : sequence of CheckedPhoto
         The photos.
-    classifier : SceneClassifier
-        Predicts the class of scene.
-    lights : LightNetwork
-        Predicts the number of lights.
+    network : SceneNetwork
 
     Raises
     ------
@@ -170,15 +165,9 @@ def report(
         If there are no photos.
     """
     if not photos:
-        raise InputError("no photos; give folders of scenes, --photos or --data")
+        raise InputError("no photos; give --world, --photos or --data")
     found = [
-        {
-            warning.kind
-            for warning in check_scene(
-                classify_scene(photo.image, photo.mask, classifier),
-                predict_light(photo.image, photo.mask, lights),
-            )
-        }
+        {one.kind for one in check_scene(predict_scene(photo.image, photo.mask, network))}
         for photo in photos
     ]
     lines = [

@@ -1,12 +1,11 @@
 """Compare the models on glossy photos with SIRFS on the photo and on the true diffuse image.
 
   python -m benchmarks.decomposition.joint_models --data ../shared/data/mit_berkeley_train
-      --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural] [--networks FOLDER]
-      [--models plain,joint] [--roundings K] [--shape-prior PRIOR]
+      --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural] [--weights NPZ]
+      [--models plain,joint] [--roundings K] [--unpredicted]
 
 Sets: the laboratory originals, and every folder of DIR, as written by `isc synth glossy-mit`.
-`--networks`: for each object a network fitted without it, `OBJECT.npz` of
-`training.networks.layer_network`; by default the shipped network, which was fitted with all.
+`--weights`: a scene network; by default the shipped one. Neither has learned from these objects.
 `--roundings`: each photo is measured that often, all but the first time with values perturbed by
 about 1e-7: SIRFS has many minima, and the last digit decides between them. Writes OUT/rows.jsonl,
 one row per run, which is kept, and OUT/tables.md: geometric means of errors relative to plain
@@ -27,11 +26,11 @@ import numpy as np
 from benchmarks.records import append_row, read_rows
 from benchmarks.sirfs.mit_berkeley import rounded
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
-from isc_core.decomposition.settings import SHAPE_PRIORS, ShapePrior
+from isc_core.decomposition.settings import LightPrior, ShapePrior
 from isc_core.evaluation.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation.metrics import score
 from isc_core.evaluation.runner import RunnerOptions, make_runner
-from isc_core.networks.layer_network import LayerNetwork
+from isc_core.networks.scene_network import SceneNetwork
 from isc_core.progress import Monitor
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
@@ -68,8 +67,9 @@ def run_model(
     model: str,
     photo: MitBerkeleyObject,
     diffuse: MitBerkeleyObject,
-    network: LayerNetwork | None,
-    shape_prior: str = ShapePrior.SILHOUETTE,
+    network: SceneNetwork | None,
+    *,
+    predicted: bool = True,
 ) -> tuple[Estimate, float]:
     """Run a model on a photo.
 
@@ -79,10 +79,10 @@ def run_model(
         One of `MODELS`.
     photo, diffuse : MitBerkeleyObject
         The object as photographed, and its diffuse image.
-    network : LayerNetwork or None
+    network : SceneNetwork or None
         Instead of the shipped one.
-    shape_prior : str, optional
-        As for `isc evaluate`.
+    predicted : bool
+        Whether SIRFS expects what the network predicts, as users' runs do.
 
     Returns
     -------
@@ -93,7 +93,9 @@ def run_model(
     """
     truth = diffuse if model == "true diffuse" else photo
     options = RunnerOptions(
-        "sirfs" if model in ("plain", "true diffuse") else model, shape_prior=shape_prior
+        "sirfs" if model in ("plain", "true diffuse") else model,
+        light_prior=LightPrior.PREDICTED if predicted else LightPrior.DATASET,
+        shape_prior=ShapePrior.PREDICTED if predicted else ShapePrior.SILHOUETTE,
     )
     began = time.perf_counter()
     answer = make_runner(options, shipped_prior_set(), network)(truth, Monitor())
@@ -115,6 +117,7 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
     """
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
+    network = SceneNetwork.read(given.weights) if given.weights else None
     done = {(row["set"], row["object"], row["model"], row.get("rounding", 0)) for row in rows}
     folders = [
         given.data,
@@ -136,10 +139,11 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             if not missing:
                 continue
             photos = photo_of(folder, name)
-            network = LayerNetwork.read(given.networks / f"{name}.npz") if given.networks else None
             for rounding, model in missing:
                 photo, diffuse = (rounded(one, rounding) for one in photos)
-                answer, seconds = run_model(model, photo, diffuse, network, given.shape_prior)
+                answer, seconds = run_model(
+                    model, photo, diffuse, network, predicted=not given.unpredicted
+                )
                 rows.append(
                     row_of(label, name, model, photo, answer, seconds) | {"rounding": rounding}
                 )
@@ -255,17 +259,12 @@ def main() -> None:
     )
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
     parser.add_argument("--glossy", type=Path, help="a run of isc synth glossy-mit")
-    parser.add_argument("--networks", type=Path, help="networks fitted without each object")
+    parser.add_argument("--weights", type=Path, help="a scene network (default: the shipped one)")
     parser.add_argument("--objects", type=_names, default=[], help="comma-separated (default: all)")
     parser.add_argument("--sets", type=_names, default=[], help="comma-separated (default: all)")
     parser.add_argument("--models", type=_names, default=MODELS, help="comma-separated models")
     parser.add_argument("--roundings", type=int, default=1, help="perturbations")
-    parser.add_argument(
-        "--shape-prior",
-        choices=SHAPE_PRIORS,
-        default=ShapePrior.SILHOUETTE.value,
-        help="as for isc evaluate",
-    )
+    parser.add_argument("--unpredicted", action="store_true", help="SIRFS without predictions")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

@@ -22,7 +22,7 @@ import numpy as np
 
 from isc_core.decomposition.pipeline import decompose
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
-from isc_core.networks.light_network import predict_light
+from isc_core.networks.scene_network import predict_scene
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.lobe_fit import Interval, LobeFit
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
@@ -338,7 +338,7 @@ def chain_fit(scene: LobeScene) -> FitRow:
     m, mask = scene.maps, scene.maps["mask"]
     start = time.perf_counter()
     outline = silhouette_normals(mask, shipped_prior_set().silhouette)
-    light_estimate = predict_light(np.maximum(m["image"], 0), mask)
+    light_estimate = predict_scene(np.maximum(m["image"], 0), mask).lamps
     fit = fit_lobe(
         m["chain_specular"],
         m["chain_normal"],

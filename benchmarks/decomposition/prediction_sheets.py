@@ -1,6 +1,6 @@
 """Sheets of what the scene network predicts, and of results before and after a change.
 
-  python -m benchmarks.decomposition.prediction_sheets bodies WORLD --panoramas DIR --weights NPZ
+  python -m benchmarks.decomposition.prediction_sheets bodies WORLD --panoramas DIR [--weights NPZ]
   -o SHEET.jpg
   python -m benchmarks.decomposition.prediction_sheets results BEFORE AFTER -o SHEET.jpg
 
@@ -18,6 +18,7 @@ import numpy as np
 from PIL import Image
 
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.networks.scene_network import SceneNetwork, predict_scene
 from isc_core.result_files.result_folder import load
 from isc_core.scene.decomposition import Decomposition
@@ -42,7 +43,7 @@ def toned(light: np.ndarray, mask: np.ndarray, white: float | None = None) -> np
         White outside the mask.
     """
     level = white or max(float(np.percentile(light[mask].max(axis=1), _WHITE)), 1e-9)
-    tone = np.clip(light / level, 0, 1) ** (1 / 2.2)
+    tone = linear_to_srgb(np.clip(light / level, 0, 1))
     return np.where(mask[..., None], np.rint(255 * tone), 255).astype(np.uint8)
 
 
@@ -65,7 +66,7 @@ def coloured(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def body_rows(
-    world: Path, panoramas: Path, network: SceneNetwork, seed: int
+    world: Path, panoramas: Path, network: SceneNetwork | None, seed: int
 ) -> list[list[np.ndarray]]:
     """Pictures of held-out bodies, a row each.
 
@@ -73,7 +74,7 @@ def body_rows(
     ----------
     world : Path
     panoramas : Path
-    network : SceneNetwork
+    network : SceneNetwork or None
     seed : int
 
     Returns
@@ -175,7 +176,7 @@ def main() -> None:
     bodies = kinds.add_parser("bodies", help="held-out bodies")
     bodies.add_argument("world", type=Path, metavar="WORLD", help="folder of isc world build")
     bodies.add_argument("--panoramas", type=Path, required=True, metavar="DIR")
-    bodies.add_argument("--weights", type=Path, required=True, metavar="NPZ", help="scene network")
+    bodies.add_argument("--weights", type=Path, metavar="NPZ", help="default: the shipped network")
     bodies.add_argument("--seed", type=int, default=0)
     results = kinds.add_parser("results", help="results before and after")
     results.add_argument("before", type=Path, metavar="BEFORE")
@@ -185,7 +186,7 @@ def main() -> None:
     given = parser.parse_args()
     try:
         if given.kind == "bodies":
-            network = SceneNetwork.read(given.weights)
+            network = None if given.weights is None else SceneNetwork.read(given.weights)
             made = sheet(body_rows(given.world, given.panoramas, network, given.seed), 2)
         else:
             made = sheet(result_rows(given.before, given.after), 1)

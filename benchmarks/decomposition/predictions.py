@@ -1,6 +1,6 @@
 """What the scene network alone says of the MIT-Berkeley objects, which it has not seen.
 
-  python -m benchmarks.decomposition.predictions --data ROOT --weights NPZ [--json FILE]
+  python -m benchmarks.decomposition.predictions --data ROOT [--weights NPZ] [--json FILE]
 
 For each of the twenty images without highlights: the mean angular error of the normals, the mean
 absolute error of the log shading up to a constant, the root mean square of the light that the log
@@ -22,25 +22,27 @@ from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load
 from isc_core.decomposition.settings import Illumination
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import truth_normal
-from isc_core.networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
+from isc_core.networks.scene_network import SceneNetwork, predict_scene
+from isc_core.separation.network import separate
 from isc_core.shading.spherical_harmonics import light_from_reference
 
 _LEAST = 1e-4
 
 
-def measure(truth: MitBerkeleyObject, found: ScenePrediction) -> dict[str, float]:
+def measure(truth: MitBerkeleyObject, network: SceneNetwork | None) -> dict[str, float]:
     """Compare a prediction with the truth.
 
     Parameters
     ----------
     truth : MitBerkeleyObject
-    found : ScenePrediction
+    network : SceneNetwork or None
 
     Returns
     -------
     dict of str to float
         By column.
     """
+    found = predict_scene(truth.image, truth.mask, network)
     known = truth.mask & np.isfinite(truth.height) & truth.valid
     normal = truth_normal(np.where(known, truth.height, np.nan))
     sure = known & np.isfinite(normal).all(-1)
@@ -50,7 +52,7 @@ def measure(truth: MitBerkeleyObject, found: ScenePrediction) -> dict[str, float
     off = np.abs(predicted[:, :2] - normal[sure][:, :2]) <= found.normals.deviation[sure, None]
     shading = np.log(np.maximum(truth.shading[sure], _LEAST)) - found.shading.log_shading[sure]
     shading_error = np.abs(shading - np.median(shading))
-    taken = truth.image * (1 - np.exp(-found.log_ratio))
+    taken = truth.image - separate(truth.image, truth.mask, network=network).diffuse
     light = light_from_reference(truth.light) - found.light.mean
     return {
         "degrees": float(degrees.mean()),
@@ -66,14 +68,14 @@ def measure(truth: MitBerkeleyObject, found: ScenePrediction) -> dict[str, float
     }
 
 
-def gain_on_photo(root: Path, name: str, network: SceneNetwork) -> float:
-    """Return the squared error of the predicted diffuse image over that of the photo.
+def gain_on_photo(root: Path, name: str, network: SceneNetwork | None) -> float:
+    """Return the squared error of the separated diffuse image over that of the photo.
 
     Parameters
     ----------
     root : Path
     name : str
-    network : SceneNetwork
+    network : SceneNetwork or None
 
     Returns
     -------
@@ -81,8 +83,7 @@ def gain_on_photo(root: Path, name: str, network: SceneNetwork) -> float:
     """
     photo = load_object(root, name, Illumination.LABORATORY, "original")
     diffuse = load_object(root, name, Illumination.LABORATORY)
-    found = predict_scene(photo.image, photo.mask, network)
-    left = photo.image * np.exp(-found.log_ratio) - diffuse.image
+    left = separate(photo.image, photo.mask, network=network).diffuse - diffuse.image
     before = photo.image - diffuse.image
     return float(np.square(left[photo.mask]).sum() / np.square(before[photo.mask]).sum())
 
@@ -93,11 +94,13 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
-    parser.add_argument("--weights", type=Path, required=True, help="archive of the network")
+    parser.add_argument(
+        "--weights", type=Path, help="archive of a network (default: the shipped one)"
+    )
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     given = parser.parse_args()
     try:
-        network = SceneNetwork.read(given.weights)
+        network = None if given.weights is None else SceneNetwork.read(given.weights)
     except InputError as error:
         parser.error(str(error))
     rows: dict[str, dict[str, dict[str, float]]] = {}
@@ -105,7 +108,7 @@ def main() -> None:
         rows[light] = {}
         for name in list_objects(given.data, light):
             truth = load_object(given.data, name, light)
-            row = measure(truth, predict_scene(truth.image, truth.mask, network))
+            row = measure(truth, network)
             if light == Illumination.LABORATORY:
                 row["photo"] = gain_on_photo(given.data, name, network)
             rows[light][name] = row

@@ -16,10 +16,10 @@ from isc_core.shading.spherical_harmonics import (
     real_sh,
 )
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.normal_prior import expected_normals
 from isc_core.sirfs.priors.priors import Priors
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
+from isc_core.sirfs.silhouette import normals_from_silhouette
 from isc_core.sirfs.solver import SirfsResult
 
 LIGHTS = ("natural", "laboratory")
@@ -179,7 +179,8 @@ def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Probl
     image = truth.image[..., : priors.channels]
     log_image = np.where(truth.valid[..., None], np.log(np.where(image > 0, image, 1)), 0.0)
     contour = occluding_contour(truth.mask, drop_near_edge=True)
-    expected = expected_normals(truth.mask, priors.silhouette, None)
+    profile = priors.silhouette
+    expected = None if profile is None else normals_from_silhouette(truth.mask, profile)
     return Problem(
         log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=expected
     )

@@ -1,12 +1,11 @@
 """How far should SIRFS trust what the scene network predicts? Measured on held-out bodies.
 
-  python -m benchmarks.sirfs.prediction_weights WORLD --panoramas DIR --weights NPZ [--count N]
-  [--ways A,B,...] [--illumination NAME] [--seed K] [--json FILE]
+  python -m benchmarks.sirfs.prediction_weights WORLD --panoramas DIR [--weights NPZ] [--count N]
+  [--ways A,B,...] [--light KIND] [--illumination NAME] [--seed K] [--json FILE]
 
 WORLD is a folder of `isc world build`. Bodies and panoramas that no fit has seen are lit and
-photographed; the network sees the photo, SIRFS its diffuse image. A way is "normals:shading:light":
-the weights of predicted normals and log shading (`PredictionWeights`) and the temperature of the
-predicted light; "-" leaves a prediction out, "network" is the network's own answer. Errors are
+photographed, each from one side; the network sees the photo, SIRFS its diffuse image. Ways are
+those of `ways`; "network" is the network's own answer. Errors are
 geometric means over photos, relative to no prediction at all, with the 95 % interval of resampled
 photos: mean angle of the normals, mean error of log shading but for its brightness (that of log
 reflectance is the same), and but for its brightness in each channel.
@@ -33,9 +32,11 @@ from isc_core.shading.spherical_harmonics import (
     real_sh,
 )
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.settings import PredictionWeights
 
-WAYS = "-:-:-,network,1.5:-:-,-:3:-,-:-:1,1.5:3:1,.7:3:1,.7:1.5:1,.7:1.5:2,3:3:1"
+from .ways import Predictions, with_way
+
+WAYS = "-:-:-,network,.5:-:-,-:.5:-,-:-:1,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
+_LEAST_PIXELS = 1500
 METRICS = ("normals", "shading", "shading, colour aside")
 
 
@@ -59,8 +60,10 @@ class Lit:
     log_shading: np.ndarray
 
 
-def lit_bodies(world: Path, panoramas: Path, count: int, seed: int) -> list[Lit]:
-    """Light and photograph held-out bodies; opaque ones with their true mask.
+def lit_bodies(
+    world: Path, panoramas: Path, count: int, seed: int, light: str | None = None
+) -> list[Lit]:
+    """Light and photograph held-out opaque bodies, each from one side.
 
     Parameters
     ----------
@@ -69,6 +72,8 @@ def lit_bodies(world: Path, panoramas: Path, count: int, seed: int) -> list[Lit]
     count : int
         Photos.
     seed : int
+    light : str, optional
+        Kind of light; by default all kinds, as often as the network has seen them.
 
     Returns
     -------
@@ -76,30 +81,34 @@ def lit_bodies(world: Path, panoramas: Path, count: int, seed: int) -> list[Lit]
     """
     import torch
 
-    from training.networks.scene_batches import SceneBatches, SceneDraws, read_world
+    from training.networks.scene_batches import read_world
     from training.world.files import Split
-    from training.world.recipes import Shares
+    from training.world.recipes import LightKind, Shares
+    from training.world.samples import Darkroom, draw_batch
 
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.BODY,), 0)
     shares = Shares(kinds=(1, 0, 0))
-    draws = SceneDraws(found.views[Split.BODY], found.atlas, found.judged, 8, shares)
-    draw, rng, made = SceneBatches(draws, found.bank), np.random.default_rng(seed), list[Lit]()
-    while len(made) < count:
-        sample = draw(rng)
-        for k in range(0, len(sample.kind), 4):  # photos of different bodies, mostly
-            mask = (sample.mask[k, 0] * sample.known[k, 0]).numpy() > 0
-            photo, ratio, normal, shading = (
-                part[k].permute(1, 2, 0).numpy()
-                for part in (sample.photo, sample.ratio, sample.normal, sample.log_shading)
-            )
-            if mask.sum() > 1500:
-                made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
-    return made[:count]
+    if light is not None:
+        shares = replace(shares, lights=tuple(float(kind.name == light) for kind in LightKind))
+    rng, made, bodies = np.random.default_rng(seed), list[Lit](), found.views[Split.BODY]
+    for k in rng.permutation(len(bodies)):
+        if len(made) == count:
+            break
+        draw = draw_batch([bodies[int(k)]], 1, found.atlas, found.judged, rng, shares)
+        sample = Darkroom(found.bank, 1)(draw)
+        mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
+        photo, ratio, normal, shading = (
+            part[0].permute(1, 2, 0).numpy()
+            for part in (sample.photo, sample.ratio, sample.normal, sample.log_shading)
+        )
+        if mask.sum() > _LEAST_PIXELS:
+            made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
+    return made
 
 
 def errors_of(
-    lit: Lit, ways: list[str], illumination: str, network: SceneNetwork
+    lit: Lit, ways: list[str], illumination: str, network: SceneNetwork | None
 ) -> list[list[float]]:
     """Solve one photo in every way.
 
@@ -145,14 +154,6 @@ def solved(lit: Lit, seen: ScenePrediction, way: str, illumination: str) -> list
     photo = Photo(
         image, lit.mask, 1 / 255, np.zeros_like(lit.mask), PhotoSource("", size, 8, "linear", "")
     )
-    parts = [None if part == "-" else float(part) for part in way.split(":")]
-    usual = PredictionWeights()
-    weights = replace(
-        usual,
-        normals=usual.normals if parts[0] is None else parts[0],
-        shading=usual.shading if parts[1] is None else parts[1],
-        light_temperature=usual.light_temperature if parts[2] is None else parts[2],
-    )
     settings = Settings(
         "sirfs",
         illumination=illumination,
@@ -160,18 +161,9 @@ def solved(lit: Lit, seen: ScenePrediction, way: str, illumination: str) -> list
         light_prior="dataset",
         shape_prior="silhouette",
     )
-    task = DecompositionTask(
-        photo,
-        photo,
-        settings,
-        normal_estimate=None if parts[0] is None else seen.normals,
-        shading_estimate=None if parts[1] is None else seen.shading,
-        light_coefficients=None if parts[2] is None else seen.light,
-        options=SolveOptions(
-            solve_size=0, fit_lobe=False, check_assumptions=False, prediction_weights=weights
-        ),
-    )
-    found = solve(task)
+    options = SolveOptions(solve_size=0, fit_lobe=False, check_assumptions=False)
+    task = DecompositionTask(photo, photo, settings, options=options)
+    found = solve(with_way(task, Predictions(seen.normals, seen.shading, seen.light), way))
     normal = normal_from_reference(normals(found.height))
     return measured(lit, normal, real_sh(normal) @ light_from_reference(found.light))
 
@@ -235,17 +227,18 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--weights", type=Path, required=True, metavar="NPZ", help="scene network")
+    add("--weights", type=Path, metavar="NPZ", help="scene network (default: the shipped one)")
     add("--count", type=int, default=24, help="photos (default: %(default)s)")
     add("--ways", default=WAYS, help="default: %(default)s")
-    add("--illumination", default="natural", choices=ILLUMINATIONS, help="priors to use")
+    add("--light", metavar="KIND", help="HARMONICS, AROUND, ONE_LAMP, LAMPS or LABORATORY")
+    add("--illumination", default="photo", choices=ILLUMINATIONS, help="priors to use")
     add("--seed", type=int, default=0, help="of the photos")
     add("--workers", type=int, default=2, help="processes")
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
     ways = given.ways.split(",")
-    network = SceneNetwork.read(given.weights)
-    photos = lit_bodies(given.world, given.panoramas, given.count, given.seed)
+    network = None if given.weights is None else SceneNetwork.read(given.weights)
+    photos = lit_bodies(given.world, given.panoramas, given.count, given.seed, given.light)
     run = partial(errors_of, ways=ways, illumination=given.illumination, network=network)
     with ProcessPoolExecutor(given.workers) as pool:
         found = list(pool.map(run, photos))

@@ -10,9 +10,10 @@ weights. Else they are simulated: the truth with smooth Gaussian errors, normals
 deviations are right for each pixel; neighbouring errors are correlated, as those of networks are,
 so the weights that are found are those of predictions calibrated pixel by pixel.
 
-A way is "normals:shading:temperature"; "-" leaves a prediction out. With normals, the solver starts
-once for each of `--domes`, the factor on the height that they integrate to; else as usual.
-Errors are geometric means over objects and noises, relative to no prediction at all.
+Ways are those of `ways`. With normals, the solver starts once for each of `--domes`, the factor on
+the silhouette's dome; by default as usual. Errors are geometric means over objects and noises,
+relative to no prediction at all, in the same illumination's priors: those of the light, or what
+`--solve-as` says.
 
 Limits: errors of the three predictions are independent here; a network's are not.
 """
@@ -27,7 +28,7 @@ from scipy import ndimage
 
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_natural_lights, load_object
 from isc_core.decomposition.models import solve
-from isc_core.decomposition.task import DecompositionTask
+from isc_core.decomposition.settings import ILLUMINATIONS
 from isc_core.evaluation.metrics import score, truth_normal
 from isc_core.evaluation.runner import RunnerOptions, reference_task
 from isc_core.networks.scene_network import SceneNetwork, predict_scene
@@ -44,12 +45,13 @@ from isc_core.shading.spherical_harmonics import (
 )
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.priors.prior_set import PriorSet
-from isc_core.sirfs.settings import Start
+from isc_core.sirfs.settings import Start, prediction_weights
 
 from .leave_one_out import METRICS, without
 from .mit_berkeley import LIGHTS, write_json
+from .ways import Predictions, with_way
 
-WAYS = "-:-:-,1.5:-:-,-:3:-,-:-:1,1.5:-:1,.4:1:1,.4:3:1,1.5:3:1,1.5:10:1,4:10:1,1.5:3:4"
+WAYS = "-:-:-,.2:-:-,-:.2:-,-:-:4,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
 _CORRELATED = 15.0  # pixels: standard deviation of the filter that makes errors smooth
 
 
@@ -81,9 +83,9 @@ class Job:
     number: int
     noise: Noise
     starts: tuple[Start, ...]
-    tolerance: float
     priors: PriorSet
     weights: Path | None = None
+    solved_as: str | None = None
 
 
 def run_job(job: Job) -> tuple[Job, list[float], int]:
@@ -105,8 +107,14 @@ def run_job(job: Job) -> tuple[Job, list[float], int]:
     """
     truth = load_object(job.data, job.name, job.illumination, "diffuse")
     options = RunnerOptions(threads=1)
-    task = with_predictions(reference_task(truth, options, job.priors), truth, job)
-    found = solve(task)
+    task = reference_task(truth, options, job.priors)
+    if job.solved_as is not None:
+        task = replace(task, settings=replace(task.settings, illumination=job.solved_as))
+    seen = simulated(truth, job) if job.weights is None else of_network(truth, job.weights)
+    usual = prediction_weights(task.settings.illumination)
+    if job.starts:
+        usual = replace(usual, starts=job.starts)
+    found = solve(with_way(task, seen, job.way, usual))
     normal = normal_from_reference(normals(found.height))
     light = light_from_reference(found.light)
     shading = np.exp(real_sh(normal) @ light)
@@ -121,49 +129,7 @@ def run_job(job: Job) -> tuple[Job, list[float], int]:
     return job, [getattr(errors, m) for m in METRICS], found.diagnostics.evaluations or 0
 
 
-def with_predictions(
-    task: DecompositionTask, truth: MitBerkeleyObject, job: Job
-) -> DecompositionTask:
-    """Add the predictions of a job's way to a task.
-
-    Parameters
-    ----------
-    task : DecompositionTask
-        Without predictions.
-    truth : MitBerkeleyObject
-        The object.
-    job : Job
-        Way and noise.
-
-    Returns
-    -------
-    DecompositionTask
-    """
-    seen, predicted, lit = (
-        simulated(truth, job) if job.weights is None else of_network(truth, job.weights)
-    )
-    parts = [None if part == "-" else float(part) for part in job.way.split(":")]
-    of, given = task.options.prediction_weights, [part is not None for part in parts]
-    chosen = replace(
-        of,
-        normals=of.normals if parts[0] is None else parts[0],
-        shading=of.shading if parts[1] is None else parts[1],
-        light_temperature=of.light_temperature if parts[2] is None else parts[2],
-        starts=job.starts,
-        loss_tolerance=job.tolerance,
-    )
-    return replace(
-        task,
-        normal_estimate=seen if given[0] else None,
-        shading_estimate=predicted if given[1] else None,
-        light_coefficients=lit if given[2] else None,
-        options=replace(task.options, prediction_weights=chosen),
-    )
-
-
-def of_network(
-    truth: MitBerkeleyObject, weights: Path
-) -> tuple[NormalEstimate, ShadingEstimate, LightCoefficientsEstimate]:
+def of_network(truth: MitBerkeleyObject, weights: Path) -> Predictions:
     """Predict normals, shading and light by a scene network.
 
     Parameters
@@ -175,15 +141,13 @@ def of_network(
 
     Returns
     -------
-    NormalEstimate, ShadingEstimate, LightCoefficientsEstimate
+    Predictions
     """
     found = predict_scene(truth.image, truth.mask, SceneNetwork.read(weights))
-    return found.normals, found.shading, found.light
+    return Predictions(found.normals, found.shading, found.light)
 
 
-def simulated(
-    truth: MitBerkeleyObject, job: Job
-) -> tuple[NormalEstimate, ShadingEstimate, LightCoefficientsEstimate]:
+def simulated(truth: MitBerkeleyObject, job: Job) -> Predictions:
     """Simulate predictions near the truth.
 
     Parameters
@@ -194,7 +158,7 @@ def simulated(
 
     Returns
     -------
-    NormalEstimate, ShadingEstimate, LightCoefficientsEstimate
+    Predictions
     """
     rng = np.random.default_rng([job.number, LIGHTS.index(job.illumination)])
     normal = truth_normal(truth.height)
@@ -208,7 +172,8 @@ def simulated(
     predicted = ShadingEstimate(shading, np.where(known, job.noise.shading, 0))
     covariance = job.noise.light**2 * np.kron(0.8 + 0.2 * np.eye(3), np.eye(9))
     off = np.linalg.cholesky(covariance) @ rng.standard_normal(27)
-    return seen, predicted, LightCoefficientsEstimate(light + off.reshape(3, 9).T, covariance)
+    lit = LightCoefficientsEstimate(light + off.reshape(3, 9).T, covariance)
+    return Predictions(seen, predicted, lit)
 
 
 def noisy_normals(
@@ -267,8 +232,7 @@ def jobs(given: argparse.Namespace) -> list[Job]:
     statistics = collect_statistics(read_training_objects(given.data))
     lights, names = load_natural_lights(given.data), given.names.split(",")
     noise = Noise(given.degrees, given.shading, given.light)
-    starts = tuple(Start(float(dome), light=1) for dome in given.domes.split(","))
-    stop = given.tolerance
+    starts = tuple(Start(float(dome), light=1) for dome in given.domes.split(",") if dome)
     made = []
     for name in statistics if given.names == "all" else names:
         priors = fit_priors(without(statistics, name), lights, FitOptions())
@@ -281,11 +245,11 @@ def jobs(given: argparse.Namespace) -> list[Job]:
                 number,
                 noise,
                 starts,
-                stop,
                 priors,
                 given.weights,
+                given.solve_as,
             )
-            for illumination in LIGHTS
+            for illumination in given.lights.split(",")
             for way in given.ways.split(",")
             for number in range(given.noises if way != "-:-:-" else 1)
         ]
@@ -293,21 +257,27 @@ def jobs(given: argparse.Namespace) -> list[Job]:
 
 
 def report(found: dict[tuple[str, str], dict[str, list[list[float]]]]) -> None:
-    """Print errors relative to no prediction.
+    """Print errors relative to no prediction, the average with its interval over objects.
 
     Parameters
     ----------
     found : dict of (str, str) to dict
         By illumination and way, the errors and evaluations of each object's noises.
     """
-    print("\n| light | way | N | S | R | L | avg | evaluations |\n" + "|---" * 8 + "|")
+    heads = "light", "way", "N", "S", "R", "L", "avg (95 %; largest)", "evaluations"
+    print("\n| " + " | ".join(heads) + " |\n" + "|---" * len(heads) + "|")
     for (illumination, way), objects in found.items():
         logs = {name: np.log(rows).mean(axis=0) for name, rows in objects.items()}
         base = found.get((illumination, "-:-:-"), objects)
         none = {name: np.log(base[name]).mean(axis=0) for name in objects}
-        ratio = np.exp(np.mean([logs[name] - none[name] for name in logs], axis=0))
-        average = np.exp(np.log(ratio[: len(METRICS)]).mean())
-        row = [f"{v:.2f}" for v in (*ratio[[1, 2, 3, 5]], average, ratio[-1])]
+        gain = np.array([logs[name] - none[name] for name in logs])
+        ratio, averages = np.exp(gain.mean(axis=0)), gain[:, : len(METRICS)].mean(axis=1)
+        again = np.random.default_rng(0).integers(len(gain), size=(2000, len(gain)))
+        low, high = np.exp(np.quantile(averages[again].mean(axis=1), (0.025, 0.975)))
+        average = (
+            f"{np.exp(averages.mean()):.2f} ({low:.2f}-{high:.2f}; {np.exp(averages.max()):.2f})"
+        )
+        row = [*(f"{value:.2f}" for value in ratio[[1, 2, 3, 5]]), average, f"{ratio[-1]:.2f}"]
         print(f"| {illumination} | {way} | " + " | ".join(row) + " |")
 
 
@@ -317,13 +287,14 @@ def main() -> None:
     options.add_argument("--data", type=Path, required=True, help="folder mit_berkeley_train")
     options.add_argument("--names", default="cup1,frog1,panther", help='objects, or "all"')
     options.add_argument("--weights", type=Path, help="archive of a scene network")
+    options.add_argument("--lights", default=",".join(LIGHTS), help="default: %(default)s")
+    options.add_argument("--solve-as", choices=ILLUMINATIONS, help="default: as what it is")
     options.add_argument("--ways", default=WAYS, help="comma-separated, see above")
     options.add_argument("--noises", type=int, default=1, help="noises per object and light")
     options.add_argument("--degrees", type=float, default=18.0, help="of normals")
     options.add_argument("--shading", type=float, default=0.15, help="of log shading")
     options.add_argument("--light", type=float, default=0.3, help="of light coefficients")
-    options.add_argument("--domes", default="0", help="starts: factors on the normals' height")
-    options.add_argument("--tolerance", type=float, default=2e-4, help="of the loss, then")
+    options.add_argument("--domes", default="", help="starts: factors on the silhouette's dome")
     options.add_argument("--processes", type=int, default=2, help="parallel processes")
     options.add_argument("--json", type=Path, help="JSON file to write")
     given = options.parse_args()

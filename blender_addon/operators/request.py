@@ -39,7 +39,7 @@ class MethodSettings:
 
     model: str = "joint"
     separator: str = "isc"
-    illumination: str = "natural"
+    illumination: str = "photo"
     max_size: int = 256
     samples: int = 64
 

@@ -90,7 +90,8 @@ SEPARATORS = _numbered(
     ("none", "None", "Keep the highlights"),
 )
 ILLUMINATIONS = _numbered(
-    ("natural", "Natural", "Light from all directions: outdoors, a room, a light tent"),
+    ("photo", "Photo", "Any light, in a photo of balanced colors"),
+    ("natural", "Natural", "Smooth light from all directions, of any color"),
     ("laboratory", "Laboratory", "One strong light source in a dark room"),
 )
 MASK_SOURCES = _numbered(
@@ -212,7 +213,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Light",
         description="Prior of the light",
         items=ILLUMINATIONS,
-        default="natural",
+        default="photo",
     )
     max_size: IntProperty(
         name="Size",

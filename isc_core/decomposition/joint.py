@@ -5,10 +5,10 @@ Problem: MDR relies on a separation by colour. On grey albedo, where colour carr
 that leaves highlights in the diffuse image: shape and light are bent to explain them, and the
 reflectance shows them as bright albedo.
 
-Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and the
-layer network's prediction of the shape of highlights (`networks.layer_network`): it expects y =
-log(I / D) with an error b, and D_1 = min(D_0, I e^-max(y - b / 2, 0)), the light between D_0 and
-D_1 being nearly white (`separation.support.light_tint`). SIRFS on D_1 gives shape and light. They
+Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
+form shows of highlights (`separation.network`): t is the part of log(I / D) that the scene network
+is sure of, and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being nearly white
+(`separation.support.light_tint`). SIRFS on D_1 gives shape and light. They
 give a better separation: where the network removed much of what colour had left
 (`ResidualHighlights.unreliable`), too little of the albedo is visible; it is continued from the
 surroundings, in the shading at that place,
@@ -16,8 +16,8 @@ surroundings, in the shading at that place,
     log R = average of log D_1 - SH(normal) over nearby reliable pixels,
     D = min(D_1, R exp(SH(normal)))
 
-An object is changed only where highlights stand out that colour has left (`JointOptions`);
-otherwise the result is MDR's.
+An object is changed only where highlights stand out that colour has left
+(`separation.network.highlights_stand_out`); otherwise the result is MDR's.
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
 the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
@@ -39,9 +39,10 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.smoothing import masked_gaussian
-from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
+from ..networks.scene_network import ScenePrediction, predict_scene
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
+from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
 from ..separation.support.light_tint import limit_tint
 from .layers import separated_first, shaded
 from .lobe import fit_specular
@@ -59,7 +60,6 @@ _REACHES = (
     0.25,
 )
 _HALF = 0.5  # of the object unreliable: there is nothing to continue its albedo from
-_SPECK = 0.005  # of the object's diagonal
 _ENOUGH = 0.1  # of a neighbourhood known: nearer ones decide
 
 
@@ -69,18 +69,14 @@ class JointOptions:
 
     Attributes
     ----------
-    above_usual : float
-        Highlights stand out if the largest y that colour has left exceeds the 90th percentile by
-        this much.
     unreliable_from : float
-        y above which albedo is unreliable.
+        t above which albedo is unreliable.
     change_of_variables : float
         b of the energy.
     network : NetworkOptions
-        How the layer network is applied.
+        When light is taken off.
     """
 
-    above_usual: float = 0.3
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
     network: NetworkOptions = field(default_factory=NetworkOptions)
@@ -147,7 +143,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     split, layers = separated_first(task)
     with task.clock.stage("separation"):
         residual = detect_residual_highlights(
-            working.image, layers.diffuse, working.mask, options, task.options.layer_network
+            working.image, layers.diffuse, working.mask, task.prediction, options
         )
     weight = confidence_weight(
         without_unreliable(layers.confidence, residual), task.settings.confidence_weights
@@ -186,8 +182,8 @@ def detect_residual_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
+    seen: ScenePrediction | None = None,
     options: JointOptions | None = None,
-    network: LayerNetwork | None = None,
 ) -> ResidualHighlights | None:
     """Find highlights that a separation by colour has left in the diffuse image.
 
@@ -199,10 +195,10 @@ def detect_residual_highlights(
         The separation's diffuse layer.
     mask : (H, W) ndarray of bool
         The object.
+    seen : ScenePrediction, optional
+        What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
-    network : LayerNetwork, optional
-        The shipped one by default.
 
     Returns
     -------
@@ -210,18 +206,16 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options, inside = options or JointOptions(), mask[..., None]
-    expected, _ = log_ratio(image, mask, network or LayerNetwork.shipped(), options.network)
+    expected = sure_ratio(seen or predict_scene(image, mask), options.network)
     taken = np.log(
         np.maximum(np.where(inside, image, 1), 1e-9)
         / np.maximum(np.where(inside, diffuse, 1), 1e-9)
     )
     left = np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
-    level = left.mean(axis=2)
-    # Structures of a few pixels do not count: they are texture.
-    broad = ndimage.grey_opening(level, max(3, 2 * round(_SPECK * _diagonal(mask)) + 1))[mask]
-    if float(broad.max()) - float(np.quantile(broad, 0.9)) <= options.above_usual:
+    if not highlights_stand_out(left, mask, options.network):
         return None
-    unreliable = ndimage.binary_opening(level > options.unreliable_from, np.ones((2, 2))) & mask
+    much = left.mean(axis=2) > options.unreliable_from
+    unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask
     if unreliable[mask].mean() > _HALF:
         unreliable = np.zeros_like(mask)
     cleaner = limit_tint(diffuse, diffuse * np.exp(-left), options.network.tint)
@@ -324,9 +318,8 @@ def _split(
     """
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale:
-        of_maps = detect_residual_highlights(
-            photo.image, start.diffuse, photo.mask, options, task.options.layer_network
-        )
+        seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
+        of_maps = detect_residual_highlights(photo.image, start.diffuse, photo.mask, seen, options)
         if of_maps is None:
             return start
         residual, diffuse = of_maps, of_maps.diffuse

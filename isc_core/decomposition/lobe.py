@@ -125,4 +125,5 @@ def _recovered(shading: np.ndarray, task: DecompositionTask) -> RecoveredScene |
         return None
     profile = (task.prior_set or shipped_prior_set()).silhouette
     normals = silhouette_normals(task.maps.mask, profile)
-    return RecoveredScene(shading, normals, task.light_estimate)
+    lamps = None if task.prediction is None else task.prediction.lamps
+    return RecoveredScene(shading, normals, lamps)

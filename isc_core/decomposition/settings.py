@@ -26,18 +26,27 @@ MODEL_SUMMARIES = {
 
 
 class Illumination(StrEnum):
-    """The kind of light that the priors describe.
+    """The kind of photo that the priors describe.
 
     Attributes
     ----------
+    PHOTO
+        A photo of balanced colours in any light: the priors of natural light, and more trust in
+        what the network predicts.
     NATURAL
-        Light of natural environments.
+        The MIT-Berkeley objects in natural light.
     LABORATORY
-        Light of the MIT-Berkeley laboratory.
+        The same in the light of the laboratory.
     """
 
+    PHOTO = "photo"
     NATURAL = "natural"
     LABORATORY = "laboratory"
+
+    @property
+    def statistics(self) -> str:
+        """Illumination of the data set whose statistics are used."""
+        return Illumination.NATURAL if self == Illumination.PHOTO else self
 
 
 class LightColour(StrEnum):
@@ -61,8 +70,8 @@ class LightPrior(StrEnum):
     Attributes
     ----------
     PREDICTED
-        Around the light predicted from the photo (`networks.light_network`); in natural
-        illumination.
+        That of the data set, multiplied by the light predicted from the photo
+        (`networks.scene_network`); the predicted shading is expected as well.
     DATASET
         The distribution over all photos of the illumination.
     """
@@ -77,8 +86,7 @@ class ShapePrior(StrEnum):
     Attributes
     ----------
     PREDICTED
-        Normals predicted from the photo (`networks.normal_network`); in natural illumination, where
-        no depth is known and the frame does not cut the object.
+        Normals predicted from the photo (`networks.scene_network`), where no depth is known.
     SILHOUETTE
         Normals that the silhouette suggests.
     """
@@ -128,7 +136,7 @@ class Settings:
     separator : str
         One of `separation.METHODS`, for `SEPARATING_MODELS`.
     illumination : Illumination or str
-        The kind of light.
+        The kind of photo.
     max_size : int
         Long side of the object, pixels, at which the maps are made; 0 for the photo's. SIRFS is
         solved at a size of its own, `recover.SOLVE_SIZE`.
@@ -155,7 +163,7 @@ class Settings:
 
     model: str = "joint"
     separator: str = BEST
-    illumination: str = Illumination.NATURAL
+    illumination: str = Illumination.PHOTO
     max_size: int = 512
     full_size: bool = False
     engine: str = "auto"
@@ -181,14 +189,12 @@ class Settings:
     @property
     def uses_predicted_normals(self) -> bool:
         """Whether SIRFS expects the predicted normals."""
-        natural = self.illumination != Illumination.LABORATORY
-        return natural and self.shape_prior == ShapePrior.PREDICTED
+        return self.shape_prior == ShapePrior.PREDICTED
 
     @property
     def uses_predicted_light(self) -> bool:
-        """Whether SIRFS expects the predicted light; that of the laboratory is known."""
-        natural = self.illumination != Illumination.LABORATORY
-        return natural and self.light_prior == LightPrior.PREDICTED
+        """Whether SIRFS expects the predicted light and shading."""
+        return self.light_prior == LightPrior.PREDICTED
 
     def check(self) -> None:
         """Validate the settings.

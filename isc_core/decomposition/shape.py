@@ -19,16 +19,15 @@ from ..photo import Photo
 from ..progress import Monitor
 from ..scene.diagnostics import Diagnostics, StopReason
 from ..scene.known_inputs import SceneConstraints
-from ..scene.light_estimate import LightEstimate
 from ..sirfs.kernel_cache import announce_compilation
 from ..sirfs.priors.light_posterior import light_posterior
-from ..sirfs.priors.predicted_light import predicted_light_prior
 from ..sirfs.priors.prior_file import shipped_prior_set
 from ..sirfs.priors.priors import Priors
 from ..sirfs.recover import Recovered, RecoverOptions, recover
-from ..sirfs.settings import Weights, isc_weights
+from ..sirfs.settings import PredictionWeights, Weights, isc_weights, prediction_weights
 from ..sirfs.solver import SolverOptions
 from .layers import scaled_light
+from .settings import Illumination
 from .task import DecompositionTask
 
 # Level of the brightest channels' percentile below, white being 1; it is .23 to .87 in the training
@@ -184,32 +183,28 @@ def _recover(
 
 def _priors(task: DecompositionTask, channels: int) -> Priors:
     """The priors for this photo, with what was predicted of its light."""
-    settings, coefficients = task.settings, task.light_coefficients
-    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-    if coefficients is not None:
-        temperature = task.options.prediction_weights.light_temperature
-        return replace(priors, light=light_posterior(priors.light, coefficients, temperature))
-    if settings.uses_predicted_light and task.light_estimate is not None:
-        return with_predicted_light(priors, task.light_estimate)
-    return priors
+    coefficients = task.light_coefficients
+    statistics = Illumination(task.settings.illumination).statistics
+    priors = (task.prior_set or shipped_prior_set()).priors(statistics, channels)
+    if coefficients is None:
+        return priors
+    temperature = _prediction_weights(task).light_temperature
+    return replace(priors, light=light_posterior(priors.light, coefficients, temperature))
 
 
 def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, float | None]:
     """The weights for what was predicted, and the optimiser's tolerance if it is another."""
-    normals = task.normal_estimate is not None
-    weights = isc_weights(task.settings.illumination, channels, normals_predicted=normals)
-    if (
-        task.settings.uses_predicted_normals
-        and task.shading_estimate is None
-        and task.light_coefficients is None
-    ):
-        return weights, None  # the shape network's normals, whose weight and starts were chosen
-    return task.options.prediction_weights.applied(
+    weights = isc_weights(Illumination(task.settings.illumination).statistics, channels)
+    return _prediction_weights(task).applied(
         weights,
-        normals=normals,
+        normals=task.normal_estimate is not None,
         shading=task.shading_estimate is not None,
         light=task.light_coefficients is not None,
     )
+
+
+def _prediction_weights(task: DecompositionTask) -> PredictionWeights:
+    return task.options.prediction_weights or prediction_weights(task.settings.illumination)
 
 
 def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> RecoverOptions:
@@ -225,25 +220,6 @@ def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> R
         settings.shading_only,
         solver,
     )
-
-
-def with_predicted_light(priors: Priors, light_estimate: LightEstimate) -> Priors:
-    """Replace the prior of the light by one around the predicted light.
-
-    Parameters
-    ----------
-    priors : Priors
-        Priors of the data set.
-    light_estimate : LightEstimate
-        Predicted light.
-
-    Returns
-    -------
-    Priors
-        With the new prior of the light.
-    """
-    light = predicted_light_prior(priors.light, light_estimate.light, light_estimate.deviations)
-    return replace(priors, light=light)
 
 
 def _exposure_gain(photo: Photo) -> float:

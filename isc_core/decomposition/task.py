@@ -8,14 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..networks.layer_network import LayerNetwork
+from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import Diagnostics
 from ..scene.known_inputs import SceneConstraints
 from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
-from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import LobeFit
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
@@ -79,10 +78,11 @@ class SolveOptions:
     check_assumptions : bool
         The photo is checked against the models' assumptions, and the light's colour is estimated
         even where it is not used.
-    layer_network : LayerNetwork or None
-        Network of the model joint; None for the shipped one.
-    prediction_weights : PredictionWeights
-        How far predicted normals, shading and light coefficients are trusted.
+    scene_network : SceneNetwork or None
+        What looks at the photo; None for the shipped network.
+    prediction_weights : PredictionWeights or None
+        How far predicted normals, shading and light coefficients are trusted; None: as usual in
+        the illumination.
     """
 
     solve_size: int = SOLVE_SIZE
@@ -92,8 +92,8 @@ class SolveOptions:
     layer_dtype: type[np.floating[Any]] = np.float32
     fit_lobe: bool = True
     check_assumptions: bool = True
-    layer_network: LayerNetwork | None = None
-    prediction_weights: PredictionWeights = field(default_factory=PredictionWeights)
+    scene_network: SceneNetwork | None = None
+    prediction_weights: PredictionWeights | None = None
 
 
 @dataclass(frozen=True)
@@ -118,15 +118,14 @@ class DecompositionTask:
         Receives the duration of each stage.
     split : Separation or None
         Layers of `maps` by the separator of the settings, where already computed.
-    light_estimate : LightEstimate or None
-        Predicted light, where already computed.
+    prediction : ScenePrediction or None
+        What the scene network says of the working photo, where already asked.
     normal_estimate : NormalEstimate or None
         Predicted normals at the working scale, where already computed; used in any light.
     shading_estimate : ShadingEstimate or None
         Predicted log shading at the working scale.
     light_coefficients : LightCoefficientsEstimate or None
-        Predicted coefficients of the light; then `light_estimate` does not change the light's
-        prior.
+        Predicted coefficients of the light.
     silhouette : (h, w) ndarray of bool or None
         Outline of the object in `working`; None where it is the working photo's mask.
     options : SolveOptions
@@ -141,7 +140,7 @@ class DecompositionTask:
     monitor: Monitor = field(default_factory=Monitor)
     clock: Clock = field(default_factory=Clock)
     split: Separation | None = None
-    light_estimate: LightEstimate | None = None
+    prediction: ScenePrediction | None = None
     normal_estimate: NormalEstimate | None = None
     shading_estimate: ShadingEstimate | None = None
     light_coefficients: LightCoefficientsEstimate | None = None

@@ -19,7 +19,7 @@ from ..decomposition.models import solve
 from ..decomposition.pipeline import decompose
 from ..decomposition.settings import LightPrior, Settings, ShapePrior
 from ..decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
-from ..networks.layer_network import LayerNetwork
+from ..networks.scene_network import SceneNetwork
 from ..photo import Photo, PhotoSource
 from ..progress import Monitor
 from ..separation import BEST
@@ -118,7 +118,7 @@ class RunnerOptions:
 
 
 def make_runner(
-    options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None
+    options: RunnerOptions, prior_set: PriorSet, network: SceneNetwork | None = None
 ) -> Runner:
     """Make the function that `evaluate` runs on each object.
 
@@ -128,8 +128,8 @@ def make_runner(
         Model and protocol.
     prior_set : PriorSet
         SIRFS priors.
-    network : LayerNetwork, optional
-        Network of the model joint under `Protocol.REFERENCE`; the shipped one by default.
+    network : SceneNetwork, optional
+        What looks at the photo under `Protocol.REFERENCE`; the shipped one by default.
 
     Returns
     -------
@@ -157,7 +157,7 @@ def reference_task(
     truth: MitBerkeleyObject,
     options: RunnerOptions,
     prior_set: PriorSet,
-    network: LayerNetwork | None = None,
+    network: SceneNetwork | None = None,
     monitor: Monitor | None = None,
 ) -> DecompositionTask:
     """Set up one object under the reference protocol.
@@ -172,8 +172,8 @@ def reference_task(
         Model and priors.
     prior_set : PriorSet
         SIRFS priors.
-    network : LayerNetwork, optional
-        Network of the model joint; the shipped one by default.
+    network : SceneNetwork, optional
+        What looks at the photo; the shipped one by default.
     monitor : Monitor, optional
         Receives progress.
 
@@ -190,7 +190,7 @@ def reference_task(
         layer_dtype=np.float64,
         fit_lobe=False,
         check_assumptions=False,
-        layer_network=network,
+        scene_network=network,
     )
     return DecompositionTask(
         photo,

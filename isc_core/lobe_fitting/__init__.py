@@ -6,7 +6,7 @@ the peaks of a specular image, as starts of the least squares in `lamps`; `recov
 direction from a highlight on blurred recovered normals; `light_direction` explains a finished
 decomposition by one distant light, for editing; `baselines.light_direction` is the published
 estimate of the shape-from-shading baselines, from the gradients of a photo without normals.
-`networks.light_network` predicts the direction from the photo alone. The half-vector geometry that
+`networks.scene_network` predicts the direction from the photo alone. The half-vector geometry that
 they share is `starts.light_of_half_vector`.
 """
 

@@ -1,8 +1,8 @@
 """The layers of the networks: convolutions whose results are identical on any number of threads.
 
-Equation: the input is log(I / mean I + .03) and the mask, in blocks of 2 x 2 pixels (space to
-depth); each level of an encoder is two 3 x 3 convolutions with max(0, .) and zero padding, and half
-as fine as the one before.
+Equation: the input is log(I / mean I + .03) and the mask, in blocks of pixels (space to depth);
+each level is two 3 x 3 convolutions with max(0, .) and zero padding, and half as fine as the one
+before.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
@@ -16,40 +16,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-STRIDE = 32  # pixels: the sides of a network's input are multiples of it
-BLOCK = 2
-_DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
+DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
-_FRAME = 8  # pixels around the object: beyond the photo's frame there is background as well
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
 ]  # weights (9, inputs, outputs) and biases (outputs,) of the remaining convolutions
-
-
-def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> list[np.ndarray]:
-    """Run an encoder.
-
-    Parameters
-    ----------
-    image : (H, W, 3) ndarray
-    mask : (H, W) bool ndarray
-        Both as `pad_to_stride` returns them.
-    steps : Steps
-        Weights and biases of the remaining convolutions.
-    depth : int
-        Number of levels.
-
-    Returns
-    -------
-    list of ndarray
-        Layers (H / 2^(k+1), W / 2^(k+1), channels), the finest first.
-    """
-    layer, kept = space_to_depth(inputs_of(image, mask)), []
-    for level in range(depth):
-        layer = conv_block(layer if level == 0 else average_pool(layer), steps)
-        kept.append(layer)
-    return kept
 
 
 def weights_in(
@@ -102,31 +74,6 @@ def is_chain(
     ]
 
 
-def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) -> bool:
-    """Return whether these are the convolutions of an encoder: two a level, each fitting the next.
-
-    Parameters
-    ----------
-    weights, biases : tuple of ndarray
-
-    Returns
-    -------
-    bool
-    """
-    shapes = [w.shape for w in weights]
-    chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(
-        len(s) == 3 and s[0] == 9 for s in shapes
-    )
-    biased = [w.shape[2:] for w in weights] == [b.shape for b in biases]
-    return (
-        bool(shapes)
-        and len(shapes) % 2 == 0
-        and shapes[0][1:2] == (4 * BLOCK**2,)
-        and chained
-        and biased
-    )
-
-
 def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Return the channels of the first layer: log light over the object's mean, and the mask.
 
@@ -142,11 +89,11 @@ def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """
     light = np.where(mask[..., None], image, 0).astype(np.float32)
     mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
-    log_light = np.log(light / np.float32(mean) + np.float32(_DARK)) * mask[..., None]
+    log_light = np.log(light / np.float32(mean) + np.float32(DARK)) * mask[..., None]
     return np.concatenate([log_light, mask[..., None].astype(np.float32)], axis=2)
 
 
-def space_to_depth(layer: np.ndarray, block: int = BLOCK) -> np.ndarray:
+def space_to_depth(layer: np.ndarray, block: int) -> np.ndarray:
     """Rearrange each block of pixels into the channels of one pixel.
 
     Parameters
@@ -168,7 +115,7 @@ def space_to_depth(layer: np.ndarray, block: int = BLOCK) -> np.ndarray:
     )
 
 
-def depth_to_space(layer: np.ndarray, block: int = BLOCK) -> np.ndarray:
+def depth_to_space(layer: np.ndarray, block: int) -> np.ndarray:
     """Rearrange the channels of each pixel into a block of pixels; inverse of `space_to_depth`.
 
     Parameters
@@ -272,31 +219,3 @@ def softmax(score: np.ndarray) -> np.ndarray:
     """
     shares = np.exp(score - score.max())
     return np.asarray(shares / shares.sum())
-
-
-def pad_to_stride(
-    image: np.ndarray, mask: np.ndarray
-) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
-    """Centre image and mask in arrays whose sides are multiples of the network's stride.
-
-    Parameters
-    ----------
-    image : (h, w, 3) ndarray
-        Divided by its mean over the mask.
-    mask : (h, w) bool ndarray
-
-    Returns
-    -------
-    (image, mask) : tuple of ndarray
-    place : tuple of slice
-        Rows and columns of the original.
-    """
-    sides = [-(-(n + 2 * _FRAME) // STRIDE) * STRIDE for n in mask.shape]
-    place = tuple(
-        slice((side - n) // 2, (side - n) // 2 + n)
-        for side, n in zip(sides, mask.shape, strict=True)
-    )
-    light, inside = np.zeros((*sides, 3), np.float32), np.zeros(sides, bool)
-    mean = max(float(image[mask].mean(dtype=float)), 1e-30)
-    light[place], inside[place] = np.where(mask[..., None], image / mean, 0), mask
-    return (light, inside), place  # type: ignore[return-value]

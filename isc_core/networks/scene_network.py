@@ -29,15 +29,13 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
-from ..imaging.area_resize import averaged_object
-from ..imaging.bounding_box import mask_slices
-from ..imaging.upsampling import enlarged
 from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
+from ..scene.light_estimate import LightEstimate, mirrored_places
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
+from .frame import at_full_size, framed
 from .layers import (
     average_pool,
     conv_block,
@@ -48,9 +46,7 @@ from .layers import (
     softmax,
     space_to_depth,
 )
-from .light_network import mirrored_places
 from .loader import Network, Parameters
-from .network_input import NetworkInput
 
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
 INPUTS, BLOCK = 6, 4
@@ -86,6 +82,16 @@ HEADS: Mapping[Head, slice] = {
     Head.EDGE: slice(12, 13),
 }
 CHANNELS = 13
+
+
+class Kind(StrEnum):
+    """What an object is made of, in the order of `ScenePrediction.kinds`."""
+
+    OPAQUE = "opaque"
+    MIRROR = "mirror"
+    GLASS = "glass"
+
+
 TEMPERATURES = ("normal", "ratio", "shading", "light")
 
 
@@ -271,7 +277,7 @@ class ScenePrediction:
     places : (256,) ndarray
         Probabilities of `scene.light_estimate.PLACES` for the strongest lamp, if there is one.
     kinds : (3,) ndarray
-        Probabilities of an opaque object, a mirror, and glass.
+        Probabilities of `Kind`.
     edge : (H, W) ndarray
         Probability that the depth jumps.
     """
@@ -285,6 +291,12 @@ class ScenePrediction:
     places: np.ndarray
     kinds: np.ndarray
     edge: np.ndarray
+
+    @property
+    def lamps(self) -> LightEstimate:
+        """What is known of the lamps."""
+        none, one, several = (float(share) for share in self.counts)
+        return LightEstimate(none, one, several, self.places)
 
 
 def predict_scene(
@@ -305,13 +317,13 @@ def predict_scene(
     ScenePrediction
     """
     network = network or SceneNetwork.shipped()
-    frame = framed(image, mask)
+    frame = framed(image, mask, SIDE, LONG_SIDE)
     direct = network(frame.image, frame.mask)
     mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
     maps = _settled(direct.maps), _settled(mirrored.maps[:, ::-1]) * _MIRRORED
     small = 0.5 * (maps[0] + maps[1])
     factors = dict(zip(TEMPERATURES, network.temperatures, strict=True))
-    full = _at_full_size(small, frame, mask)
+    full = at_full_size(small, frame, mask)
     part = {head: full[..., place] for head, place in HEADS.items()}
     return ScenePrediction(
         NormalEstimate(part[Head.NORMAL], _scale(part[Head.NORMAL_SCALE], mask, factors["normal"])),
@@ -327,28 +339,6 @@ def predict_scene(
     )
 
 
-def framed(image: np.ndarray, mask: np.ndarray) -> NetworkInput:
-    """Place an object in the middle of the network's frame.
-
-    Parameters
-    ----------
-    image : (H, W, 3) ndarray
-    mask : (H, W) bool ndarray
-
-    Returns
-    -------
-    NetworkInput
-        `SIDE` pixels wide and high.
-    """
-    small, inside, factor = averaged_object(image, mask, LONG_SIDE)
-    rows, columns = inside.shape
-    top, left = (SIDE - rows) // 2, (SIDE - columns) // 2
-    place = slice(top, top + rows), slice(left, left + columns)
-    light, cover = np.zeros((SIDE, SIDE, 3), np.float32), np.zeros((SIDE, SIDE), bool)
-    light[place], cover[place] = small, inside
-    return NetworkInput(light, cover, place, inside, factor)
-
-
 _MIRRORED = np.ones(CHANNELS, np.float32)
 _MIRRORED[HEADS[Head.NORMAL].start] = -1
 
@@ -359,20 +349,6 @@ def _settled(maps: np.ndarray) -> np.ndarray:
     ratio = HEADS[Head.RATIO]
     found[..., ratio] = np.logaddexp(0, maps[..., ratio] - np.float32(MARGIN))
     return found
-
-
-def _at_full_size(small: np.ndarray, frame: NetworkInput, mask: np.ndarray) -> np.ndarray:
-    """Maps of the network's frame on the photo's pixels, 0 outside the mask."""
-    box = mask_slices(mask)
-    nearest = ndimage.distance_transform_edt(
-        ~frame.mask, return_distances=False, return_indices=True
-    )
-    values = small[tuple(nearest)][frame.place]
-    if frame.factor != 1:
-        values = enlarged(values, mask[box].shape, 1 / frame.factor)
-    full = np.zeros((*mask.shape, CHANNELS), np.float32)
-    full[box] = np.where(mask[box][..., None], values, 0)
-    return full
 
 
 def _scale(log_scale: np.ndarray, mask: np.ndarray, factor: float) -> np.ndarray:

@@ -243,11 +243,11 @@ class Diagnostics:
     light_colour : LightColourDiagnostics or None
         The colour of the light.
     scene_classes : dict of str to float
-        Probabilities of the scene classifier.
+        Probabilities of what the object is made of: "opaque", "mirror" and "glass".
     light_counts : dict of str to float
         Probabilities of "none", "one" and "several" lights.
     several_lights : float or None
-        Probability of several lights, by both networks.
+        Probability of several lights.
     warnings : tuple of AssumptionWarning
         Violated assumptions.
     """

@@ -1,12 +1,12 @@
-"""The light predicted from a photo: whether there is a lamp or several, the direction of the
-strongest, and the light as a whole.
+"""The lamps predicted from a photo: whether there is one or several, and where the strongest is.
 
 `PLACES`, possible directions of a lamp, are distributed evenly over the hemisphere in front of the
 object and a little behind it, on a spiral: R. Swinbank and R. J. Purser 2006,
-doi:10.1256/qj.05.227. `networks.light_network` predicts all of it.
+doi:10.1256/qj.05.227. `networks.scene_network` predicts them.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -27,9 +27,15 @@ def _spiral() -> np.ndarray:
 PLACES = _spiral()
 
 
+@cache
+def mirrored_places() -> np.ndarray:
+    """Return the number (256,) of the place that mirrors each of `PLACES`."""
+    return np.argmax((PLACES * (-1, 1, 1)) @ PLACES.T, axis=1)
+
+
 @dataclass(frozen=True)
 class LightEstimate:
-    """Predicted light of a photo.
+    """Predicted lamps of a photo.
 
     Attributes
     ----------
@@ -37,18 +43,12 @@ class LightEstimate:
         Probabilities of so many lamps; they sum to 1.
     places : (256,) ndarray
         Probability of each of `PLACES` for the strongest lamp, if there is one.
-    light : (8,) ndarray
-        Description of the log shading, see `sirfs.priors.predicted_light`.
-    deviations : (8,) ndarray
-        Standard deviations of `light`.
     """
 
     none: float
     one: float
     several: float
     places: np.ndarray
-    light: np.ndarray
-    deviations: np.ndarray
 
     @property
     def direction(self) -> np.ndarray:

@@ -650,8 +650,8 @@ def blur_color(counts, taps, blurred):
 
 
 @jit(math=REASSOCIATED)
-def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
-    """Compute the silhouette term of rows [first, last).
+def normals_rows(first, last, geometry, expected, strength, gradient, sums):
+    """Compute a term of expected normals in rows [first, last).
 
     Parameters
     ----------
@@ -662,7 +662,7 @@ def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
     expected : (2, H, W) ndarray
         Expected n1 and n2.
     strength : (H, W) ndarray
-        Precision times the term's scale.
+        See `silhouette.ExpectedNormals.strength`.
     gradient : (2, H, W) ndarray
         Output: gradients with respect to n1 and n2.
     sums : (H,) ndarray
@@ -709,7 +709,7 @@ def backward_rows(first, last, surface, spans, light, whiten, pulls, scales, in_
     scales : tuple of float
         Factors of the smoothness, palette, curvature and slant gradients.
     in_plane : (2, H, W) ndarray
-        Gradients of the contour and silhouette terms with respect to n1 and n2.
+        Gradients of the terms of contour and expected normals with respect to n1 and n2.
     out : Backward
         Output.
     """

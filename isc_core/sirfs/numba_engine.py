@@ -18,7 +18,8 @@ from . import kernels, reflectance, shading_kernels, surface
 from .illumination import light_cost
 from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
-from .shading_term import ExpectedShading, best_offset
+from .shading_term import ExpectedShading, best_offsets
+from .silhouette import ExpectedNormals
 
 _ROWS_A_BLOCK = 16
 _MOST_BLOCKS = 16
@@ -67,6 +68,34 @@ def _spans(valid: np.ndarray) -> np.ndarray:
     return spans
 
 
+class _NormalsTerm:
+    """A term of expected normals, and its gradient.
+
+    Parameters
+    ----------
+    valid : (H, W) bool ndarray
+    field : ExpectedNormals
+    weight : float
+    dtype : dtype
+    """
+
+    def __init__(
+        self, valid: np.ndarray, field: ExpectedNormals, weight: float, dtype: np.dtype[Any]
+    ) -> None:
+        self._expected = np.ascontiguousarray([field.down, field.right], dtype)
+        self._strength = field.strength(valid, weight).astype(dtype)
+        self.gradient = np.zeros((2, *valid.shape), dtype)
+        self._sums = np.zeros(len(valid))
+
+    def rows(self, geometry: np.ndarray, first: int, last: int) -> None:
+        kernels.normals_rows(
+            first, last, geometry, self._expected, self._strength, self.gradient, self._sums
+        )
+
+    def cost(self) -> float:
+        return float(self._sums.sum())
+
+
 class _ShadingTerm:
     """The term of the expected shading, and its gradient joined with that of the palette.
 
@@ -80,7 +109,8 @@ class _ShadingTerm:
     def __init__(self, problem: Problem, expected: ExpectedShading, dtype: np.dtype[Any]) -> None:
         valid, weights = problem.valid, problem.weights
         strength = expected.strength(valid, weights.predicted_shading)
-        self._exact, self._strength = strength, strength.astype(dtype)
+        self._total, self._strength = float(strength.sum()), strength.astype(dtype)
+        self._balanced = weights.balanced_colour
         self._mean = np.ascontiguousarray(expected.mean.transpose(0, 2, 1), dtype)
         self._spans = _spans(valid)
         channels = expected.mean.shape[2]
@@ -88,7 +118,7 @@ class _ShadingTerm:
         # reflectance is image less shading, hence the sign
         self._back = np.ascontiguousarray(-solve_linear(whiten, np.eye(channels)).T, dtype)
         self._residual, self.joined = np.zeros((2, *self._mean.shape), dtype)
-        self._sums = np.zeros(len(valid))
+        self._away, self._sums = np.zeros((len(valid), channels)), np.zeros(len(valid))
 
     def residuals(self, geometry: np.ndarray, light: np.ndarray, first: int, last: int) -> None:
         shading_kernels.residual_rows(
@@ -100,19 +130,20 @@ class _ShadingTerm:
             self._mean,
             self._strength,
             self._residual,
-            self._sums,
+            self._away,
         )
 
-    def offset(self) -> float:
-        return best_offset(float(self._sums.sum()), self._exact, self._mean.shape[1])
+    def offsets(self) -> np.ndarray:
+        found = best_offsets(self._away.sum(axis=0), self._total, self._balanced)
+        return found.astype(self._mean.dtype)
 
-    def pulls(self, offset: float, palette: np.ndarray, first: int, last: int) -> None:
+    def pulls(self, offsets: np.ndarray, palette: np.ndarray, first: int, last: int) -> None:
         shading_kernels.pull_rows(
             first,
             last,
             self._spans,
             self._residual,
-            offset,
+            offsets,
             self._strength,
             self._back,
             palette,
@@ -171,13 +202,6 @@ class NumbaEngine:
         self._curvature_pairs = _pairs(low, p.priors.curvature.step, costs, t)
         smoothness = p.priors.smoothness
         self._smooth_pairs = _pairs(smoothness.low, smoothness.step, smoothness.values, t)
-        if p.silhouette is not None:
-            strength = np.where(p.valid, p.silhouette.precision, 0) * (
-                p.weights.silhouette / max(int(p.valid.sum()), 1)
-            )
-            field = p.silhouette
-            self._expected = np.ascontiguousarray([field.down, field.right], t)
-            self._strength = strength.astype(t)
         count = min(_MOST_BLOCKS, max(1, height // _ROWS_A_BLOCK))
         edges = [height * k // count for k in range(count + 1)]
         self._blocks = list(zip(edges[:-1], edges[1:], strict=True))
@@ -205,14 +229,23 @@ class NumbaEngine:
             np.empty((height, 9, channels)), np.zeros((5, height + 4, width + 4), t)
         )
         self._wide = np.empty((height + 2, width + 2), t)
-        self._silhouette_cost = np.zeros(height)
         if channels == 3:
             self._cells = kernels.Cells(
                 np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
             )
         self._palette_terms: dict[str, float] = {}
-        expected = self.problem.expected_shading
-        self._shading = None if expected is None else _ShadingTerm(self.problem, expected, t)
+        p, w = self.problem, self.problem.weights
+        fields = {
+            "silhouette": (p.silhouette, w.silhouette),
+            "predicted_normals": (p.predicted_normals, w.predicted_normals),
+        }
+        self._normals = {
+            name: _NormalsTerm(p.valid, field, weight, t)
+            for name, (field, weight) in fields.items()
+            if field is not None
+        }
+        expected = p.predicted_shading
+        self._shading = None if expected is None else _ShadingTerm(p, expected, t)
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
         """Compute the objective and its gradients.
@@ -242,8 +275,7 @@ class NumbaEngine:
         pairs += [partial(self._pair_block, k) for k in range(len(self._blocks))]
         self._workers.run(pairs)
         self._add_spills()
-        if p.silhouette is not None:
-            self._each_block(self._silhouette_rows)
+        normals = self._normals_terms()
         pulls = self._pulls if self._shading is None else self._with_shading(self._shading, folded)
         contour = self._contour_term()
         self._each_block(partial(self._backward, folded, pulls))
@@ -257,8 +289,7 @@ class NumbaEngine:
         light_gradient = _unfold_light_gradient(self._backward_out.light.sum(axis=0))
         cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
         terms = self._palette_terms | {"contour": contour, "light": cost} | self._pair_terms()
-        if p.silhouette is not None:
-            terms["silhouette"] = float(self._silhouette_cost.sum())
+        terms |= normals
         if self._shading is not None:
             terms["predicted_shading"] = self._shading.cost()
         if p.observation is not None:
@@ -294,16 +325,13 @@ class NumbaEngine:
             self._reflectance,
         )
 
-    def _silhouette_rows(self, first: int, last: int) -> None:
-        kernels.silhouette_rows(
-            first,
-            last,
-            self._surface.geometry,
-            self._expected,
-            self._strength,
-            self._in_plane,
-            self._silhouette_cost,
-        )
+    def _normals_terms(self) -> dict[str, float]:
+        """The terms of expected normals; their gradient becomes `_in_plane`."""
+        self._in_plane[:] = 0
+        for term in self._normals.values():
+            self._each_block(partial(term.rows, self._surface.geometry))
+            self._in_plane += term.gradient
+        return {name: term.cost() for name, term in self._normals.items()}
 
     def _pair_block(self, k: int) -> None:
         first, last = self._blocks[k]
@@ -386,7 +414,7 @@ class NumbaEngine:
     def _with_shading(self, term: _ShadingTerm, light: np.ndarray) -> kernels.Pulls:
         """The pulls with that of the expected shading, for the folded `light`."""
         self._each_block(partial(term.residuals, self._surface.geometry, light))
-        self._each_block(partial(term.pulls, term.offset(), self._pulls.palette))
+        self._each_block(partial(term.pulls, term.offsets(), self._pulls.palette))
         return self._pulls._replace(palette=term.joined)
 
     def _contour_term(self) -> float:
@@ -396,12 +424,8 @@ class NumbaEngine:
         cost, c1, c2 = surface.contour_cost(
             n1, n2, p.contour, w.contour, w.contour_power, p.valid.size
         )
-        if p.silhouette is None:
-            self._in_plane[(0, *at)] = c1
-            self._in_plane[(1, *at)] = c2
-        else:
-            self._in_plane[(0, *at)] += c1
-            self._in_plane[(1, *at)] += c2
+        self._in_plane[(0, *at)] += c1
+        self._in_plane[(1, *at)] += c2
         return cost
 
     def _scales(self) -> tuple[float, float, float, float]:

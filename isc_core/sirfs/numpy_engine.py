@@ -9,7 +9,7 @@ from . import reflectance, surface
 from .illumination import light_cost
 from .problem import Evaluation, Problem, Terms
 from .shading_term import shading_cost
-from .silhouette import silhouette_cost
+from .silhouette import normals_cost
 
 
 class NumpyEngine:
@@ -51,9 +51,14 @@ class NumpyEngine:
         reflectance_terms, d_reflectance = self._reflectance(log_reflectance)
         d_reflectance[~p.valid] = 0
         d_shading = -d_reflectance
-        if p.expected_shading is not None:
+        if p.predicted_shading is not None:
+            w = p.weights
             reflectance_terms["predicted_shading"], pull_shading = shading_cost(
-                log_shading, p.expected_shading, p.valid, p.weights.predicted_shading
+                log_shading,
+                p.predicted_shading,
+                p.valid,
+                w.predicted_shading,
+                balanced=w.balanced_colour,
             )
             d_shading = d_shading + pull_shading
         light_gradient = np.einsum("khw,hwc->kc", functions, d_shading, dtype=float)
@@ -105,8 +110,13 @@ class NumpyEngine:
         d2[at] += c2.astype(d2.dtype)
         terms = {"curvature": curvature, "slant": slant, "contour": contour}
         if p.silhouette is not None:
-            terms["silhouette"], e1, e2 = silhouette_cost(
+            terms["silhouette"], e1, e2 = normals_cost(
                 g.n1, g.n2, p.valid, p.silhouette, w.silhouette
+            )
+            d1, d2 = d1 + e1, d2 + e2
+        if p.predicted_normals is not None:
+            terms["predicted_normals"], e1, e2 = normals_cost(
+                g.n1, g.n2, p.valid, p.predicted_normals, w.predicted_normals
             )
             d1, d2 = d1 + e1, d2 + e2
         gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)

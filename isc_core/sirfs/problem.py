@@ -9,7 +9,7 @@ from ..shading.occluding_contour import Contour
 from .priors.priors import Priors
 from .settings import Weights
 from .shading_term import ExpectedShading
-from .silhouette import ExpectedNormals
+from .silhouette import ExpectedNormals, SilhouetteNormals
 
 # Half of the offsets (down, right) in a 5 x 5 window: every unordered pair once.
 PAIR_OFFSETS = (
@@ -48,13 +48,13 @@ class Problem:
         Observed depth.
     shading_only : bool
         Shape-from-shading mode: the reflectance is one unknown colour.
-    silhouette : ExpectedNormals or None
-        Expected normals, from the silhouette or from a prediction.
+    silhouette : SilhouetteNormals or None
+        Normals that the silhouette suggests.
     pixel_weight : (H, W) ndarray or None
         Weight of a valid pixel in the reflectance terms, in [0, 1] and not 0 everywhere; a pair
         counts with the product. None: 1.
-    expected_shading : ExpectedShading or None
-        Expected log shading, from a prediction.
+    predicted_normals : ExpectedNormals or None
+    predicted_shading : ExpectedShading or None
     """
 
     log_image: np.ndarray
@@ -65,9 +65,10 @@ class Problem:
     weights: Weights
     observation: DepthObservation | None = None
     shading_only: bool = False
-    silhouette: ExpectedNormals | None = None
+    silhouette: SilhouetteNormals | None = None
     pixel_weight: np.ndarray | None = None
-    expected_shading: ExpectedShading | None = None
+    predicted_normals: ExpectedNormals | None = None
+    predicted_shading: ExpectedShading | None = None
 
     @property
     def reflectance_weight(self) -> np.ndarray:
@@ -89,6 +90,7 @@ class Terms:
     silhouette: float = 0.0
     observation: float = 0.0
     shading_only: float = 0.0
+    predicted_normals: float = 0.0
     predicted_shading: float = 0.0
 
     @property

@@ -22,11 +22,12 @@ from ..scene.known_inputs import DepthObservation, SceneConstraints
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 from ..shading.occluding_contour import Contour, occluding_contour
-from .normal_prior import expected_normals
+from .normal_prior import normals_from_prediction
 from .priors.priors import Priors
 from .problem import Problem, Terms
 from .settings import Weights
 from .shading_term import expected_shading
+from .silhouette import normals_from_silhouette
 from .solver import SirfsResult, SolverOptions, solve
 
 MARGIN = 20
@@ -413,6 +414,7 @@ def _problem(
     inputs: SolveInputs, floor: float, priors: Priors, weights: Weights, options: RecoverOptions
 ) -> Problem:
     contour = occluding_contour(inputs.silhouette, drop_near_edge=options.drop_near_edge)
+    profile = priors.silhouette
     return Problem(
         np.where(inputs.valid[..., None], np.log(np.maximum(inputs.image, floor)), 0.0),
         inputs.valid,
@@ -422,8 +424,9 @@ def _problem(
         weights,
         inputs.depth,
         options.shading_only,
-        expected_normals(inputs.silhouette, priors.silhouette, inputs.normals),
+        None if profile is None else normals_from_silhouette(inputs.silhouette, profile),
         inputs.pixel_weight,
+        normals_from_prediction(inputs.normals, inputs.silhouette),
         expected_shading(inputs.shading, priors.channels),
     )
 

@@ -31,7 +31,7 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
         See `ExpectedShading.strength`.
     residual : (H, C, W) ndarray
         Output, written within the spans.
-    sums : (H,) float64 ndarray
+    sums : (H, C) float64 ndarray
         Output: sum over each row of strength times residual.
     """
     t = geometry.dtype.type
@@ -39,7 +39,6 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
         a, b = spans[i, 0], spans[i, 1]
         n1, n2, n3 = geometry[i, 5, a:b], geometry[i, 6, a:b], geometry[i, 7, a:b]
         s = strength[i, a:b]
-        total = t(0)
         for c in range(mean.shape[1]):
             l0, l1, l2, l3, l4 = light[0, c], light[1, c], light[2, c], light[3, c], light[4, c]
             l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
@@ -51,13 +50,14 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
                     + n2[j] * (l1 + l5 * n3[j] - l8 * n2[j])
                     + n3[j] * (l2 + l6 * n3[j])
                 ) - m[j]
+            total = t(0)
             for j in range(b - a):
                 total += s[j] * out[j]
-        sums[i] = total
+            sums[i, c] = total
 
 
 @jit(math=REASSOCIATED)
-def pull_rows(first, last, spans, residual, offset, strength, back, palette, joined, sums):
+def pull_rows(first, last, spans, residual, offsets, strength, back, palette, joined, sums):
     """Compute the term and its gradient in rows [first, last).
 
     Parameters
@@ -68,8 +68,8 @@ def pull_rows(first, last, spans, residual, offset, strength, back, palette, joi
         See `kernels.Photo`.
     residual : (H, C, W) ndarray
         From `residual_rows`; overwritten by the gradient with respect to the log shading.
-    offset : float
-        The free constant.
+    offsets : (C,) ndarray
+        The free constants.
     strength : (H, W) ndarray
         See `ExpectedShading.strength`.
     back : (C, C) ndarray
@@ -82,14 +82,14 @@ def pull_rows(first, last, spans, residual, offset, strength, back, palette, joi
         Output: the term of each row.
     """
     t = residual.dtype.type
-    half, k = t(0.5), t(offset)
+    half = t(0.5)
     channels = residual.shape[1]
     for i in range(first, last):
         a, b = spans[i, 0], spans[i, 1]
         s = strength[i, a:b]
         total = t(0)
         for c in range(channels):
-            r = residual[i, c, a:b]
+            r, k = residual[i, c, a:b], offsets[c]
             for j in range(b - a):
                 away = r[j] - k
                 r[j] = s[j] * away

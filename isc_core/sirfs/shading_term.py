@@ -5,16 +5,16 @@ neighbouring pixels cannot.
 
 Equation: with the log shading S_c of the current normals and light, the predicted mean m_c and the
 deviation s of each of n valid pixels and C channels,
-  cost = w/(n C) * sum over pixels and channels of (S_c - m_c - k)^2 / (2 s^2).
-Brightness cannot be told from albedo, so k is free. At its optimum, the mean of S - m weighted by
-1 / s^2, the derivative by k is 0, so
-  d cost / d S_c = w/(n C) * (S_c - m_c - k) / s^2.
+  cost = w/(n C) * sum over pixels and channels of (S_c - m_c - k_c)^2 / (2 s^2).
+Brightness cannot be told from albedo, so k is free: one constant for photos of balanced colours,
+one for each channel where the light may have any colour. At its optimum, the mean of S - m weighted
+by 1 / s^2, the derivative by k is 0, so
+  d cost / d S_c = w/(n C) * (S_c - m_c - k_c) / s^2.
 
-Citation: none; the quadratic term of a Gaussian likelihood with one unknown profiled out.
+Citation: none; the quadratic term of a Gaussian likelihood with unknown constants profiled out.
 
 Limits: s is the deviation of one pixel, while errors of neighbours and of channels are correlated;
-w, well below the 1 of independent errors, compensates for that on average. The cost is quadratic: a
-saturating one would leave no closed form for k, and where a prediction fails, its s should say so.
+w, well below the 1 of independent errors, compensates for that on average.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class ExpectedShading:
     Attributes
     ----------
     mean : (H, W, C) ndarray
-        Log shading up to one constant.
+        Log shading up to k.
     precision : (H, W) ndarray
         1 / s^2 of each channel; 0 where nothing is expected.
     """
@@ -85,7 +85,12 @@ def expected_shading(estimate: ShadingEstimate | None, channels: int) -> Expecte
 
 
 def shading_cost(
-    log_shading: np.ndarray, expected: ExpectedShading, valid: np.ndarray, weight: float
+    log_shading: np.ndarray,
+    expected: ExpectedShading,
+    valid: np.ndarray,
+    weight: float,
+    *,
+    balanced: bool,
 ) -> tuple[float, np.ndarray]:
     """Compute the term of the expected shading.
 
@@ -96,6 +101,8 @@ def shading_cost(
     expected : ExpectedShading
     valid : (H, W) bool ndarray
     weight : float
+    balanced : bool
+        Whether k is one constant for all channels.
 
     Returns
     -------
@@ -106,29 +113,29 @@ def shading_cost(
     t = log_shading.dtype
     strength = expected.strength(valid, weight)
     away = log_shading - expected.mean.astype(t)
-    offset = best_offset(
-        float((strength[..., None] * away).sum(dtype=float)), strength, away.shape[2]
-    )
-    away = away - t.type(offset)
+    sums = (strength[..., None] * away).sum(axis=(0, 1), dtype=float)
+    away = away - best_offsets(sums, float(strength.sum(dtype=float)), balanced).astype(t)
     pull = strength.astype(t)[..., None] * away
     return 0.5 * float((pull * away).sum(dtype=float)), pull
 
 
-def best_offset(weighted: float, strength: np.ndarray, channels: int) -> float:
-    """Return the constant k at which the term is least.
+def best_offsets(sums: np.ndarray, total: float, balanced: bool) -> np.ndarray:
+    """Return the constants k at which the term is least.
 
     Parameters
     ----------
-    weighted : float
-        Sum over pixels and channels of strength times S - m.
-    strength : (H, W) ndarray
-        See `ExpectedShading.strength`.
-    channels : int
+    sums : (C,) ndarray
+        Sums over pixels of strength times S - m.
+    total : float
+        Sum of the strengths.
+    balanced : bool
+        Whether k is one constant for all channels.
 
     Returns
     -------
-    float
+    (C,) ndarray
         0 if nothing is expected anywhere.
     """
-    total = channels * float(strength.sum(dtype=float))
-    return weighted / total if total > 0 else 0.0
+    if total <= 0:
+        return np.zeros(len(sums))
+    return (np.full(len(sums), sums.mean()) if balanced else sums) / total

@@ -32,7 +32,7 @@ _SMOOTHING = 0.05
 
 @dataclass(frozen=True)
 class ExpectedNormals:
-    """Expected normals and the height map they add up to, each (H, W); 0 outside the mask.
+    """Expected normals, each (H, W); 0 outside the mask.
 
     Attributes
     ----------
@@ -40,14 +40,39 @@ class ExpectedNormals:
         Expected in-plane part of the unit normal.
     precision : ndarray
         1 / s^2 of each component.
-    dome : ndarray
-        Height in pixels of these normals; from the silhouette, with a slope of m / sqrt(1 - m^2) at
-        depth u, Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du.
     """
 
     down: np.ndarray
     right: np.ndarray
     precision: np.ndarray
+
+    def strength(self, valid: np.ndarray, weight: float) -> np.ndarray:
+        """Return the factor of each pixel's half squares.
+
+        Parameters
+        ----------
+        valid : (H, W) bool ndarray
+        weight : float
+            Weight of the term.
+
+        Returns
+        -------
+        (H, W) float64 ndarray
+        """
+        return np.where(valid, self.precision, 0) * (weight / max(int(valid.sum()), 1))
+
+
+@dataclass(frozen=True)
+class SilhouetteNormals(ExpectedNormals):
+    """Normals that a silhouette suggests, and the height map they add up to.
+
+    Attributes
+    ----------
+    dome : (H, W) ndarray
+        Height in pixels. With a slope of m / sqrt(1 - m^2) at depth u,
+        Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du.
+    """
+
     dome: np.ndarray
 
 
@@ -110,7 +135,7 @@ def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarr
     return -down / length, -right / length
 
 
-def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> ExpectedNormals:
+def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> SilhouetteNormals:
     """Return the normals that a profile expects inside a mask.
 
     Parameters
@@ -120,13 +145,13 @@ def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> Exp
 
     Returns
     -------
-    ExpectedNormals
+    SilhouetteNormals
     """
     distance, deepest = _depth(mask)
     u, (down, right) = distance / deepest, _outward(distance, deepest)
     mean, spread = profile.at(u)
     maps = (mean * down, mean * right, 1 / spread**2, deepest * _dome_at(u, profile))
-    return ExpectedNormals(*(np.where(mask, values, 0) for values in maps))
+    return SilhouetteNormals(*(np.where(mask, values, 0) for values in maps))
 
 
 def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
@@ -139,10 +164,10 @@ def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
     )
 
 
-def silhouette_cost(
+def normals_cost(
     n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, field: ExpectedNormals, weight: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Compute the term of the expected normals.
+    """Compute the term of expected normals.
 
     Parameters
     ----------
@@ -157,8 +182,7 @@ def silhouette_cost(
     cost : float
     gradient_n1, gradient_n2 : (H, W) ndarray
     """
-    scale = weight / max(int(valid.sum()), 1)
-    strength = (np.where(valid, field.precision, 0) * scale).astype(n1.dtype)
+    strength = field.strength(valid, weight).astype(n1.dtype)
     away1, away2 = n1 - field.down.astype(n1.dtype), n2 - field.right.astype(n1.dtype)
     pull1, pull2 = strength * away1, strength * away2
     return 0.5 * float((pull1 * away1 + pull2 * away2).sum(dtype=float)), pull1, pull2

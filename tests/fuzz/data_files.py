@@ -21,9 +21,7 @@ from isc_core.batch.item import ImageRecipe
 from isc_core.batch.manifest import Manifest
 from isc_core.datasets.mit_berkeley import load_natural_lights, load_object
 from isc_core.decomposition.pipeline import Settings, decompose
-from isc_core.networks.layer_network import LayerNetwork
-from isc_core.networks.light_network import LightNetwork
-from isc_core.networks.scene_classifier import SceneClassifier
+from isc_core.networks.scene_network import SceneNetwork
 from isc_core.photo import read_photo
 from isc_core.result_files.known_inputs import read_light
 from isc_core.result_files.result_folder import load, save
@@ -160,9 +158,7 @@ def _npz() -> tuple[Case, ...]:
     return (
         *_npz_cases("priors.npz", priors, load_prior_set),
         *_npz_cases("table.npz", table, read_table),
-        *_npz_cases("network.npz", network, LayerNetwork.read),
-        *_npz_cases("appearance.npz", network, SceneClassifier.read),
-        *_npz_cases("lamps.npz", network, LightNetwork.read),
+        *_npz_cases("network.npz", network, SceneNetwork.read),
         *_npz_cases("arrays.npz", result["arrays.npz"], _read_result, description),
     )
 

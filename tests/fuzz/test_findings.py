@@ -20,9 +20,7 @@ from isc_core.io.json_files import read_json
 from isc_core.io.limits import Limits
 from isc_core.io.matlab import read_matrix
 from isc_core.io.npy import read_array, read_arrays
-from isc_core.networks.layer_network import LayerNetwork
-from isc_core.networks.light_network import LightNetwork
-from isc_core.networks.scene_classifier import SceneClassifier
+from isc_core.networks.scene_network import SceneNetwork
 from isc_core.photo import read_linear, read_photo
 from isc_core.result_files.known_inputs import read_light
 from isc_core.result_files.result_folder import load
@@ -253,13 +251,12 @@ def test_tables_and_networks_with_nan_are_refused(refused: Callable[..., None]) 
         "a.npz",
     )
     weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
-    for read in (LayerNetwork.read, SceneClassifier.read, LightNetwork.read):
-        refused(
-            read,
-            "a.npz",
-            archive(**{key: array(value) for key, value in weights.items()}),
-            "not finite",
-        )
+    refused(
+        SceneNetwork.read,
+        "a.npz",
+        archive(**{key: array(value) for key, value in weights.items()}),
+        "not finite",
+    )
 
 
 # --- descriptions ---------------------------------------------------------------------------------

@@ -24,6 +24,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.networks.layers import DARK
 from isc_core.networks.scene_network import (
     BLOCK,
     CHANNELS,
@@ -45,7 +46,6 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
-from .torch_layers import network_input
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
@@ -185,9 +185,9 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         hidden = functional.relu(self.hidden(torch.cat(features, 1)))
         return maps, self.light(hidden)
 
-    def encoder_parameters(self) -> list[nn.Parameter]:
-        """Return the parameters of the convolutions."""
-        return [*self.down.parameters(), *self.up.parameters(), *self.out.parameters()]
+    def matrices(self) -> list[nn.Parameter]:
+        """Return the weights of the blocks."""
+        return [convolution.matrix for convolution, _ in self._pairs]
 
     def loss(self, batch: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its terms.
@@ -302,7 +302,10 @@ def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
     rows, columns = photo.shape[2:]
     right = (torch.arange(columns, device=photo.device) + 0.5) * (2 / columns) - 1
     up = 1 - (torch.arange(rows, device=photo.device) + 0.5) * (2 / rows)
-    return torch.cat([network_input(photo, mask), right * mask, up[:, None] * mask], 1)
+    mean = (photo.mean(1, keepdim=True) * mask).sum((2, 3), keepdim=True)
+    mean = (mean / mask.sum((2, 3), keepdim=True).clamp(min=1)).clamp(min=1e-9)
+    light = torch.log(photo / mean + DARK) * mask
+    return torch.cat([light, mask, right * mask, up[:, None] * mask], 1)
 
 
 def _thinned(maps: torch.Tensor, batch: Sample, *, random: bool) -> tuple[torch.Tensor, Sample]:

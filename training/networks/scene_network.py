@@ -4,10 +4,10 @@
   [--device cuda] [--minutes N] -o SCENE.npz
 
 WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are taken while the
-network learns (`training.world.samples`), and none is used twice. `--weights` starts from an
-archive that an earlier run wrote, `--resume` continues an interrupted one; `--side 64` sees photos
-smaller, which is a quarter of the work. Held-out bodies under held-out panoramas are measured every
-thousand steps.
+network learns (`training.world.samples`), and none is used twice.
+`--weights` starts from an archive that an earlier run wrote, `--resume` continues an interrupted
+one; `--side 64` sees photos smaller, which is a quarter of the work. Held-out bodies under held-out
+panoramas are measured every thousand steps.
 
 Equation: see `training.networks.scene_module`.
 
@@ -33,7 +33,7 @@ from ..world.samples import OUTPUT, Darkroom, Draw, Sample
 from .scene_batches import POOL, SceneBatches, SceneDraws, read_world
 from .scene_module import WIDTHS, SceneNetworkModule
 
-SCHEDULE = Schedule(rate=3e-3, head_rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
+SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
     "prints": {"printed": 0.0},
@@ -68,7 +68,7 @@ def main() -> None:
         parser.error(str(error))
     widths = tuple(arguments.widths)
     network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
-    schedule = replace(SCHEDULE, rate=arguments.rate, head_rate=arguments.rate)
+    schedule = replace(SCHEDULE, rate=arguments.rate)
     shares = Shares()
     for name in arguments.without:
         shares = replace(shares, **_ABLATIONS[name])

@@ -24,7 +24,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from ..data.random_draws import log_uniform
+from .random_draws import log_uniform
 
 BLOCK = 8
 _LUMA = (

@@ -1,46 +1,40 @@
-"""Light from all around: photographed panoramas, their variations, and what a network learns of
-them.
+"""Light from all around: photographed panoramas, and what gloss shows of them.
 
 An environment is an image (rows, 2 rows, 3) of linear radiance in the layout of
 `isc_core.shading.environment_map`. `invented_environments` draws those that nobody photographed.
 
-Equations: reduction and rotation take the mean radiance of the solid angle that a pixel covers, so
-that the light as a whole stays the same. A gloss of width a (GGX) reflects, for a viewer along the
+Equation: reduction takes the mean radiance of the solid angle that a pixel covers, so that the
+light as a whole stays the same. A gloss of width a (GGX) reflects, for a viewer along the
 normal,
 
     L_a(r) = integral of K(r, w) L(w) dw,        K ~ D_a(half angle) max(r . w, 0)
 
 K is scaled by a factor for each ring of latitude so that a uniform environment stays uniform and
-the mean radiance of any other stays as it is (Sinkhorn). The light description of SIRFS is the
-quadratic that is closest to the logarithm of the diffuse shading on the normals that face a viewer.
+the mean radiance of any other stays as it is (Sinkhorn).
 
 Citation: B. Walter et al. (2007), "Microfacet models for refraction through rough surfaces",
 doi:10.2312/EGWR/EGSR07/195-206 (GGX); B. Karis (2013), "Real shading in Unreal Engine 4" (one lobe
-for each direction); R. Sinkhorn (1964), doi:10.1214/aoms/1177703591; J. T. Barron, J. Malik (2015),
-doi:10.1109/TPAMI.2014.2377712 (log shading).
+for each direction); R. Sinkhorn (1964), doi:10.1214/aoms/1177703591.
 
-Limits: 32 rows show details of 6 degrees, which is also the narrowest lobe. A rotation spreads a
-pixel over the neighbours. Lobes do not stretch at grazing angles.
+Limits: 32 rows show details of 6 degrees, which is also the narrowest lobe. Lobes do not
+stretch at grazing angles.
 """
 
 import re
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import groupby
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from isc_core.errors import InputError
 from isc_core.photo import read_linear, read_raster
 from isc_core.shading.environment_map import (
     directions,
     resampled,
-    shading_under,
     solid_angles,
 )
-from isc_core.shading.spherical_harmonics import real_sh
 
 ROWS = 32
 FILES = (".exr", ".hdr")
@@ -105,98 +99,6 @@ def read_panoramas(folder: Path, seed: int) -> list[Panorama]:
     return [Panorama(path.stem, _read(path), path.stem in judged) for path in files]
 
 
-def turned(environment: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Rotate an environment at random.
-
-    Most are turned about the vertical, half of these also tilted a little, as by a camera that
-    looks down at a table. One in eight is rotated anyhow.
-
-    Parameters
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (rows, 2 rows, 3) ndarray
-    """
-    if rng.random() < 1 / 8:
-        return rotated(environment, Rotation.random(random_state=rng).as_matrix())
-    yaw = rng.uniform(0, 360)
-    pitch, roll = rng.normal(0, (12, 5)) if rng.random() < 0.5 else (0.0, 0.0)
-    turn = Rotation.from_euler("yxz", (yaw, pitch, roll), degrees=True)
-    return rotated(environment, turn.as_matrix())
-
-
-def rotated(environment: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Rotate an environment about the object.
-
-    Parameters
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-    rotation : (3, 3) ndarray
-        Takes a direction that light came from to the one that it comes from now, camera frame.
-
-    Returns
-    -------
-    (rows, 2 rows, 3) ndarray of float32
-        Of the same total light in each channel.
-    """
-    rows = len(environment)
-    # Several directions in each pixel: the share of each old pixel in each new one.
-    came = directions(rows * _SAMPLES) @ rotation
-    row = np.clip((np.arccos(np.clip(came[..., 1], -1, 1)) * (rows / np.pi)).astype(int), 0, None)
-    azimuth = np.arctan2(came[..., 0], -came[..., 2]) % (2 * np.pi)
-    column = (azimuth * (rows / np.pi)).astype(int) % (2 * rows)
-    new = resampled(environment.astype(float)[np.minimum(row, rows - 1), column], rows)
-    before, after = _light(environment), _light(new)
-    return np.asarray(new * before / np.where(after > 0, after, 1), np.float32)
-
-
-def exposed(environment: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Vary contrast, colour and exposure of an environment.
-
-    Parameters
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (rows, 2 rows, 3) ndarray of float32
-        Its mean luminance is between 1/2 and 2.
-    """
-    changed = contrasted(environment, float(np.exp(rng.normal(0, 0.2))))
-    warmth, tint = rng.normal(0, (0.15, 0.04))
-    changed = changed * np.exp([warmth, tint, -warmth])
-    level = float((_light(changed) * _LUMINANCE).sum() / (4 * np.pi))
-    return np.asarray(changed * (2 ** rng.uniform(-1, 1) / max(level, 1e-12)), np.float32)
-
-
-def contrasted(environment: np.ndarray, exponent: float) -> np.ndarray:
-    """Change the contrast of an environment and keep its hues.
-
-    Parameters
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-    exponent : float
-        Of the luminance; above 1, bright places stand out more.
-
-    Returns
-    -------
-    (rows, 2 rows, 3) ndarray of float32
-        Of the same mean luminance.
-    """
-    luminance = environment @ _LUMINANCE
-    mean = float((luminance * solid_angles(len(environment))).sum() / (4 * np.pi))
-    if not mean > 0:
-        return np.asarray(environment, np.float32)
-    factor = np.maximum(luminance / mean, 1e-6) ** (exponent - 1)
-    changed = environment * factor[..., None]
-    kept = (_light(environment) @ _LUMINANCE) / (_light(changed) @ _LUMINANCE)
-    return np.asarray(changed * kept, np.float32)
-
-
 def smoothed_levels(environment: np.ndarray, widths: tuple[float, ...]) -> np.ndarray:
     """Compute what glosses of several widths reflect from each direction.
 
@@ -244,69 +146,6 @@ def lobe_matrix(rows: int, width: float) -> np.ndarray:
     matrix = matrix.reshape(2 * rows * rows, -1)
     matrix.setflags(write=False)
     return matrix
-
-
-def log_harmonics(environment: np.ndarray) -> np.ndarray:
-    """Fit the light description of SIRFS to an environment.
-
-    Parameters
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-
-    Returns
-    -------
-    (9, 3) ndarray
-        Coefficients of `real_sh` for the logarithm of the diffuse shading on the normals that face
-        the viewer, each weighted by its area in the picture of a sphere. Shading below a thousandth
-        of the brightest counts as that.
-    """
-    shading = shading_under(environment, facing_normals())
-    return fitted_harmonics(np.log(np.maximum(shading, _LEAST_SHADING * shading.max() + 1e-12)))
-
-
-def fitted_harmonics(log_shading: np.ndarray) -> np.ndarray:
-    """Fit the quadratic that is closest to a log shading.
-
-    Parameters
-    ----------
-    log_shading : (N, 3) ndarray
-        At `facing_normals`.
-
-    Returns
-    -------
-    (9, 3) ndarray
-        Coefficients of `real_sh`, least squares.
-    """
-    return _fit() @ log_shading
-
-
-@cache
-def facing_normals(steps: int = 24) -> np.ndarray:
-    """Return the normals of a sphere's picture.
-
-    Parameters
-    ----------
-    steps : int
-        Pixels of its diameter.
-
-    Returns
-    -------
-    (N, 3) ndarray
-        Unit vectors with z > 0, camera frame. Read-only.
-    """
-    places = (np.arange(steps) + 0.5) * 2 / steps - 1
-    x, y = np.meshgrid(places, places)
-    inside = x * x + y * y < 1
-    x, y = x[inside], y[inside]
-    normals = np.stack([x, y, np.sqrt(1 - x * x - y * y)], -1)
-    normals.setflags(write=False)
-    return normals
-
-
-@cache
-def _fit() -> np.ndarray:
-    """The matrix (9, N) of the least-squares fit at `facing_normals`."""
-    return np.linalg.pinv(real_sh(facing_normals()))
 
 
 def _light(environment: np.ndarray) -> np.ndarray:

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..data.random_draws import log_uniform
 from .patterns import Atlas, PatternKind
+from .random_draws import log_uniform
 
 LAMPS, LAYERS = 4, 3
 

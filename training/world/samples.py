@@ -16,12 +16,12 @@ from torch.nn import functional
 
 from isc_core.scene.light_estimate import PLACES
 
-from ..data.random_draws import log_uniform
 from .camera import CameraDraw, draw_camera, exposed, photographed
 from .lighting import PreparedView, ViewBatch, basis_of, batch_of
 from .lit_pictures import LitPictures, make_pictures
 from .patterns import Atlas
 from .pictures import Bank, stacked
+from .random_draws import log_uniform
 from .recipes import Shares, draw_recipe
 from .tensor_batch import Pool, TensorBatch
 from .views import SIDE

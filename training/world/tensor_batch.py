@@ -81,9 +81,6 @@ class Pool(Generic[Batch]):
         self._size, self._next = size, 0
         self._rows: Batch | None = None
 
-    def __len__(self) -> int:
-        return 0 if self._rows is None else len(self._rows)
-
     def exchange(self, fresh: Batch) -> None:
         """Add rows; once the pool is full, in place of the oldest.
 

@@ -185,7 +185,8 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         "--illumination",
         choices=ILLUMINATIONS,
         default=defaults.illumination,
-        help="prior of the illumination (default %(default)s)",
+        help="kind of photo: any of balanced colours, or an object of MIT-Berkeley in natural or "
+        "laboratory light (default %(default)s)",
     )
     group.add_argument(
         "--light-colour",

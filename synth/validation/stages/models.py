@@ -20,11 +20,10 @@ import numpy as np
 
 from isc_core.decomposition.layers import separated, shaded
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
+from isc_core.decomposition.predictions import with_predictions
 from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
-from isc_core.networks.light_network import predict_light
-from isc_core.networks.normal_network import predict_normals
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.known_inputs import SceneConstraints
@@ -104,27 +103,14 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
         )
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
-    # Estimated from the photo, also for the run on its diffuse layer.
-    light_estimate, normal_estimate = (
-        predict_light(photo.image, photo.mask),
-        predict_normals(photo.image, photo.mask),
-    )
+    # What is predicted from the photo also serves the run on its diffuse layer.
+    usual = Settings("sirfs", options.separator, options.illumination, threads=options.threads)
+    seen = with_predictions(DecompositionTask(photo, photo, usual, monitor=monitor, split=split))
 
     def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
         known = SceneConstraints() if start is None else SceneConstraints(start.height, start.light)
-        settings = Settings(model, options.separator, options.illumination, threads=options.threads)
-        return solve(
-            DecompositionTask(
-                image,
-                image,
-                settings,
-                known,
-                monitor=monitor,
-                split=split,
-                light_estimate=light_estimate,
-                normal_estimate=normal_estimate,
-            )
-        )
+        settings = replace(usual, model=model)
+        return solve(replace(seen, working=image, maps=image, settings=settings, known=known))
 
     answers = {PLAIN: solved("sirfs", photo)}
     for name in (name for name in SEPARATING_MODELS if name in options.models):

@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 
+from isc_core.decomposition.settings import Illumination
 from isc_core.errors import InputError
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import (
@@ -220,12 +221,13 @@ def _solved(
         and np.array_equal(inside[:, :1], inside[:, 2:])
         else 3
     )
-    priors = _priors(options.illumination, channels)
+    statistics = Illumination(options.illumination).statistics
+    priors = _priors(statistics, channels)
     log_image = np.where(
         valid[..., None], np.log(np.maximum(diffuse[..., :channels].astype(float), BLACK)), 0.0
     )
     field = None if priors.silhouette is None else normals_from_silhouette(mask, priors.silhouette)
-    weights = isc_weights(options.illumination, channels)
+    weights = isc_weights(statistics, channels)
     problem = Problem(
         log_image, valid, mask, occluding_contour(mask), priors, weights, silhouette=field
     )

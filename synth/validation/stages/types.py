@@ -36,7 +36,7 @@ class StageOptions:
     separator : str
         One of `isc_core.separation.METHODS`.
     illumination : str
-        Light prior of SIRFS, "natural" or "laboratory".
+        One of `isc_core.decomposition.pipeline.ILLUMINATIONS`.
     threads : int
         Threads of one solver, 0 for all cores.
     models : tuple of str
@@ -49,7 +49,7 @@ class StageOptions:
     """
 
     separator: str = BEST
-    illumination: str = "natural"
+    illumination: str = "photo"
     threads: int = 1
     models: tuple[str, ...] = ()
 

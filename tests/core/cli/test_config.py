@@ -65,7 +65,7 @@ def test_lists_of_names_and_repeated_options() -> None:
         ("[decompose]\nmax-size = -3", "max-size of [decompose]: '-3' is not a whole number"),
         ("[decompose]\nmax-size = [3]", "is one value, not [3]"),
         ('[decompose]\nfull-size = "yes"', "is true or false, not 'yes'"),
-        ('[decompose]\nillumination = "sun"', "unknown 'sun': choose natural, laboratory"),
+        ('[decompose]\nillumination = "sun"', "unknown 'sun': choose photo, natural, laboratory"),
         ("[decompose]\noutput = 'x'", "has no option 'output'"),
         ("[decompose\n", "is not valid TOML"),
         ("[decompose]\nmodel = 1979-05-27", "is a text or a number"),

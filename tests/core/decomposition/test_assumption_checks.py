@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decomposition import assumption_checks
 from isc_core.decomposition.assumption_checks import (
     check_photo,
     check_scene,
@@ -13,24 +12,33 @@ from isc_core.decomposition.assumption_checks import (
     with_warnings,
 )
 from isc_core.decomposition.models import SceneEstimate
-from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
+from isc_core.networks.scene_network import Kind, ScenePrediction
 from isc_core.photo import Photo, PhotoSource
 from isc_core.result_files.diagnostics_text import warning_text
 from isc_core.scene.decomposition import Separation
 from isc_core.scene.diagnostics import Diagnostics, WarningKind
-from isc_core.scene.light_estimate import PLACES, LightEstimate
+from isc_core.scene.light_coefficients_estimate import LightCoefficientsEstimate
+from isc_core.scene.light_estimate import PLACES
+from isc_core.scene.normal_estimate import NormalEstimate
+from isc_core.scene.shading_estimate import ShadingEstimate
 
 SIZE = 20
-SURE, MIRRORED = (
-    {ORDINARY: 0.9, MIRROR: 0.06, GLASS: 0.02, LAMPS: 0.02},
-    {ORDINARY: 0.2, MIRROR: 0.4, GLASS: 0.3, LAMPS: 0.1},
-)
+SURE, MIRRORED = (0.92, 0.06, 0.02), (0.3, 0.4, 0.3)  # probabilities of `Kind`
 
 
-def lit_by(several: float) -> LightEstimate:
-    """One light or, with a probability of `several`, more."""
-    return LightEstimate(
-        0.0, 1 - several, several, np.full(len(PLACES), 1 / len(PLACES)), np.zeros(8), np.ones(8)
+def told(kinds: tuple[float, float, float], several: float) -> ScenePrediction:
+    """What the network says: one lamp or, with a probability of `several`, more."""
+    maps, flat = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE))
+    return ScenePrediction(
+        NormalEstimate(maps, flat),
+        maps,
+        flat,
+        ShadingEstimate(maps, flat),
+        LightCoefficientsEstimate(np.zeros((9, 3)), np.eye(27)),
+        np.array([0, 1 - several, several]),
+        np.full(len(PLACES), 1 / len(PLACES)),
+        np.array(kinds),
+        flat,
     )
 
 
@@ -52,18 +60,15 @@ def answered() -> tuple[Photo, SceneEstimate]:
     [
         (SURE, 0.2, []),
         (MIRRORED, 0.2, [WarningKind.MIRROR_OR_GLASS]),
-        (SURE, 0.7, []),
-        (SURE | {LAMPS: 0.3}, 0.7, [WarningKind.SEVERAL_LIGHTS]),
-        (MIRRORED | {LAMPS: 0.3}, 0.7, [WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS]),
-        ({ORDINARY: 0.3, MIRROR: 0.0, GLASS: 0.0, LAMPS: 0.7}, 0.3, [WarningKind.SEVERAL_LIGHTS]),
-        ({ORDINARY: 0.3, MIRROR: 0.0, GLASS: 0.0, LAMPS: 0.7}, 0.1, []),
-        ({ORDINARY: 0.45, MIRROR: 0.25, GLASS: 0.3, LAMPS: 0.0}, 0.3, []),
+        (SURE, 0.8, [WarningKind.SEVERAL_LIGHTS]),
+        (MIRRORED, 0.8, [WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS]),
+        ((0.75, 0.15, 0.1), 0.5, []),
     ],
 )
-def test_each_kind_has_its_line(
-    kinds: dict[str, float], several: float, expected: list[WarningKind]
+def test_each_kind_has_its_threshold(
+    kinds: tuple[float, float, float], several: float, expected: list[WarningKind]
 ) -> None:
-    found = check_scene(kinds, lit_by(several))
+    found = check_scene(told(kinds, several))
     assert [warning.kind for warning in found] == expected
     assert all(warning.value is not None and 0 < warning.value <= 1 for warning in found)
 
@@ -73,38 +78,33 @@ def test_each_kind_has_its_line(
     [
         (SURE, 0.2, 1),
         (MIRRORED, 0.2, 0.3),
-        (MIRRORED | {ORDINARY: 0.001, LAMPS: 0.0}, 0.2, 0.1),
-        (SURE | {LAMPS: 0.6}, 0.6, 0.4),
-        (MIRRORED | {LAMPS: 0.5}, 0.5, 0.35),
+        ((0.001, 0.499, 0.5), 0.2, 0.1),
+        (SURE, 0.7, 0.3),
+        (MIRRORED, 0.65, 0.105),
     ],
 )
-def test_a_doubt_leaves_the_confidence_left_for_paint(
-    monkeypatch: pytest.MonkeyPatch, kinds: dict[str, float], several: float, left: float
+def test_a_warning_lowers_the_confidence_to_what_remains(
+    kinds: tuple[float, float, float], several: float, left: float
 ) -> None:
-    monkeypatch.setattr(assumption_checks, "classify_scene", lambda image, mask: kinds)
     photo, answer = answered()
-    found = with_warnings(photo, answer, lit_by(several))
-    assert (
-        found.diagnostics.converged
-        and found.diagnostics.scene_classes == kinds
-        and bool(found.diagnostics.warnings) == (left < 1)
-    )
+    found = with_warnings(photo, answer, told(kinds, several))
+    assert found.diagnostics.converged and bool(found.diagnostics.warnings) == (left < 1)
     np.testing.assert_allclose(found.split.confidence, left * answer.split.confidence, rtol=1e-3)
     np.testing.assert_array_equal(found.split.diffuse, answer.split.diffuse)
 
 
-def test_the_status_tells_how_likely_each_kind_is() -> None:
-    found = with_warnings(*answered(), lit_by(0.25)).diagnostics
-    assert list(found.scene_classes) == list(KINDS)
-    assert sum(found.scene_classes.values()) == pytest.approx(1, abs=1e-3)
+def test_the_status_has_all_probabilities() -> None:
+    found = with_warnings(*answered(), told(MIRRORED, 0.25)).diagnostics
+    assert found.scene_classes == dict(zip(map(str, Kind), MIRRORED, strict=True))
     assert found.light_counts == {"none": 0.0, "one": 0.75, "several": 0.25}
+    assert found.several_lights == 0.25
 
 
 def test_much_that_is_too_bright_is_said() -> None:
     photo, answer = answered()
     assert check_photo(photo) == ()
     clipped = photo.mask & (np.indices(photo.mask.shape)[0] > SIZE / 2)
-    found = with_warnings(replace(photo, clipped=clipped), answer, lit_by(0.2))
+    found = with_warnings(replace(photo, clipped=clipped), answer, told(SURE, 0.2))
     lines = [warning_text(warning) for warning in found.diagnostics.warnings]
     assert any("clipped" in line and "%" in line for line in lines)
 

@@ -128,7 +128,7 @@ def test_the_users_protocol_measures_decompose_itself(root: Path) -> None:
     source = PhotoSource("", truth.mask.shape[::-1], 16, "linear", "file")
     clipped = np.zeros_like(truth.mask)
     photo = Photo(truth.image.astype(np.float32), truth.mask, 1 / 65535, clipped, source)
-    result = decompose(photo, Settings("sirfs", threads=1, full_size=True))
+    result = decompose(photo, Settings("sirfs", illumination="natural", threads=1, full_size=True))
     for name in ("height", "normal", "shading", "reflectance"):
         np.testing.assert_array_equal(getattr(found, name), getattr(result, name))
     np.testing.assert_array_equal(found.light, result.illumination)
@@ -162,12 +162,10 @@ def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
             load_object(root, "ball", illumination), Monitor()
         ).height
 
-    by_itself = height("natural")
-    for prior in ("light_prior", "shape_prior"):
-        assert not np.array_equal(height("natural", **{prior: "predicted"}), by_itself)
-    np.testing.assert_array_equal(
-        height("laboratory", light_prior="predicted"), height("laboratory")
-    )  # its light is known
+    for illumination in ("natural", "laboratory"):
+        by_itself = height(illumination)
+        for prior in ("light_prior", "shape_prior"):
+            assert not np.array_equal(height(illumination, **{prior: "predicted"}), by_itself)
     with pytest.raises(InputError, match="unknown shape prior"):
         RunnerOptions(shape_prior="round").check()
 

@@ -363,7 +363,7 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
 def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> LightEstimate:
     """One light, with some uncertainty."""
     places = np.exp(30 * (PLACES @ toward))
-    return LightEstimate(none, 0.9 - none, 0.1, places / places.sum(), np.zeros(8), np.ones(8))
+    return LightEstimate(none, 0.9 - none, 0.1, places / places.sum())
 
 
 def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> None:

@@ -7,7 +7,6 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
-from isc_core.networks.light_network import mirrored_places
 from isc_core.networks.scene_network import (
     BLOCK,
     CHANNELS,
@@ -18,6 +17,7 @@ from isc_core.networks.scene_network import (
     ScenePrediction,
     predict_scene,
 )
+from isc_core.scene.light_estimate import mirrored_places
 
 WIDTHS = (4, 6, 6, 8)
 HIDDEN = 10

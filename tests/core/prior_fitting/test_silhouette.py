@@ -3,7 +3,7 @@
 import numpy as np
 
 from isc_core.prior_fitting.silhouette import BINS, SilhouetteMoments, fit_silhouette
-from isc_core.sirfs.silhouette import normals_from_silhouette, silhouette_cost
+from isc_core.sirfs.silhouette import normals_cost, normals_from_silhouette
 
 
 def ball(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -32,5 +32,5 @@ def test_the_true_ball_costs_less_than_a_flat_one_and_than_its_inverse() -> None
     field = normals_from_silhouette(mask, profile)
     i, j = (np.mgrid[:100, :100] - 49.5) / 40
     down, right = np.where(mask, i, 0), np.where(mask, j, 0)
-    costs = [silhouette_cost(s * down, s * right, mask, field, 1.0)[0] for s in (1.0, 0.0, -1.0)]
+    costs = [normals_cost(s * down, s * right, mask, field, 1.0)[0] for s in (1.0, 0.0, -1.0)]
     assert costs[0] < costs[1] < costs[2]

@@ -16,7 +16,7 @@ from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
 from isc_core.sirfs.shading_term import ExpectedShading
-from isc_core.sirfs.silhouette import normals_from_silhouette
+from isc_core.sirfs.silhouette import ExpectedNormals, normals_from_silhouette
 
 NODES = 30
 BRIGHTNESS = (-0.8, -0.9, -1.1)
@@ -149,6 +149,7 @@ def only(term: str) -> Weights:
         "light",
         "silhouette",
         "shading_only",
+        "predicted_normals",
         "predicted_shading",
     )
     none = dict.fromkeys(names, 0.0)
@@ -200,6 +201,13 @@ def some_shading(valid: np.ndarray, channels: int) -> ExpectedShading:
     rng = np.random.default_rng(13)
     mean = ndimage.gaussian_filter(rng.normal(size=(*valid.shape, channels)), (4, 4, 0))
     return ExpectedShading(3 * mean, np.maximum(rng.uniform(-3, 25, valid.shape), 0))
+
+
+def some_normals(valid: np.ndarray) -> ExpectedNormals:
+    """Random expected normals; in places, nothing is expected."""
+    rng = np.random.default_rng(14)
+    down, right = ndimage.gaussian_filter(rng.normal(size=(2, *valid.shape)), (0, 4, 4))
+    return ExpectedNormals(5 * down, 5 * right, np.maximum(rng.uniform(-3, 25, valid.shape), 0))
 
 
 def random_state(

@@ -16,6 +16,7 @@ from .small_problems import (
     blob,
     make_problem,
     random_state,
+    some_normals,
     some_pixel_weight,
     some_shading,
     weights,
@@ -32,9 +33,9 @@ KINDS = {
     "grey": (1, False),
     "shading only": (3, True),
     "grey shading only": (1, True),
-    "weighted, expected shading": (3, False),
-    "grey, expected shading": (1, False),
-    "shading only, expected shading": (3, True),
+    "weighted, predictions": (3, False),
+    "grey, predictions": (1, False),
+    "shading only, predictions": (3, True),
 }
 
 
@@ -46,7 +47,12 @@ def problem_of(kind: str) -> Problem:
     )
     problem = make_problem(
         scene,
-        weights(silhouette=2.0, predicted_shading=0.7),
+        weights(
+            silhouette=2.0,
+            predicted_normals=0.3,
+            predicted_shading=0.7,
+            balanced_colour="weighted" in kind,
+        ),
         shading_only=shading_only,
         observation=seen,
         holes=True,
@@ -55,7 +61,8 @@ def problem_of(kind: str) -> Problem:
     return replace(
         problem,
         pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None,
-        expected_shading=some_shading(problem.valid, channels) if "expected" in kind else None,
+        predicted_normals=some_normals(problem.valid) if "predictions" in kind else None,
+        predicted_shading=some_shading(problem.valid, channels) if "predictions" in kind else None,
     )
 
 
@@ -106,7 +113,7 @@ def test_same_numbers_in_float32_but_for_jumps_between_table_cells(kind: str) ->
         assert np.linalg.norm(without_jumps) < 1e-5 * np.linalg.norm(want.height_gradient)
 
 
-@pytest.mark.parametrize("kind", ["colour", "weighted, expected shading"])
+@pytest.mark.parametrize("kind", ["colour", "weighted, predictions"])
 def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads(kind: str) -> None:
     problem = problem_of(kind)
     height, light = states(problem, np.float32)[5]

@@ -21,6 +21,7 @@ from .small_problems import (
     make_problem,
     only,
     random_state,
+    some_normals,
     some_pixel_weight,
     some_shading,
     weights,
@@ -37,6 +38,7 @@ TERMS = (
     "silhouette",
     "observation",
     "shading_only",
+    "predicted_normals",
     "predicted_shading",
 )
 OF_HEIGHT = set(TERMS) - {"light"}
@@ -75,7 +77,9 @@ def problem_of(term: str, channels: int) -> Problem:
         seen = DepthObservation(heights, sigma=1.5, weight=4.0)
     problem = make_problem(
         scene,
-        weights(silhouette=2.0, predicted_shading=0.7) if everything else only(term),
+        weights(silhouette=2.0, predicted_normals=0.3, predicted_shading=0.7, balanced_colour=True)
+        if everything
+        else only(term),
         observation=seen,
         shading_only=term == "shading_only",
         holes=True,
@@ -89,7 +93,10 @@ def problem_of(term: str, channels: int) -> Problem:
         problem,
         priors=priors,
         pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in term else None,
-        expected_shading=some_shading(problem.valid, channels)
+        predicted_normals=some_normals(problem.valid)
+        if everything or term == "predicted_normals"
+        else None,
+        predicted_shading=some_shading(problem.valid, channels)
         if everything or term == "predicted_shading"
         else None,
     )
@@ -176,10 +183,14 @@ def test_what_trust_means(engine: str, shading_only: bool) -> None:
     assert less.curvature == whole.curvature
 
 
+@pytest.mark.parametrize("balanced", [False, True])
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
-def test_expected_shading_leaves_brightness_open(engine: str) -> None:
-    """The shading of the state itself costs nothing at any brightness; other colours cost."""
-    problem = make_problem(blob((30, 34)), only("predicted_shading"))
+def test_expected_shading_leaves_brightness_open(engine: str, balanced: bool) -> None:
+    """The shading of the state itself costs nothing at any brightness; other colours cost in
+    photos of balanced colours.
+    """
+    chosen = replace(only("predicted_shading"), balanced_colour=balanced)
+    problem = make_problem(blob((30, 34)), chosen)
     height, light = random_state((30, 34), 3, 4)
     down, right, toward = np.moveaxis(normals(height), -1, 0)
     shading = np.einsum("khw,kc->hwc", basis(down, right, toward), light)
@@ -187,12 +198,14 @@ def test_expected_shading_leaves_brightness_open(engine: str) -> None:
 
     def cost(added: np.ndarray) -> float:
         expected = ExpectedShading(shading + added, precision)
-        of_term = make_engine(engine, replace(problem, expected_shading=expected))
+        of_term = make_engine(engine, replace(problem, predicted_shading=expected))
         return of_term.evaluate(height, light).terms.predicted_shading
 
     assert cost(np.zeros(3)) == pytest.approx(0, abs=1e-20)
     assert cost(np.full(3, 1.7)) == pytest.approx(0, abs=1e-20)
-    assert cost(np.array([0.2, 0.0, -0.2])) > 0.01
+    coloured = cost(np.array([0.2, 0.0, -0.2]))
+    assert coloured > 0.01 if balanced else coloured == pytest.approx(0, abs=1e-20)
+    assert cost(np.linspace(-0.5, 0.5, 34)[:, None]) > 0.01
 
 
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
@@ -201,7 +214,7 @@ def test_where_nothing_is_expected_no_shading_costs(engine: str) -> None:
     height, light = random_state((30, 34), 3, 4)
     nothing = replace(some_shading(problem.valid, 3), precision=np.zeros(problem.valid.shape))
     without = make_engine(engine, problem).evaluate(height, light)
-    with_it = make_engine(engine, replace(problem, expected_shading=nothing)).evaluate(
+    with_it = make_engine(engine, replace(problem, predicted_shading=nothing)).evaluate(
         height, light
     )
     assert with_it.terms == without.terms

@@ -8,9 +8,9 @@ import pytest
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.silhouette import (
+    normals_cost,
     normals_from_silhouette,
     silhouette_coordinates,
-    silhouette_cost,
     silhouette_normals,
 )
 
@@ -58,8 +58,8 @@ def test_a_half_ball_costs_less_than_flat_and_a_hollow_more(sign: int) -> None:
     profile = SilhouetteProfile(np.linspace(0.95, 0.05, 10), np.full(10, 0.2))
     field = normals_from_silhouette(mask, profile)
     n1, n2, _ = np.moveaxis(normals(height), -1, 0)
-    flat = silhouette_cost(0 * n1, 0 * n2, mask, field, 1.0)[0]
-    cost = silhouette_cost(n1, n2, mask, field, 1.0)[0]
+    flat = normals_cost(0 * n1, 0 * n2, mask, field, 1.0)[0]
+    cost = normals_cost(n1, n2, mask, field, 1.0)[0]
     assert cost < 0.2 * flat if sign == 1 else cost > 2 * flat
 
 

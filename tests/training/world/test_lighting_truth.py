@@ -20,7 +20,7 @@ pytest.importorskip("mitsuba")
 
 import torch
 
-from isc_core.shading.environment_map import directions
+from isc_core.shading.environment_map import directions, resampled
 from synth.rendering import RenderOptions, light_surface
 from synth.scene.camera import Camera
 from synth.scene.lights import DirectionalLight, EnvironmentLight, Light, PointLight
@@ -32,7 +32,7 @@ from synth.scene.tracing import Tracer
 from synth.shapes import SHAPES
 from training.world import views as views_module
 from training.world.bodies.families import family_body
-from training.world.environments import ROWS, rotated
+from training.world.environments import ROWS
 from training.world.invented_environments import studio
 from training.world.lighting import LitViews, Material, batch_of, light_views, prepared
 from training.world.patterns import Atlas
@@ -52,6 +52,19 @@ class Kind(StrEnum):
     SMOOTH = "smooth surroundings"
     STUDIO = "studio"
     BOTH = "studio and lamps"
+
+
+SAMPLES = 4  # a pixel's side
+
+
+def rotated(environment: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """An environment (rows, 2 rows, 3) whose light from w now comes from `rotation` w."""
+    rows = len(environment)
+    came = directions(rows * SAMPLES) @ rotation
+    row = np.clip((np.arccos(np.clip(came[..., 1], -1, 1)) * (rows / np.pi)).astype(int), 0, None)
+    azimuth = np.arctan2(came[..., 0], -came[..., 2]) % (2 * np.pi)
+    column = (azimuth * (rows / np.pi)).astype(int) % (2 * rows)
+    return resampled(environment.astype(float)[np.minimum(row, rows - 1), column], rows)
 
 
 CASES = (

@@ -9,7 +9,7 @@ from ....lobe_fitting.light_direction import (
     explain_specular,
     share_explained,
 )
-from ....networks.light_network import predict_light
+from ....networks.scene_network import predict_scene
 from ....result_files.contact_sheet import Panel
 from ....scene.decomposition import Decomposition
 from ....scene.light_estimate import LightEstimate
@@ -42,7 +42,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
             if estimate.determined
             else empty_panel(label, remark)
         )
-    light_estimate = predict_light(d.image, d.mask)
+    light_estimate = predict_scene(d.image, d.mask).lamps
     panels.append(_predicted_panel(d, light_estimate))
     for label, direction in _OTHER_LIGHTS:
         _, share = share_explained(d, toward(*direction))

@@ -1,0 +1,28 @@
+"""The layers' arithmetic against other people's."""
+
+import numpy as np
+from scipy import ndimage
+
+from isc_core.networks.layers import convolved, depth_to_space, space_to_depth
+
+
+def test_convolution_is_correlation_with_zeros_around() -> None:
+    rng = np.random.default_rng(0)
+    layer, weight, bias = rng.normal(size=(7, 9, 3)), rng.normal(size=(9, 3, 2)), rng.normal(size=2)
+    expected = [
+        sum(
+            ndimage.correlate(layer[..., i], weight[:, i, o].reshape(3, 3), mode="constant")
+            for i in range(3)
+        )
+        + bias[o]
+        for o in range(2)
+    ]
+    # steps of 2^-20 of the largest factors
+    np.testing.assert_allclose(convolved(layer, weight, bias), np.stack(expected, -1), atol=5e-5)
+
+
+def test_blocks_of_pixels_go_there_and_back() -> None:
+    layer = np.arange(4 * 6 * 3.0).reshape(4, 6, 3)
+    blocks = space_to_depth(layer, 2)
+    np.testing.assert_array_equal(blocks[1, 2].reshape(3, 2, 2), layer[2:4, 4:6].transpose(2, 0, 1))
+    np.testing.assert_array_equal(depth_to_space(blocks, 2), layer)

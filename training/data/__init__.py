@@ -1,1 +1,0 @@
-"""Samples to fit networks on: rendered, traced and relit objects with known ground truth."""
