@@ -166,11 +166,12 @@ def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree
 
 @pytest.mark.slow
 def test_warnings_of_a_photo_are_printed(tmp_path: Path) -> None:
-    image, mask = under_lights((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
-    np.save(tmp_path / "ball.npy", image)
+    image, mask = under_lights((-0.8, 0.4, 0.7))
+    overexposed = np.clip(np.rint(255 * 4 * image / image.max()), 0, 255).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "ball.png"), overexposed[..., ::-1])
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255) * mask)
     done = run(
-        tmp_path / "ball.npy",
+        tmp_path / "ball.png",
         "--mask",
         tmp_path / "mask.png",
         "--results",
