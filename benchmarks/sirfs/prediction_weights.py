@@ -24,6 +24,7 @@ import numpy as np
 
 from isc_core.decomposition.models import DecompositionTask, Settings, SolveOptions, solve
 from isc_core.decomposition.settings import ILLUMINATIONS
+from isc_core.errors import InputError
 from isc_core.networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
 from isc_core.photo import Photo, PhotoSource
 from isc_core.shading.spherical_harmonics import (
@@ -36,6 +37,7 @@ from isc_core.shading.surface_stencils import normals
 from .ways import Predictions, with_way
 
 WAYS = "-:-:-,network,.5:-:-,-:.5:-,-:-:1,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
+LIGHTS = ("HARMONICS", "AROUND", "ONE_LAMP", "LAMPS", "LABORATORY")  # of `recipes.LightKind`
 _LEAST_PIXELS = 1500
 METRICS = ("normals", "shading", "shading, colour aside")
 
@@ -230,15 +232,18 @@ def main() -> None:
     add("--weights", type=Path, metavar="NPZ", help="scene network (default: the shipped one)")
     add("--count", type=int, default=24, help="photos (default: %(default)s)")
     add("--ways", default=WAYS, help="default: %(default)s")
-    add("--light", metavar="KIND", help="HARMONICS, AROUND, ONE_LAMP, LAMPS or LABORATORY")
+    add("--light", choices=LIGHTS, help="kind of light (default: all)")
     add("--illumination", default="photo", choices=ILLUMINATIONS, help="priors to use")
     add("--seed", type=int, default=0, help="of the photos")
     add("--workers", type=int, default=2, help="processes")
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
     ways = given.ways.split(",")
-    network = None if given.weights is None else SceneNetwork.read(given.weights)
-    photos = lit_bodies(given.world, given.panoramas, given.count, given.seed, given.light)
+    try:
+        network = None if given.weights is None else SceneNetwork.read(given.weights)
+        photos = lit_bodies(given.world, given.panoramas, given.count, given.seed, given.light)
+    except InputError as error:
+        parser.error(str(error))
     run = partial(errors_of, ways=ways, illumination=given.illumination, network=network)
     with ProcessPoolExecutor(given.workers) as pool:
         found = list(pool.map(run, photos))
