@@ -15,7 +15,6 @@ from dataclasses import replace
 import numpy as np
 
 from ..networks.scene_network import predict_scene
-from .settings import SEPARATING_MODELS
 from .task import DecompositionTask
 
 
@@ -39,7 +38,7 @@ def with_predictions(task: DecompositionTask) -> DecompositionTask:
         and task.known.depth is None
     )
     light = settings.uses_predicted_light and task.light_coefficients is None
-    others = options.check_assumptions or options.fit_lobe or settings.model in SEPARATING_MODELS
+    others = options.check_assumptions or options.fit_lobe or settings.model == "joint"
     seen = task.prediction
     if not (shape or light) and (seen is not None or not others):
         return task

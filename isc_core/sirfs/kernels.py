@@ -662,7 +662,7 @@ def normals_rows(first, last, geometry, expected, strength, gradient, sums):
     expected : (2, H, W) ndarray
         Expected n1 and n2.
     strength : (H, W) ndarray
-        See `silhouette.ExpectedNormals.strength`.
+        See `precision.strength_of`.
     gradient : (2, H, W) ndarray
         Output: gradients with respect to n1 and n2.
     sums : (H,) ndarray

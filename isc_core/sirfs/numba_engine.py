@@ -16,6 +16,7 @@ from ..shading.irradiance_basis import C1, C2, C3, C4, C5
 from ..shading.surface_stencils import fold_border
 from . import kernels, reflectance, shading_kernels, surface
 from .illumination import light_cost
+from .precision import strength_of
 from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
 from .shading_term import ExpectedShading, best_offsets
@@ -83,7 +84,7 @@ class _NormalsTerm:
         self, valid: np.ndarray, field: ExpectedNormals, weight: float, dtype: np.dtype[Any]
     ) -> None:
         self._expected = np.ascontiguousarray([field.down, field.right], dtype)
-        self._strength = field.strength(valid, weight).astype(dtype)
+        self._strength = strength_of(field.precision, valid, weight).astype(dtype)
         self.gradient = np.zeros((2, *valid.shape), dtype)
         self._sums = np.zeros(len(valid))
 
@@ -108,12 +109,12 @@ class _ShadingTerm:
 
     def __init__(self, problem: Problem, expected: ExpectedShading, dtype: np.dtype[Any]) -> None:
         valid, weights = problem.valid, problem.weights
-        strength = expected.strength(valid, weights.predicted_shading)
+        channels = expected.mean.shape[2]
+        strength = strength_of(expected.precision, valid, weights.predicted_shading, channels)
         self._total, self._strength = float(strength.sum()), strength.astype(dtype)
         self._balanced = weights.balanced_colour
         self._mean = np.ascontiguousarray(expected.mean.transpose(0, 2, 1), dtype)
         self._spans = _spans(valid)
-        channels = expected.mean.shape[2]
         whiten = np.eye(channels) if problem.shading_only else problem.priors.parsimony_whiten
         # reflectance is image less shading, hence the sign
         self._back = np.ascontiguousarray(-solve_linear(whiten, np.eye(channels)).T, dtype)

@@ -28,7 +28,7 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
     mean : (H, C, W) ndarray
         Expected log shading.
     strength : (H, W) ndarray
-        See `ExpectedShading.strength`.
+        See `precision.strength_of`.
     residual : (H, C, W) ndarray
         Output, written within the spans.
     sums : (H, C) float64 ndarray
@@ -71,7 +71,7 @@ def pull_rows(first, last, spans, residual, offsets, strength, back, palette, jo
     offsets : (C,) ndarray
         The free constants.
     strength : (H, W) ndarray
-        See `ExpectedShading.strength`.
+        See `precision.strength_of`.
     back : (C, C) ndarray
         Takes that gradient to the whitened space of the palette terms.
     palette : (H, C, W) ndarray

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.shading_estimate import ShadingEstimate
+from .precision import strength_of
 
 _LEAST_DEVIATION = 0.03  # of log shading: nobody knows it better, and 1 / s^2 stays bounded
 
@@ -40,22 +41,6 @@ class ExpectedShading:
 
     mean: np.ndarray
     precision: np.ndarray
-
-    def strength(self, valid: np.ndarray, weight: float) -> np.ndarray:
-        """Return the factor of each pixel's half squares.
-
-        Parameters
-        ----------
-        valid : (H, W) bool ndarray
-        weight : float
-            Weight of the term.
-
-        Returns
-        -------
-        (H, W) float64 ndarray
-        """
-        scale = weight / (max(int(valid.sum()), 1) * self.mean.shape[2])
-        return np.where(valid, self.precision, 0) * scale
 
 
 def expected_shading(estimate: ShadingEstimate | None, channels: int) -> ExpectedShading | None:
@@ -111,7 +96,7 @@ def shading_cost(
         With respect to the log shading.
     """
     t = log_shading.dtype
-    strength = expected.strength(valid, weight)
+    strength = strength_of(expected.precision, valid, weight, log_shading.shape[2])
     away = log_shading - expected.mean.astype(t)
     sums = (strength[..., None] * away).sum(axis=(0, 1), dtype=float)
     away = away - best_offsets(sums, float(strength.sum(dtype=float)), balanced).astype(t)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from .precision import strength_of
 from .priors.priors import SilhouetteProfile
 
 _STEPS = 257
@@ -45,21 +46,6 @@ class ExpectedNormals:
     down: np.ndarray
     right: np.ndarray
     precision: np.ndarray
-
-    def strength(self, valid: np.ndarray, weight: float) -> np.ndarray:
-        """Return the factor of each pixel's half squares.
-
-        Parameters
-        ----------
-        valid : (H, W) bool ndarray
-        weight : float
-            Weight of the term.
-
-        Returns
-        -------
-        (H, W) float64 ndarray
-        """
-        return np.where(valid, self.precision, 0) * (weight / max(int(valid.sum()), 1))
 
 
 @dataclass(frozen=True)
@@ -182,7 +168,7 @@ def normals_cost(
     cost : float
     gradient_n1, gradient_n2 : (H, W) ndarray
     """
-    strength = field.strength(valid, weight).astype(n1.dtype)
+    strength = strength_of(field.precision, valid, weight).astype(n1.dtype)
     away1, away2 = n1 - field.down.astype(n1.dtype), n2 - field.right.astype(n1.dtype)
     pull1, pull2 = strength * away1, strength * away2
     return 0.5 * float((pull1 * away1 + pull2 * away2).sum(dtype=float)), pull1, pull2
