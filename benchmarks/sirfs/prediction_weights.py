@@ -33,11 +33,11 @@ from isc_core.shading.spherical_harmonics import (
     real_sh,
 )
 from isc_core.shading.surface_stencils import normals
+from training.world.recipes import LightKind
 
 from .ways import Predictions, with_way
 
 WAYS = "-:-:-,network,.5:-:-,-:.5:-,-:-:1,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
-LIGHTS = ("HARMONICS", "AROUND", "ONE_LAMP", "LAMPS", "LABORATORY")  # of `recipes.LightKind`
 _LEAST_PIXELS = 1500
 METRICS = ("normals", "shading", "shading, colour aside")
 
@@ -85,7 +85,7 @@ def lit_bodies(
 
     from training.networks.scene_batches import read_world
     from training.world.files import Split
-    from training.world.recipes import LightKind, Shares
+    from training.world.recipes import Shares
     from training.world.samples import Darkroom, draw_batch
 
     torch.manual_seed(seed)
@@ -232,7 +232,7 @@ def main() -> None:
     add("--weights", type=Path, metavar="NPZ", help="scene network (default: the shipped one)")
     add("--count", type=int, default=24, help="photos (default: %(default)s)")
     add("--ways", default=WAYS, help="default: %(default)s")
-    add("--light", choices=LIGHTS, help="kind of light (default: all)")
+    add("--light", choices=[kind.name for kind in LightKind], help="kind of light (default: all)")
     add("--illumination", default="photo", choices=ILLUMINATIONS, help="priors to use")
     add("--seed", type=int, default=0, help="of the photos")
     add("--workers", type=int, default=2, help="processes")
