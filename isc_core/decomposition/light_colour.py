@@ -1,5 +1,5 @@
-"""The colour of the light, where a photo determines it: the photo is explained as under white
-light, and the colour is put back.
+"""The colour of the light, where it is given or a photo determines it: the photo is explained as
+under white light, and the colour is put back.
 
 Problem: separations, and the priors of a lamp's colour, assume white light.
 
@@ -28,7 +28,7 @@ from ..scene.decomposition import Separation
 from ..scene.diagnostics import LightColourDiagnostics
 from ..scene.lobe_fit import Interval, LobeFit
 from .layers import scale_confidence, scaled_light
-from .settings import LightColour
+from .settings import SEPARATING_MODELS, LightColour
 from .task import DecompositionTask, SceneEstimate
 
 _COLOURED = 0.1  # of a channel's share: less cannot be distinguished from white
@@ -58,21 +58,57 @@ def under_light(
     Cancelled
         If the monitor cancels.
     """
-    if not task.options.check_assumptions and task.settings.light_colour == LightColour.WHITE:
+    settings = task.settings
+    wanted = settings.light_colour == LightColour.ESTIMATE
+    checked = task.options.check_assumptions and settings.model in SEPARATING_MODELS
+    if not (wanted or checked):
         return solver(task)
     with task.clock.stage("estimate light colour"):
         light = estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
-    used = light.determined and task.settings.light_colour == LightColour.ESTIMATE
+    used = light.determined and wanted
     estimate = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
     split = scale_confidence(estimate.split) if light.too_strong else estimate.split
-    diagnostics = replace(estimate.diagnostics, light_colour=_diagnostics(light, used))
+    diagnostics = replace(
+        estimate.diagnostics, light_colour=_diagnostics(light, settings.light_colour, used)
+    )
     return replace(estimate, split=split, diagnostics=diagnostics)
 
 
-def _diagnostics(light: Illuminant, used: bool) -> LightColourDiagnostics:
+def under_given_light(
+    task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
+) -> SceneEstimate:
+    """Run a solver under white light where the light's colour is given as numbers.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+    solver : callable
+        All that follows, predictions included: it sees the photo without the light's colour.
+
+    Returns
+    -------
+    SceneEstimate
+        Under the photo's own light.
+
+    Raises
+    ------
+    InputError
+        If the model cannot explain this photo.
+    Cancelled
+        If the monitor cancels.
+    """
+    given = task.settings.given_light_colour
+    if given is None:
+        return solver(task)
+    colour = np.array(given)
+    return _back(solver(_whitened(task, colour)), colour)
+
+
+def _diagnostics(light: Illuminant, asked: str, used: bool) -> LightColourDiagnostics:
     red, green, blue = (round(float(part), 4) for part in light.colour)
     return LightColourDiagnostics(
-        LightColour.ESTIMATE if used else LightColour.WHITE,
+        LightColour.BALANCED if asked == LightColour.ESTIMATE and not used else asked,
         (red, green, blue),
         round(light.confidence, 4),
         light.outcome,

@@ -3,17 +3,18 @@ and one function that knows their names.
 
 A model is a function from a `DecompositionTask` to a `SceneEstimate`: `sirfs_only.sirfs`,
 `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with. `light_colour` decides
-which colour of light the separating models see; those that recover shape and light are given what
+which colour of light they see; those that recover shape and light are given what
 a network sees in the photo (`predictions`), and `assumption_checks` lowers the confidence of
 photos that violate what the models assume.
 """
 
 from collections.abc import Callable
+from functools import partial
 
 from .assumption_checks import with_warnings
-from .light_colour import under_light
+from .light_colour import under_given_light, under_light
 from .predictions import with_predictions
-from .settings import SEPARATING_MODELS, SIRFS_MODELS, Settings
+from .settings import SIRFS_MODELS, Settings
 from .task import DecompositionTask, SceneEstimate, SolveOptions
 
 
@@ -42,10 +43,15 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     solver = _solver(task.settings.model)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
+    return under_given_light(task, partial(_solved, solver=solver))
+
+
+def _solved(
+    task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
+) -> SceneEstimate:
+    """Predict, solve and check."""
     task = with_predictions(task)
-    estimate = (
-        under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
-    )
+    estimate = under_light(task, solver)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, task.prediction)

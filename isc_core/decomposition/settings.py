@@ -1,5 +1,6 @@
 """The settings of a decomposition: names of the models, and a user's choices."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -54,14 +55,17 @@ class LightColour(StrEnum):
 
     Attributes
     ----------
-    WHITE
-        White.
+    BALANCED
+        Nearly white, as a camera's white balance leaves it.
     ESTIMATE
-        Estimated from the photo's highlights, where they determine it.
+        Estimated from the photo's highlights, where they determine it; else as BALANCED.
+    FREE
+        Highlights are white, but the light on the diffuse image may have any colour.
     """
 
-    WHITE = "white"
+    BALANCED = "balanced"
     ESTIMATE = "estimate"
+    FREE = "free"
 
 
 class LightPrior(StrEnum):
@@ -102,9 +106,26 @@ SHAPE_PRIORS = tuple(one.value for one in ShapePrior)
 
 # Values of earlier versions, accepted for one version.
 _RENAMED: dict[str, dict[str, str]] = {
+    "light_colour": {"white": LightColour.BALANCED},
     "light_prior": {"seen": LightPrior.PREDICTED, "usual": LightPrior.DATASET},
     "shape_prior": {"seen": ShapePrior.PREDICTED, "outline": ShapePrior.SILHOUETTE},
 }
+
+
+_MOST_COLOUR = 100.0  # strongest over weakest channel of a light: candles have less than 10
+
+
+def _colour_of(text: str) -> tuple[float, float, float] | None:
+    """Three positive numbers "r,g,b", scaled to a mean of 1; None for anything else."""
+    try:
+        red, green, blue = (float(part) for part in text.split(","))
+    except ValueError:
+        return None
+    low, high = min(red, green, blue), max(red, green, blue)
+    if not 0 < low <= high <= _MOST_COLOUR * low < math.inf:
+        return None
+    mean = (red + green + blue) / 3
+    return red / mean, green / mean, blue / mean
 
 
 def renamed_value(setting: str, value: str) -> str | None:
@@ -154,7 +175,7 @@ class Settings:
         For `WEIGHTING_MODELS`: pixels with an uncertain separation have less weight in SIRFS'
         reflectance terms.
     light_colour : LightColour or str
-        For `SEPARATING_MODELS`: the assumed colour of the light.
+        For `SIRFS_MODELS`: the assumed colour of the light, or three numbers "r,g,b", linear.
     light_prior : LightPrior or str
         For `SIRFS_MODELS`: the prior of the light.
     shape_prior : ShapePrior or str
@@ -171,7 +192,7 @@ class Settings:
     seed: int = 0
     shading_only: bool = False
     confidence_weights: bool = False
-    light_colour: str = LightColour.WHITE
+    light_colour: str = LightColour.BALANCED
     light_prior: str = LightPrior.PREDICTED
     shape_prior: str = ShapePrior.PREDICTED
 
@@ -196,6 +217,16 @@ class Settings:
         """Whether SIRFS expects the predicted light and shading."""
         return self.light_prior == LightPrior.PREDICTED
 
+    @property
+    def given_light_colour(self) -> tuple[float, float, float] | None:
+        """Linear RGB of mean 1 where the light's colour is given as numbers."""
+        return _colour_of(self.light_colour)
+
+    @property
+    def expects_white_light(self) -> bool:
+        """Whether SIRFS expects nearly white light, the light's known colour being divided out."""
+        return self.illumination == Illumination.PHOTO and self.light_colour != LightColour.FREE
+
     def check(self) -> None:
         """Validate the settings.
 
@@ -208,7 +239,6 @@ class Settings:
             ("model", self.model, MODELS),
             ("separator", self.separator, METHODS),
             ("illumination", self.illumination, ILLUMINATIONS),
-            ("light colour", self.light_colour, LIGHT_COLOURS),
             ("light prior", self.light_prior, LIGHT_PRIORS),
             ("shape prior", self.shape_prior, SHAPE_PRIORS),
             ("engine", self.engine, ("auto", "numba", "numpy")),
@@ -220,10 +250,15 @@ class Settings:
                 f"--confidence-weights does not apply to {self.model}: "
                 f"use --model {' or '.join(WEIGHTING_MODELS)}"
             )
-        if self.light_colour != LightColour.WHITE and self.model not in SEPARATING_MODELS:
+        if self.light_colour not in LIGHT_COLOURS and self.given_light_colour is None:
+            raise InputError(
+                f'unknown light colour "{self.light_colour}": choose {", ".join(LIGHT_COLOURS)}, '
+                f"or three numbers r,g,b, the largest at most {_MOST_COLOUR:g} times the smallest"
+            )
+        if self.light_colour != LightColour.BALANCED and self.model not in SIRFS_MODELS:
             raise InputError(
                 f"--light-colour does not apply to {self.model}: "
-                f"use --model {' or '.join(SEPARATING_MODELS)}"
+                f"use --model {' or '.join(SIRFS_MODELS)}"
             )
         if self.max_size < 0 or self.threads < 0:
             raise InputError(

@@ -20,6 +20,7 @@ from ..progress import Monitor
 from ..scene.diagnostics import Diagnostics, StopReason
 from ..scene.known_inputs import SceneConstraints
 from ..sirfs.kernel_cache import announce_compilation
+from ..sirfs.priors.light_colour import with_light_colour
 from ..sirfs.priors.light_posterior import light_posterior
 from ..sirfs.priors.prior_file import shipped_prior_set
 from ..sirfs.priors.priors import Priors
@@ -186,17 +187,24 @@ def _priors(task: DecompositionTask, channels: int) -> Priors:
     coefficients = task.light_coefficients
     statistics = Illumination(task.settings.illumination).statistics
     priors = (task.prior_set or shipped_prior_set()).priors(statistics, channels)
-    if coefficients is None:
-        return priors
-    temperature = _prediction_weights(task).light_temperature
-    return replace(priors, light=light_posterior(priors.light, coefficients, temperature))
+    light = priors.light
+    if coefficients is not None:
+        temperature = _prediction_weights(task).light_temperature
+        light = light_posterior(light, coefficients, temperature)
+    if channels == 3 and task.settings.expects_white_light:
+        variance = task.options.light_colour_weight.variance(_plain_weights(task, 3), 3)
+        light = with_light_colour(light, np.ones(3), variance)
+    return replace(priors, light=light)
+
+
+def _plain_weights(task: DecompositionTask, channels: int) -> Weights:
+    return isc_weights(Illumination(task.settings.illumination).statistics, channels)
 
 
 def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, float | None]:
     """The weights for what was predicted, and the optimiser's tolerance if it is another."""
-    weights = isc_weights(Illumination(task.settings.illumination).statistics, channels)
     return _prediction_weights(task).applied(
-        weights,
+        _plain_weights(task, channels),
         normals=task.normal_estimate is not None,
         shading=task.shading_estimate is not None,
         light=task.light_coefficients is not None,

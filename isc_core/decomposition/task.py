@@ -20,7 +20,7 @@ from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 from ..sirfs.priors.prior_set import PriorSet
 from ..sirfs.recover import MARGIN, SOLVE_SIZE
-from ..sirfs.settings import PredictionWeights
+from ..sirfs.settings import BALANCED_LIGHT, LightColourWeight, PredictionWeights
 from .settings import Settings
 
 
@@ -83,6 +83,8 @@ class SolveOptions:
     prediction_weights : PredictionWeights or None
         How far predicted normals, shading and light coefficients are trusted; None: as usual in
         the illumination.
+    light_colour_weight : LightColourWeight
+        How strongly white light is expected, where it is.
     """
 
     solve_size: int = SOLVE_SIZE
@@ -94,6 +96,7 @@ class SolveOptions:
     check_assumptions: bool = True
     scene_network: SceneNetwork | None = None
     prediction_weights: PredictionWeights | None = None
+    light_colour_weight: LightColourWeight = BALANCED_LIGHT
 
 
 @dataclass(frozen=True)

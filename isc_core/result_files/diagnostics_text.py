@@ -174,7 +174,7 @@ def light_colour_advice(light: LightColourDiagnostics | None) -> str:
         return ""
     if light.too_strong:
         return STRONG_COLOUR
-    return COLOURED if light.coloured and light.used == "white" else ""
+    return COLOURED if light.coloured and light.used != "estimate" else ""
 
 
 def warning_text(warning: AssumptionWarning) -> str:

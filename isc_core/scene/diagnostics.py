@@ -189,7 +189,7 @@ class LightColourDiagnostics:
     Attributes
     ----------
     used : str
-        "white" or "estimate".
+        "balanced", "estimate" or "free".
     estimate : tuple of float
         Linear RGB of mean 1.
     confidence : float

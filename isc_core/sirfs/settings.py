@@ -191,6 +191,42 @@ PHOTO_PREDICTIONS = PredictionWeights(0.5, 0.5, True, 1.0, (Start(dome=1, light=
 DATASET_PREDICTIONS = PredictionWeights(0.2, 0.2, False, 4.0, ISC_NATURAL.starts)
 
 
+@dataclass(frozen=True)
+class LightColourWeight:
+    """How strongly the light of a photo is expected to be white.
+
+    Attributes
+    ----------
+    deviation : float
+        Standard deviation of the light's mean log colour, along each axis of chromaticity.
+    weight : float
+        Multiplier of the cost, half the squared distance in deviations.
+    """
+
+    deviation: float
+    weight: float
+
+    def variance(self, weights: Weights, channels: int) -> float:
+        """Return the variance that gives this cost within the light's own term.
+
+        Parameters
+        ----------
+        weights : Weights
+            Its `light` multiplies a prior's mean over coefficients.
+        channels : int
+
+        Returns
+        -------
+        float
+        """
+        return self.deviation**2 * weights.light / (9 * channels) / self.weight
+
+
+# The deviation is what white balance leaves, and the light's change of colour over the sphere; the
+# weight was chosen on held-out bodies. docs/methods/light_colour.md has both.
+BALANCED_LIGHT = LightColourWeight(0.12, 3.0)
+
+
 def prediction_weights(illumination: str) -> PredictionWeights:
     """Return how far predictions are trusted.
 

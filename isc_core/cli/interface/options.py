@@ -5,7 +5,6 @@ from pathlib import Path
 
 from ...decomposition.settings import (
     ILLUMINATIONS,
-    LIGHT_COLOURS,
     LIGHT_PRIORS,
     MODEL_SUMMARIES,
     SHAPE_PRIORS,
@@ -190,10 +189,11 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--light-colour",
-        choices=LIGHT_COLOURS,
+        type=current_name("light_colour"),
         default=defaults.light_colour,
-        help="colour of the light: white, or estimated from highlights where they determine it "
-        "(default %(default)s)",
+        metavar="NAME|r,g,b",
+        help="colour of the light: balanced (nearly white, as cameras leave it), estimate (from "
+        "highlights where they determine it), free, or three linear numbers (default %(default)s)",
     )
     group.add_argument(
         "--light-prior",

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decomposition.light_colour import under_light
+from isc_core.decomposition.light_colour import under_given_light, under_light
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decomposition.pipeline import decompose
 from isc_core.errors import InputError
@@ -80,7 +80,7 @@ def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> N
     assert answer.diagnostics.reason == MADE.reason
 
 
-@pytest.mark.parametrize(("albedos", "asked"), [(ALBEDOS, "white"), (ALBEDOS[:1], "estimate")])
+@pytest.mark.parametrize(("albedos", "asked"), [(ALBEDOS, "balanced"), (ALBEDOS[:1], "estimate")])
 def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
     albedos: np.ndarray, asked: str
 ) -> None:
@@ -89,8 +89,8 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
     np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
     np.testing.assert_array_equal(answer.split.confidence, usual.split.confidence)
     found = answer.diagnostics.light_colour
-    assert found is not None and found.used == "white"
-    assert ("--light-colour estimate" in light_colour_advice(found)) == (asked == "white")
+    assert found is not None and found.used == "balanced"
+    assert ("--light-colour estimate" in light_colour_advice(found)) == (asked == "balanced")
 
 
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
@@ -99,7 +99,7 @@ def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() 
     assert estimate_illuminant(photo.image, photo.mask).too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
     found = answer.diagnostics.light_colour
-    assert found is not None and found.used == "white"
+    assert found is not None and found.used == "balanced"
     assert light_colour_advice(found) == STRONG_COLOUR
     assert found.outcome == IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR
 
@@ -131,10 +131,48 @@ def test_the_identities_hold_in_the_end(model: str) -> None:
 
 def test_options_that_mean_nothing_to_a_model_are_refused() -> None:
     for settings in (
-        Settings(model="sirfs", light_colour="estimate"),
+        Settings(model="naive", light_colour="estimate"),
         Settings(model="mbp", confidence_weights=True),
     ):
         with pytest.raises(InputError, match="does not apply to"):
             settings.check()
-    with pytest.raises(InputError, match="unknown light colour"):
-        Settings(light_colour="red").check()
+    for colour in ("red", "1,2", "1,0,1", "-1,-1,-1", "1,1,200", "nan,1,1", "inf,1,1"):
+        with pytest.raises(InputError, match="unknown light colour"):
+            Settings(light_colour=colour).check()
+
+
+def test_the_former_name_of_balanced_light_is_understood() -> None:
+    assert Settings(light_colour="white") == Settings()
+
+
+def test_a_given_colour_is_divided_out_and_put_back() -> None:
+    photo, seen = photo_of(ALBEDOS, LIGHT), []
+
+    def solver(task: DecompositionTask) -> SceneEstimate:
+        seen.append(task)
+        return seen_by(task)
+
+    answer = under_given_light(task_of(photo, "2,1,.5"), solver)
+    colour = np.array([12, 6, 3]) / 7
+    np.testing.assert_allclose(seen[0].working.image, photo.image / colour, atol=1e-6)
+    np.testing.assert_allclose(
+        light_from_reference(answer.light)[0] * np.sqrt(1 / (4 * np.pi)), np.log(colour)
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("model", ["sirfs", "mdr", "mbp", "joint"])
+def test_a_cast_given_as_the_light_s_colour_changes_nothing_else(model: str) -> None:
+    """The photo times a colour, under light of that colour, has the same shape and albedo.
+
+    The colour's channels are powers of two and their mean is 1: division loses no digit, and the
+    solver starts from the same bits. One other digit may end in another of its many minima.
+    """
+    photo, colour = photo_of(ALBEDOS, np.ones(3), size=48), np.array([2, 0.5, 0.5])
+    plain = decompose(photo, Settings(model=model))
+    tinted = decompose(
+        replace(photo, image=(photo.image * colour).astype(np.float32)),
+        Settings(model=model, light_colour="2,.5,.5"),
+    )
+    np.testing.assert_allclose(tinted.reflectance, plain.reflectance, atol=1e-5)
+    np.testing.assert_allclose(tinted.normal, plain.normal, atol=1e-5)
