@@ -8,6 +8,7 @@ from PIL import JpegImagePlugin
 
 from ...errors import InputError
 from ..limits import Limits
+from .gain_map import gain_map_notes
 from .pillow import decode_pillow
 from .raster import Raster
 
@@ -42,7 +43,8 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
         If the file has far more segments than a picture takes.
     """
     check_scans(data, path)
-    return decode_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path, limits)
+    image = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
+    return decode_pillow(image, path, limits, notes=gain_map_notes(data))
 
 
 def check_scans(data: bytes, path: Path | str) -> None:

@@ -1,0 +1,42 @@
+"""What was assumed or left out when a photo was read, as sentences for commands."""
+
+from collections.abc import Iterable
+
+from ..io.reading_notes import ReadingNote, ReadingNoteKind
+
+_TEXTS = {
+    ReadingNoteKind.BROKEN_PROFILE: (
+        "the photo's colour profile is damaged or does not fit its pixels: sRGB was assumed"
+    ),
+    ReadingNoteKind.TABLE_PROFILE: (
+        "the photo's colour profile is a table of colours, which was applied with 8 bits: save the "
+        "photo in sRGB or Adobe RGB for more"
+    ),
+    ReadingNoteKind.UNUSED_PROFILE: (
+        "the photo's colour profile is a table of colours, which --transfer replaced: without the "
+        "option it is applied"
+    ),
+    ReadingNoteKind.GAIN_MAP: "the photo's gain map (HDR) was ignored",
+    ReadingNoteKind.UNKNOWN_CAMERA_COLOURS: (
+        "the raw file does not say which colours its camera sees: hues may be wrong; export it as "
+        "a 16-bit TIFF instead"
+    ),
+    ReadingNoteKind.OUT_OF_GAMUT: (
+        "of the object's pixels {value:.0%} have colours outside of Rec.709: they were clipped"
+    ),
+}
+
+
+def reading_note_lines(notes: Iterable[ReadingNote]) -> list[str]:
+    """Return the lines that a command prints about how it read a photo.
+
+    Parameters
+    ----------
+    notes : iterable of ReadingNote
+
+    Returns
+    -------
+    list of str
+        Each begins with "note: ".
+    """
+    return [f"note: {_TEXTS[one.kind].format(value=one.value or 0.0)}" for one in notes]
