@@ -9,7 +9,7 @@ Citation: K. M. Lam (1985), "Metamerism and colour constancy", thesis, Universit
 International Color Consortium, Specification ICC.1:2022, annex E; ITU-R BT.709-6 (2015).
 
 Limits: adaptation of the white by one diagonal matrix. Colours outside of Rec.709 have negative
-channels, which `in_rec709` clips at 0.
+channels, which `in_rec709` clips at 0; channels above 1 stay.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ _BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
 _SAME = 0.004  # profiles of sRGB differ by their rounding
-_ROWS = 256  # converted at a time
+_ROWS = 64  # converted at a time
 
 
 def to_rec709(space: ColourSpace | None) -> np.ndarray | None:
@@ -62,10 +62,21 @@ def in_rec709(linear: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     (H, W, 3) float32 ndarray
     """
     result = np.empty_like(linear)
-    rows = matrix.T.astype(np.float32)
     for start in range(0, len(linear), _ROWS):
-        block = linear[start : start + _ROWS]
+        rows = slice(start, start + _ROWS)
+        block = linear[rows]
+        if block.min() >= 0 and np.isfinite(block.max()):
+            _convert(block, matrix.astype(np.float32), result[rows])
+            continue
         sound = (np.isfinite(block) & (block >= 0)).all(axis=2, keepdims=True)
-        converted = np.maximum(np.where(sound, block, 0) @ rows, 0)
-        result[start : start + _ROWS] = np.where(sound, converted, block)
+        _convert(np.where(sound, block, 0), matrix.astype(np.float32), result[rows])
+        np.copyto(result[rows], block, where=~sound)
     return result
+
+
+def _convert(light: np.ndarray, matrix: np.ndarray, result: np.ndarray) -> None:
+    for channel, (r, g, b) in enumerate(matrix):
+        sums = r * light[..., 0]
+        sums += g * light[..., 1]
+        sums += b * light[..., 2]
+        np.maximum(sums, 0, out=result[..., channel])

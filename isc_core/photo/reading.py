@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.channels import largest
+from ..imaging.channels import largest, smallest
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
@@ -169,9 +169,9 @@ def _notes(
         table = note.kind is ReadingNoteKind.TABLE_PROFILE
         yield ReadingNote(ReadingNoteKind.UNUSED_PROFILE) if unused and table else note
     if raster.values.shape[2] == 3 and to_rec709(raster.space) is not None:
-        # Light without a channel that is black in no Rec.709 colour of these codes: it was clipped.
-        shown = mask & (raster.values > 0).all(axis=2)
-        share = float((linear[shown] == 0).any(axis=1).sum() / mask.sum())
+        # No channel is black in the file, one is in Rec.709: it was clipped.
+        outside = mask & (smallest(raster.values) > 0) & (smallest(linear) == 0)
+        share = float(outside.sum() / mask.sum())
         if share > _MOST_OUTSIDE:
             yield ReadingNote(ReadingNoteKind.OUT_OF_GAMUT, share)
 

@@ -51,9 +51,7 @@ def sampled_curve(samples: np.ndarray) -> bytes:
     return b"curv" + bytes(4) + struct.pack(">I", len(codes)) + codes.tobytes()
 
 
-def rgb_profile(
-    colorants: np.ndarray, curve: bytes, name: str = "Test", version: int = 2
-) -> bytes:
+def rgb_profile(colorants: np.ndarray, curve: bytes, name: str = "Test", version: int = 2) -> bytes:
     """A display profile of (3, 3) colorants and one curve."""
     tags = {b"desc": _description(name, version), b"wtpt": _xyz(D50)}
     for k, letter in enumerate(b"rgb"):

@@ -1,6 +1,7 @@
 """Camera raw files made by hand: a DNG of a Bayer sensor."""
 
 import struct
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -33,7 +34,7 @@ def dng(
     """
     pixels = cfa.astype(f"{order}u2").tobytes()
     height, width = claimed or cfa.shape
-    tags: list[tuple[int, int, list[float]]] = [
+    tags: list[tuple[int, int, Sequence[float]]] = [
         *((254, 4, [0]), (256, 4, [width]), (257, 4, [height]), (258, 3, [16]), (259, 3, [1])),
         *((262, 3, [32803]), (271, 2, [*b"Test\0"]), (272, 2, [*b"Test Camera\0"])),
         *((273, 4, [0]), (274, 3, [orientation]), (277, 3, [1]), (278, 4, [height])),
@@ -46,7 +47,7 @@ def dng(
     return _tiff(sorted(tags), pixels, order)
 
 
-def _tiff(tags: list[tuple[int, int, list[float]]], pixels: bytes, order: str) -> bytes:
+def _tiff(tags: list[tuple[int, int, Sequence[float]]], pixels: bytes, order: str) -> bytes:
     values = [_packed(kind, numbers, order) for _, kind, numbers in tags]
     start = 8 + 2 + 12 * len(tags) + 4
     end = start + sum(len(value) + len(value) % 2 for value in values if len(value) > 4)
@@ -64,7 +65,7 @@ def _tiff(tags: list[tuple[int, int, list[float]]], pixels: bytes, order: str) -
     return header + table + bytes(4) + content + pixels
 
 
-def _packed(kind: int, numbers: list[float], order: str) -> bytes:
+def _packed(kind: int, numbers: Sequence[float], order: str) -> bytes:
     if kind in (1, 2):
         return bytes(int(n) for n in numbers)
     if kind in (5, 10):

@@ -143,16 +143,16 @@ def colorants_of(chromaticities: np.ndarray) -> np.ndarray:
     Raises
     ------
     ValueError
-        If they are no primaries: not finite, a `y` of 0, all on one line, or a white outside of
-        their triangle.
+        If they are no primaries: not finite, all on one line, or a white without light or outside
+        of their triangle.
     """
     xy = np.asarray(chromaticities, float)
-    if not np.isfinite(xy).all() or np.abs(xy).max() > 10 or (np.abs(xy[:, 1]) < 1e-6).any():
+    if not np.isfinite(xy).all() or np.abs(xy).max() > 10 or not xy[3, 1] > 1e-3:
         raise ValueError("not chromaticities")
-    ends = np.stack([xy[:, 0] / xy[:, 1], np.ones(4), (1 - xy.sum(axis=1)) / xy[:, 1]])
+    ends = np.stack([xy[:, 0], xy[:, 1], 1 - xy.sum(axis=1)])
     if abs(np.linalg.det(ends[:, :3])) < 1e-6:
         raise ValueError("the primaries lie on a line")
-    amounts = np.linalg.solve(ends[:, :3], ends[:, 3])
+    amounts = np.linalg.solve(ends[:, :3], ends[:, 3] / xy[3, 1])
     if not (amounts > 0).all():
         raise ValueError("white is outside of the primaries")
     return ends[:, :3] * amounts
