@@ -1,6 +1,7 @@
 """What was assumed or left out when a photo was read, as sentences for commands."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from ..io.reading_notes import ReadingNote, ReadingNoteKind
 
@@ -40,3 +41,28 @@ def reading_note_lines(notes: Iterable[ReadingNote]) -> list[str]:
         Each begins with "note: ".
     """
     return [f"note: {_TEXTS[one.kind].format(value=one.value or 0.0)}" for one in notes]
+
+
+def stored_note_lines(stored: Any) -> list[str]:
+    """Return these lines for the entry `input.reading_notes` of a decomposition.json.
+
+    Parameters
+    ----------
+    stored : Any
+        The entry; the file may be anybody's, and unusable parts are ignored.
+
+    Returns
+    -------
+    list of str
+    """
+    known = {kind.value: kind for kind in ReadingNoteKind}
+    notes = [one for one in stored if isinstance(one, dict)] if isinstance(stored, list) else []
+    return reading_note_lines(
+        ReadingNote(known[str(one.get("kind"))], _share(one.get("value")))
+        for one in notes
+        if str(one.get("kind")) in known
+    )
+
+
+def _share(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and 0 <= value <= 1 else None
