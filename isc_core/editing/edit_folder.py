@@ -21,9 +21,11 @@ import numpy as np
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
 from ..io.decoders import write_png
+from ..io.decoders.raw import CAMERA_RAW
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
 from ..photo.primaries import to_rec709
+from ..photo.transfer import PROFILE
 from ..result_files.contact_sheet import MapPanel, Panel, edit_sheet
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
@@ -224,8 +226,8 @@ def _picture(
         )
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
-    if given.get("colour_profile"):  # the picture is not in the photo's colour space
-        transfer = "srgb"
+    if transfer == PROFILE or given.get("colour_profile") == CAMERA_RAW:
+        transfer = "srgb"  # a PNG cannot carry the photo's encoding
     peak = None if bits == 32 else 65535 if bits > 8 else 255
     kind = np.float32 if peak is None else np.uint16 if bits > 8 else np.uint8
     empty = Raster(

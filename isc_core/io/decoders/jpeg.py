@@ -8,6 +8,7 @@ from PIL import JpegImagePlugin
 
 from ...errors import InputError
 from ..limits import Limits
+from .colour.dcf import space_of_exif
 from .gain_map import gain_map_notes
 from .pillow import decode_pillow
 from .raster import Raster
@@ -44,7 +45,8 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
     """
     check_scans(data, path)
     image = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
-    return decode_pillow(image, path, limits, notes=gain_map_notes(data))
+    space, notes = space_of_exif(image), gain_map_notes(data)
+    return decode_pillow(image, path, limits, space=space, notes=notes)
 
 
 def check_scans(data: bytes, path: Path | str) -> None:

@@ -30,6 +30,7 @@ from ..reading_notes import ReadingNote, ReadingNoteKind
 from .colour.space import LINEAR, ColourSpace
 from .raster import Raster, check_size, raster_of_codes
 
+CAMERA_RAW = "camera raw"
 _SIGNATURES = (
     (0, b"FUJIFILMCCD-RAW"),
     (0, b"IIRO"),
@@ -39,8 +40,8 @@ _SIGNATURES = (
     (0, b"\0MRM"),
     (0, b"FOVb"),
     (4, b"ftypcrx "),
-    (6, b"HEAPCCDR"),
-    (8, b"CR\x02"),
+    (0, b"II\x1a\0\0\0HEAPCCDR"),
+    (0, b"II*\0\x10\0\0\0CR\x02"),
 )
 _PHOTOMETRIC, _SUB_DIRECTORIES, _DNG_VERSION = 262, 330, 50706
 _RAW_PHOTOMETRIC = (32803, 34892)  # colour filter array, linear raw
@@ -118,7 +119,7 @@ def read_raw(data: bytes, path: Path, limits: Limits) -> Raster:
     except rawpy.LibRawError as error:
         raise ValueError("a damaged raw file") from error
     notes = () if known else (ReadingNote(ReadingNoteKind.UNKNOWN_CAMERA_COLOURS),)
-    raster = raster_of_codes(codes, 65535, space=ColourSpace("camera raw", (LINEAR,)), notes=notes)
+    raster = raster_of_codes(codes, 65535, space=ColourSpace(CAMERA_RAW, (LINEAR,)), notes=notes)
     peak = (codes == 65535).any(axis=2)
     fits = saturated is not None and saturated.shape == peak.shape
     return replace(raster, bit_depth=min(bits, 16), saturated=peak | saturated if fits else peak)

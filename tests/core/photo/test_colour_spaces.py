@@ -240,6 +240,20 @@ def test_colours_outside_of_rec709_are_clipped_at_0_and_counted(tmp_path: Path) 
     assert note.kind is ReadingNoteKind.OUT_OF_GAMUT and note.value == pytest.approx(4 / H)
 
 
+def test_adobe_rgb_as_cameras_mark_it_in_exif(tmp_path: Path) -> None:
+    _, colorants, gamma = SPACES["Adobe RGB"]
+    flat = np.repeat(np.repeat(light()[::8, ::8], 8, 0), 8, 1)
+    image = Image.fromarray(encoded(flat, colorants, gamma, 255))
+    for index, name in (("R03", "Adobe RGB (1998)"), ("R98", "")):
+        exif = Image.Exif()
+        exif.get_ifd(0x8769)[0xA005] = {1: index}
+        image.save(tmp_path / "a.jpg", quality=98, subsampling=0, exif=exif)
+        photo = read_photo(tmp_path / "a.jpg", whole_frame=True)
+        assert photo.original.colour_profile == name
+        error = np.percentile(off(np.minimum(photo.image, 1), flat), 95)
+        assert error < 4 if name else error > 5
+
+
 # --- chunks of PNG, chromaticities of EXR ---------------------------------------------------------
 
 
