@@ -364,12 +364,11 @@ def test_the_maps_of_a_wide_photo_are_those_of_its_srgb_version(
     part in a million leads to another.
     """
     image, mask = under_lights((0.4, -0.5, 0.8))
-    profile, colorants, gamma = SPACES[name]
     alpha = (mask[..., None] * peak).astype(np.uint16 if peak > 255 else np.uint8)
     results = []
-    for profile_, *space in ((profile, colorants, gamma), (b"", to_d50(REC709), None)):
-        pixels = np.concatenate([encoded(0.6 * image, *space, peak), alpha], axis=2)
-        photo = read_photo(png(tmp_path / "a.png", pixels, profile_))
+    for embedded, primaries, power in (SPACES[name], (b"", to_d50(REC709), None)):
+        pixels = np.concatenate([encoded(0.6 * image, primaries, power, peak), alpha], axis=2)
+        photo = read_photo(png(tmp_path / "a.png", pixels, embedded))
         results.append(decompose(photo, Settings(max_size=64, model="retinex"), name="ball"))
     wide, plain = results
     for shown in ("image", "diffuse", "specular", "reflectance"):
