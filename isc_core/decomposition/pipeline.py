@@ -255,5 +255,7 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "crop_box": list(mask_box(photo.mask)),
         "transfer": source.transfer,
         "bit_depth": source.bit_depth,
+        "colour_profile": source.colour_profile,
+        "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
     }

@@ -409,7 +409,7 @@ def _wrong_input(given: Mapping[str, Any]) -> str:
         return "size"
     texts = (
         name
-        for name in ("name", "sha256", "transfer", "mask_from")
+        for name in ("name", "sha256", "transfer", "mask_from", "colour_profile")
         if not isinstance(given.get(name, ""), str)
     )
     return next(texts, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")

@@ -96,7 +96,7 @@ def add_transfer(parser: argparse.ArgumentParser | Group) -> None:
         "--transfer",
         choices=TRANSFERS,
         default="auto",
-        help="encoding of the photo (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
+        help="curve of the photo (auto: what the file says, else sRGB; floats are linear)",
     )
 
 

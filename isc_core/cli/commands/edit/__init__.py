@@ -10,6 +10,7 @@ from ....editing.edit_folder import Original, Record, Sheet, require_writable_ed
 from ....errors import InputError
 from ....imaging.srgb import linear_to_srgb
 from ....photo import read_photo, read_raster
+from ....photo.transfer import PROFILE
 from ....progress import Monitor
 from ....result_files.result_folder import load
 from ....scene.decomposition import Decomposition
@@ -181,6 +182,7 @@ def _changed_options(options: argparse.Namespace) -> str:
 def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     given = d.provenance.input
     transfer = options.transfer or str(given.get("transfer", "auto"))
+    transfer = "auto" if transfer == PROFILE else transfer
     if given.get("mask_from") == "file" and options.mask is None:
         raise InputError("the result was made with a separate mask: give the same one with --mask")
     limits = limits_of(options)
