@@ -24,11 +24,13 @@ from ..io.printable_names import readable
 from ..scene.decomposition import Decomposition, Separation
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.spherical_harmonics import real_sh
+from .error_colors import SCALE, error_colors
 from .other_views import relit_panel, turned_panels
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 
 _GAP, _EDGE, _LABEL, _HEAD = 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
+_KEY = 10  # pixels: side of a key's square
 _SMALL = 480  # pixels: long side of a sheet's thumbnail
 _TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
     (1.0, 0.42, 0.04),
@@ -43,7 +45,6 @@ _SHOWN = (
     "shading",
     "normal",
     "height",
-    "confidence",
 )  # maps that panels are drawn from
 _FULL_ERROR = 0.1  # of the photo's white: errors above it have the full colour
 
@@ -87,7 +88,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     )
     panels += [_relief(d, frame, small), _light_panel(d, light)]
     panels += [*turned_panels(d, frame, small, photo), relit_panel(d, frame, small)]
-    panels.append(_confidence_panel(frame, small))
+    panels.append(_error_panel(d, frame))
     return _sheet(*_title(d), panels, columns=4)
 
 
@@ -100,9 +101,15 @@ def _light_panel(d: Decomposition, gain: float) -> Panel:
     return Panel(gain * ball, coverage, "Light", "on a white sphere")
 
 
-def _confidence_panel(frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
-    grey = srgb_to_linear(np.clip(small["confidence"], 0, 1))
-    return Panel(np.repeat(grey[..., None], 3, axis=2), frame.coverage, "Confidence", "white is 1")
+def _error_panel(d: Decomposition, frame: Frame) -> Panel:
+    """The expected error of the normals; the confidence where it is not known."""
+    if d.expected_error is None:
+        grey = srgb_to_linear(np.clip(frame.scaled(d.confidence), 0, 1))
+        color = np.repeat(grey[..., None], 3, axis=2)
+        return Panel(color, frame.coverage, "Confidence", "white is 1")
+    color = srgb_to_linear(error_colors(frame.scaled(d.expected_error.normal)))
+    keys = tuple((f"{step}°", code) for step, code in SCALE)
+    return Panel(color, frame.coverage, "Normals off by", "", keys)
 
 
 def thumbnail(sheet: Path, target: Path) -> None:
@@ -419,16 +426,27 @@ def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> 
         x, y = _EDGE + column * (SIDE + _GAP), _HEAD + row * (SIDE + _LABEL + _GAP)
         sheet.paste(_picture(panel), (x, y), card)
         end = _write(draw, (x + 2, y + SIDE + 27), panel.label, 18, _TEXT, SIDE)
-        _write(
-            draw,
-            (x + SIDE - 2, y + SIDE + 27),
-            panel.remark,
-            14,
-            _FAINT,
-            x + SIDE - end - 12,
-            right=True,
-        )
+        right = _write_keys(draw, (x + SIDE - 2, y + SIDE + 27), panel.keys)
+        _write(draw, (right, y + SIDE + 27), panel.remark, 14, _FAINT, right - end - 10, right=True)
     return sheet
+
+
+def _write_keys(
+    draw: ImageDraw.ImageDraw,
+    place: tuple[float, float],
+    keys: Sequence[tuple[str, tuple[int, int, int]]],
+) -> float:
+    """Draw squares of colour with their texts, the last at the right end `place`; return where they
+    begin.
+    """
+    right, baseline = place
+    font = ImageFont.load_default(14)
+    for text, color in reversed(keys):
+        draw.text((right, baseline), text, fill=_FAINT, font=font, anchor="rs")
+        right -= font.getlength(text) + 4
+        draw.rectangle((right - _KEY, baseline - _KEY, right, baseline), fill=color)
+        right -= _KEY + 8
+    return right
 
 
 def _write(

@@ -21,12 +21,15 @@ class Panel:
     coverage : (N, N) ndarray
         In [0, 1].
     label, remark : str
+    keys : tuple of (str, tuple of int)
+        What colours mean: text and sRGB code, drawn in place of the remark.
     """
 
     color: np.ndarray
     coverage: np.ndarray
     label: str
     remark: str = ""
+    keys: tuple[tuple[str, tuple[int, int, int]], ...] = ()
 
 
 @dataclass(frozen=True)
