@@ -21,8 +21,8 @@ and normal deviations: see `networks.scene_network`.
 
 Limits: the mean error over many pixels of about the same expectation; a single pixel's error varies
 by as much. Errors of the separation count only as far as they bend shape and shading. Calibrated on
-opaque bodies: for mirrors, glass, hair and cast shadows of other things it is too low. Measured in
-docs/methods/expected_error.md.
+opaque bodies: for mirrors and glass it is a little low, for hair and cast shadows of other things
+unknown. Measured in docs/methods/expected_error.md.
 """
 
 from dataclasses import dataclass, replace
