@@ -22,7 +22,8 @@ from ..io.atomic import new_folder, require_writable
 from ..io.decoders import write_png
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
-from ..result_files.contact_sheet import MapPanel, Panel, edit_sheet
+from ..result_files.contact_sheet import MapPanel, edit_sheet
+from ..result_files.panels import Panel
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
 from .compositing import composite

@@ -15,6 +15,7 @@ from isc_core.result_files.contact_sheet import (
     contact_sheet,
     separation_sheet,
 )
+from isc_core.result_files.error_colors import SCALE, error_colors
 from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from isc_core.scene.diagnostics import (
     AssumptionWarning,
@@ -22,6 +23,7 @@ from isc_core.scene.diagnostics import (
     LobeFitOutcome,
     WarningKind,
 )
+from isc_core.scene.expected_error import ExpectedError
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeLight
 from tests.core.ball_scene import ball
 
@@ -171,6 +173,19 @@ def test_a_fitted_lobe_moves_with_the_viewer_and_the_light(scene: Decomposition)
     }
     assert place["from the left"] > place["from the right"]
     assert place["relit"] < SIDE / 2
+
+
+def test_expected_errors_have_the_colours_of_the_legend(scene: Decomposition) -> None:
+    for degrees, code in SCALE:
+        error = ExpectedError(np.full(scene.mask.shape, float(degrees)), 0 * scene.confidence)
+        sheet = contact_sheet(replace(scene, expected_error=error))
+        shown = panels(sheet)["confidence"]
+        np.testing.assert_allclose(shown[160, 160], srgb_to_linear(np.array(code) / 255), atol=0.01)
+    top = HEAD + 2 * (SIDE + LABEL + GAP) + SIDE
+    legend = np.asarray(sheet)[top : top + LABEL, -EDGE - SIDE : -EDGE].reshape(-1, 3)
+    assert all((legend == code).all(axis=1).sum() >= 80 for _, code in SCALE)
+    ends = error_colors(np.array([0.0, SCALE[0][0], SCALE[-1][0], 180.0]))
+    assert (ends[0] == ends[1]).all() and (ends[2] == ends[3]).all()
 
 
 def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:
