@@ -9,6 +9,7 @@ photos that violate what the models assume.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from .assumption_checks import with_warnings
@@ -51,7 +52,7 @@ def _solved(
 ) -> SceneEstimate:
     """Predict, solve and check."""
     task = with_predictions(task)
-    estimate = under_light(task, solver)
+    estimate = replace(under_light(task, solver), prediction=task.prediction)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, task.prediction)

@@ -26,7 +26,8 @@ from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
 from ..photo.primaries import to_rec709
 from ..photo.transfer import PROFILE
-from ..result_files.contact_sheet import MapPanel, Panel, edit_sheet
+from ..result_files.contact_sheet import MapPanel, edit_sheet
+from ..result_files.panels import Panel
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
 from .compositing import composite

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 from ..scene.diagnostics import (
     AssumptionWarning,
     Diagnostics,
+    ExpectedErrorDiagnostics,
     IlluminantOutcome,
     JointOutcome,
     LightColourDiagnostics,
@@ -89,6 +90,7 @@ def diagnostics_from_json(status: Any) -> Diagnostics:
         scene_classes=_numbers(status.get("kinds" if old else "scene_classes")),
         light_counts=_numbers(status.get("lamps" if old else "light_counts")),
         several_lights=_number(status.get("several_lamps" if old else "several_lights")),
+        expected_error=_expected_error(status.get("expected_error")),
         warnings=_old_warnings(status.get("doubts")) if old else _warnings(status.get("warnings")),
     )
 
@@ -115,6 +117,15 @@ def old_lobe_outcome(reason: str) -> LobeFitOutcome:
     if outcome is None:
         raise ValueError(f"unknown reason {reason[:80]!r}")
     return outcome
+
+
+def _expected_error(record: Any) -> ExpectedErrorDiagnostics | None:
+    if not isinstance(record, Mapping):
+        return None
+    normal, reflectance = (_number(record.get(k)) for k in ("normal_degrees", "log_reflectance"))
+    if normal is None or reflectance is None:
+        return None
+    return ExpectedErrorDiagnostics(normal, reflectance)
 
 
 def _lobe(record: Any) -> LobeDiagnostics | None:

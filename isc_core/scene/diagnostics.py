@@ -221,6 +221,22 @@ class LightColourDiagnostics:
 
 
 @dataclass(frozen=True)
+class ExpectedErrorDiagnostics:
+    """Means over the object of the expected errors, see `scene.expected_error`.
+
+    Attributes
+    ----------
+    normal : float
+        Degrees.
+    reflectance : float
+        Of the natural logarithm.
+    """
+
+    normal: float
+    reflectance: float
+
+
+@dataclass(frozen=True)
 class Diagnostics:
     """How a decomposition ended. None, or empty, where a step was not run.
 
@@ -248,6 +264,8 @@ class Diagnostics:
         Probabilities of "none", "one" and "several" lights.
     several_lights : float or None
         Probability of several lights.
+    expected_error : ExpectedErrorDiagnostics or None
+        How wrong normals and reflectance probably are.
     warnings : tuple of AssumptionWarning
         Violated assumptions.
     """
@@ -264,11 +282,12 @@ class Diagnostics:
     scene_classes: dict[str, float] = field(default_factory=dict)
     light_counts: dict[str, float] = field(default_factory=dict)
     several_lights: float | None = None
+    expected_error: ExpectedErrorDiagnostics | None = None
     warnings: tuple[AssumptionWarning, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry `status` of decomposition.json, without the steps that were not run."""
-        lobe, light = self.lobe, self.light_colour
+        lobe, light, error = self.lobe, self.light_colour, self.expected_error
         entries: dict[str, Any] = {
             "converged": self.converged,
             "reason": self.reason and self.reason.value,
@@ -295,6 +314,8 @@ class Diagnostics:
             "scene_classes": self.scene_classes,
             "light_counts": self.light_counts,
             "several_lights": self.several_lights,
+            "expected_error": error
+            and {"normal_degrees": error.normal, "log_reflectance": error.reflectance},
         }
         kept = {name: value for name, value in entries.items() if value is not None and value != {}}
         return kept | {
