@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from isc_core.decomposition.joint import detect_residual_highlights
+from isc_core.decomposition.joint import supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
@@ -54,9 +54,8 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         whole = Photo(photo, mask, 1 / 255, scene.clipped, source)
         return decompose(whole, Settings(threads=1)).specular
     if method == "joint":
-        start = separate("isc", photo, mask, scene.clipped)
-        residual = detect_residual_highlights(photo, start.diffuse, mask)
-        return start.specular if residual is None else photo - residual.diffuse
+        split, residual = supported_layers(photo, separate("isc", photo, mask, scene.clipped), mask)
+        return split.specular if residual is None else photo - residual.diffuse
     return separate(method, photo, mask, scene.clipped).specular
 
 
