@@ -2,6 +2,7 @@
 
   python -m benchmarks.separation.prints WORLD --panoramas DIR [--part choice|report] [--count N]
   [--methods isc,network,joint,chain] [--sheet JPG] [--json FILE]
+  python -m benchmarks.separation.prints WORLD --photos DIR --sheet JPG
 
 WORLD is a folder of `isc world build`; the photos are those of `print_set`. Constants are fitted on
 `Part.FIT` (`print_rule`), rules are chosen on `Part.CHOICE`, figures are reported on `Part.REPORT`.
@@ -10,7 +11,8 @@ continued, `chain` all of `isc decompose` (minutes).
 
 Matt: share of the light taken off, and its RMS over the photo's. Glossy: squared error of the
 specular light over that of none. 1 is what doing nothing reaches; intervals are of resampled
-bodies.
+bodies. `--photos` draws masked photos instead: each above what colour takes off and what the joint
+model keeps.
 """
 
 import argparse
@@ -24,8 +26,9 @@ from PIL import Image
 from isc_core.decomposition.joint import supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource, read_photo
 from isc_core.separation import separate
 
 from .print_set import Part, PrintScene, print_scenes
@@ -33,6 +36,7 @@ from .print_set import Part, PrintScene, print_scenes
 METHODS = ("isc", "network", "joint")
 _RESAMPLED = 2000
 _COLUMNS = 10
+_SHEET_SIDE, _PHOTO_COLUMNS = 200, 7
 
 
 def removed_light(scene: PrintScene, method: str) -> np.ndarray:
@@ -139,7 +143,50 @@ def write_sheet(path: Path, scenes: Sequence[PrintScene], rows: Sequence[np.ndar
     tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % _COLUMNS)
     sheet = np.vstack([np.hstack(tiles[k : k + _COLUMNS]) for k in range(0, len(tiles), _COLUMNS)])
     codes = np.rint(255 * linear_to_srgb(np.clip(sheet, 0, 1))).astype(np.uint8)
-    Image.fromarray(codes).save(path, quality=80)
+    Image.fromarray(codes).save(path, quality=70)
+
+
+def write_photo_sheet(path: Path, folder: Path) -> None:
+    """Write a sheet of masked photos, what colour takes off them, and what the joint model does.
+
+    Parameters
+    ----------
+    path : Path
+        JPEG to write.
+    folder : Path
+        PNG and BMP photos with their masks in alpha, or on black; others show their whole frame.
+    """
+    tiles = []
+    for file in sorted([*folder.glob("*.png"), *folder.glob("*.[bp][mp][pm]")]):
+        if file.stem.endswith("_gt"):
+            continue
+        whole = read_photo(file, whole_frame=file.suffix != ".png")
+        photo = whole.resized_to_object(_SHEET_SIDE)
+        image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
+        colour = separate("isc", image, mask, photo.clipped)
+        split, residual = supported_layers(image, colour, mask)
+        kept = split.specular if residual is None else image - residual.diffuse
+        unit = max(float(np.quantile(image[mask], 0.995)), 1e-6)
+        box = mask_slices(mask)
+        column = [_padded(one[box] / unit) for one in (image, colour.specular, kept)]
+        tiles.append(np.vstack(column))
+    rows = -(-len(tiles) // _PHOTO_COLUMNS)
+    tiles += [np.zeros_like(tiles[0])] * (rows * _PHOTO_COLUMNS - len(tiles))
+    sheet = np.vstack(
+        [np.hstack(tiles[k * _PHOTO_COLUMNS :][:_PHOTO_COLUMNS]) for k in range(rows)]
+    )
+    codes = np.rint(255 * linear_to_srgb(np.clip(sheet, 0, 1))).astype(np.uint8)
+    Image.fromarray(codes).save(path, quality=70)
+
+
+def _padded(light: np.ndarray) -> np.ndarray:
+    """An image in the middle of a black square."""
+    side = _SHEET_SIDE + 8
+    rows, columns = (min(n, side) for n in light.shape[:2])
+    square = np.zeros((side, side, 3))
+    top, left = (side - rows) // 2, (side - columns) // 2
+    square[top : top + rows, left : left + columns] = light[:rows, :columns]
+    return square
 
 
 def measured(
@@ -174,14 +221,20 @@ def main() -> None:
     )
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
-    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas")
     add("--part", type=Part, default=Part.REPORT, choices=list(Part), help="which bodies")
     add("--count", type=int, default=60, help="photos of each set (default: %(default)s)")
     add("--methods", default=",".join(METHODS), help="default: %(default)s")
+    add("--photos", type=Path, metavar="DIR", help="photos to draw instead")
     add("--sheet", type=Path, help="JPEG of the photos and what the last method takes off")
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
     methods = given.methods.split(",")
+    if given.photos is not None and given.sheet is not None:
+        write_photo_sheet(given.sheet, given.photos)
+        return
+    if given.panoramas is None:
+        parser.error("name a folder of panoramas with --panoramas, or photos and a sheet")
     try:
         matt, glossy = (
             list(print_scenes(given.world, given.panoramas, given.part, given.count, shiny))
