@@ -88,8 +88,10 @@ def _greyed(photo: Photo) -> Photo:
 
 
 def _grey_layers(split: Separation) -> Separation:
-    layers = (_grey(layer) for layer in (split.diffuse, split.specular, split.residual))
-    return Separation(*layers, split.confidence)
+    diffuse, specular, residual = (
+        _grey(layer) for layer in (split.diffuse, split.specular, split.residual)
+    )
+    return Separation(diffuse, specular, residual, split.confidence)
 
 
 def _toned(split: Separation, photo: Photo, grey: Photo) -> Separation:

@@ -7,15 +7,15 @@ from isc_core.shading.spherical_harmonics import reference_basis
 
 pytest.importorskip("torch")
 
-from training.priors.panorama_photos import (  # noqa: E402
+from training.priors.panorama_photos import (
     camera_picture,
     colour_on_a_ball,
     draw_turn,
     photograph,
 )
-from training.priors.photographed_bodies import uneven  # noqa: E402
-from training.priors.white_balance import ALGORITHMS, GREY_WORLD  # noqa: E402
-from training.world.environments import Panorama  # noqa: E402
+from training.priors.photographed_bodies import uneven
+from training.priors.white_balance import ALGORITHMS, GREY_WORLD
+from training.world.environments import Panorama
 
 LIGHT = np.array([1.3, 1.0, 0.7])
 
