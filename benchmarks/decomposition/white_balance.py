@@ -107,12 +107,12 @@ def main() -> None:
         except InputError as error:
             parser.error(str(error))
         ratios.append(light_ratio(before.illumination))
-        cells = [path.stem, f"{ratios[-1]:.2f}"]
+        cells = [path.stem, f"{ratios[-1]:.2f}", "-", "-", "-"]
         if given.most:
             after = decompose(recoloured(photo, factor), Settings(threads=1))
             angle, off = changes(before, after, factor)
             text = " ".join(f"{one:.2f}" for one in factor)
-            cells += [text, f"{angle:.1f}", f"{off:.3f}"]
+            cells[2:] = [text, f"{angle:.1f}", f"{off:.3f}"]
         print("| " + " | ".join(cells) + " |", flush=True)
     print(f"\nlight: median {np.median(ratios):.2f}, largest {max(ratios):.2f}")
 
