@@ -21,6 +21,7 @@ from ..scene.diagnostics import (
     LobeDiagnostics,
     LobeFitOutcome,
     LobeStatus,
+    PhotoColours,
     StopReason,
     WarningKind,
 )
@@ -87,6 +88,7 @@ def diagnostics_from_json(status: Any) -> Diagnostics:
         or _old_meaning(_OLD_JOINT, status.get("joint")),
         lobe=_old_lobe(status.get("gloss")) if old else _lobe(status.get("lobe")),
         light_colour=_light_colour(status.get("light_colour")),
+        photo_colours=_member(PhotoColours, status.get("photo_colours")),
         scene_classes=_numbers(status.get("kinds" if old else "scene_classes")),
         light_counts=_numbers(status.get("lamps" if old else "light_counts")),
         several_lights=_number(status.get("several_lamps" if old else "several_lights")),

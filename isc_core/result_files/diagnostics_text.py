@@ -12,6 +12,7 @@ from ..scene.diagnostics import (
     LobeDiagnostics,
     LobeFitOutcome,
     LobeStatus,
+    PhotoColours,
     WarningKind,
 )
 from .diagnostics_json import diagnostics_from_json
@@ -21,6 +22,15 @@ STOPPED_EARLY = "the solver reached its limit, so more may be possible: try a cl
 STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
 COLOURED = "the light is coloured: use --light-colour estimate"
 
+_COLOURS = {
+    PhotoColours.GREY: (
+        "the photo is grey: the light has no colour, and shape and reflectance are less certain"
+    ),
+    PhotoColours.TONED: (
+        "the photo is a toned grey one, such as sepia: it is solved as grey, and its tone is in "
+        "the reflectance"
+    ),
+}
 _JOINT = {
     JointOutcome.UNCHANGED: "no highlights beyond those that colour shows: the result is mdr's",
     JointOutcome.REMOVED: (
@@ -100,6 +110,8 @@ def note_lines(diagnostics: Diagnostics) -> list[str]:
         lines.append(f"expected error: {expected_error_text(diagnostics.expected_error)}")
     advice = light_colour_advice(diagnostics.light_colour)
     lines += [f"note: {advice}"] if advice else []
+    if diagnostics.photo_colours in _COLOURS:
+        lines.append(f"note: {_COLOURS[diagnostics.photo_colours]}")
     return lines + [f"note: {warning_text(warning)}" for warning in diagnostics.warnings]
 
 

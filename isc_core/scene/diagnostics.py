@@ -125,6 +125,24 @@ class IlluminantOutcome(StrEnum):
     STRONG_HIGHLIGHT_COLOUR = "strong highlight colour"
 
 
+class PhotoColours(StrEnum):
+    """Whether a photo has colours of its own.
+
+    Attributes
+    ----------
+    COLOURED
+        It has.
+    GREY
+        Its channels are equal.
+    TONED
+        It is a grey photo that was toned, such as sepia.
+    """
+
+    COLOURED = "coloured"
+    GREY = "grey"
+    TONED = "toned"
+
+
 class WarningKind(StrEnum):
     """An assumption that a photo violates.
 
@@ -258,6 +276,8 @@ class Diagnostics:
         The fitted lobe.
     light_colour : LightColourDiagnostics or None
         The colour of the light.
+    photo_colours : PhotoColours or None
+        Whether the photo has colours.
     scene_classes : dict of str to float
         Probabilities of what the object is made of: "opaque", "mirror" and "glass".
     light_counts : dict of str to float
@@ -279,6 +299,7 @@ class Diagnostics:
     joint: JointOutcome | None = None
     lobe: LobeDiagnostics | None = None
     light_colour: LightColourDiagnostics | None = None
+    photo_colours: PhotoColours | None = None
     scene_classes: dict[str, float] = field(default_factory=dict)
     light_counts: dict[str, float] = field(default_factory=dict)
     several_lights: float | None = None
@@ -311,6 +332,7 @@ class Diagnostics:
                 "outcome": light.outcome.value,
                 "coloured": light.coloured,
             },
+            "photo_colours": self.photo_colours and self.photo_colours.value,
             "scene_classes": self.scene_classes,
             "light_counts": self.light_counts,
             "several_lights": self.several_lights,
