@@ -8,6 +8,7 @@ from ..errors import InputError
 from ..imaging.area_resize import AreaFilter, resize_apart
 from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
+from .camera import Camera
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class PhotoSource:
         The transfer curve used, "srgb" or "linear".
     mask_from : str
         "file", "alpha", "black border" or "whole frame".
+    cropped : bool
+        The metadata give a focal length, but of a frame of another shape: it does not hold.
     """
 
     sha256: str
@@ -33,6 +36,7 @@ class PhotoSource:
     bit_depth: int
     transfer: str
     mask_from: str
+    cropped: bool = False
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Photo:
         one.
     exposed : bool
         Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
+    camera : Camera or None
+        The pinhole camera of `image`; None where it is unknown, for an orthographic view.
     """
 
     image: np.ndarray
@@ -69,6 +75,7 @@ class Photo:
     original: PhotoSource
     scale: float = 1.0
     exposed: bool = True
+    camera: Camera | None = None
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -124,6 +131,7 @@ class Photo:
             mask=mask,
             clipped=clipped,
             scale=self.scale * factor,
+            camera=None if self.camera is None else self.camera.scaled(factor),
         )
 
 

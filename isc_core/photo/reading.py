@@ -17,6 +17,7 @@ from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
 from ..io.memory import READING, enough_memory
+from .camera import Camera
 from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
 from .transfer import resolve_transfer, to_linear
@@ -127,6 +128,8 @@ def _photo(
     check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
     _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
     height, width = mask.shape
+    lens = raster.focal_length
+    cropped = lens is not None and lens.cropped
     return Photo(
         image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name)),
         mask=mask,
@@ -134,8 +137,11 @@ def _photo(
         clipped=np.zeros_like(mask)
         if raster.peak is None
         else largest(raster.values) == raster.peak,
-        original=PhotoSource(raster.sha256, (width, height), raster.bit_depth, used, mask_from),
+        original=PhotoSource(
+            raster.sha256, (width, height), raster.bit_depth, used, mask_from, cropped
+        ),
         exposed=raster.peak is not None,
+        camera=None if lens is None or cropped else Camera.of_frame(lens.pixels, (width, height)),
     )
 
 

@@ -8,6 +8,7 @@ from PIL import Image
 
 from ...errors import InputError
 from ..limits import Limits
+from .exif import with_focal_length
 from .raster import Raster, check_size, raster_of_codes
 
 _ORIENTATION_TAG = 0x0112
@@ -73,7 +74,8 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
         "RGBX",
         "YCbCr",
     ):
-        return raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
+        raster = raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
+        return with_focal_length(raster, image)
     raise InputError(
         f"{path}: pixels of kind {image.mode} are not supported: convert it to an 8- or 16-bit "
         "PNG or an EXR"

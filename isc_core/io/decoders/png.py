@@ -10,6 +10,7 @@ import numpy as np
 from PIL import PngImagePlugin
 
 from ..limits import Limits
+from .exif import with_focal_length
 from .opencv import decode_opencv
 from .pillow import decode_pillow, exif_orientation
 from .raster import Raster, as_rgb, check_size, raster_of_codes
@@ -46,7 +47,8 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     plain = _plain_png(data)
     image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
     if bits == 16:
-        return raster_of_codes(decode_opencv(plain), 65535, exif_orientation(image))
+        raster = raster_of_codes(decode_opencv(plain), 65535, exif_orientation(image))
+        return with_focal_length(raster, image)
     return decode_pillow(image, path, limits)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ..focal_length import FocalLength
 from ..limits import Limits
 
 MAX_ASPECT = 100
@@ -28,6 +29,8 @@ class Raster:
         Bits a channel.
     sha256 : str
         Of the whole file.
+    focal_length : FocalLength or None
+        Where the metadata give it.
     """
 
     values: np.ndarray
@@ -35,6 +38,7 @@ class Raster:
     peak: int | None
     bit_depth: int
     sha256: str = ""
+    focal_length: FocalLength | None = None
 
     @property
     def transparency(self) -> np.ndarray | None:

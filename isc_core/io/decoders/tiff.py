@@ -8,6 +8,7 @@ from PIL import TiffImagePlugin
 
 from ...errors import InputError
 from ..limits import Limits
+from .exif import with_focal_length
 from .opencv import decode_opencv
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
@@ -68,4 +69,4 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         )
     if pixels.dtype.kind == "f":
         pixels = pixels.astype(np.float32)
-    return raster_of_codes(pixels, 65535, premultiplied=extra == 1)
+    return with_focal_length(raster_of_codes(pixels, 65535, premultiplied=extra == 1), data)
