@@ -22,6 +22,10 @@ STRONG_COLOUR = (
     "the light, or all of the object, may have a strong colour: highlights and albedo are less "
     "reliable; use white light"
 )
+CROPPED = (
+    "the photo was cropped after it was taken, so its focal length is not known and the result is "
+    "orthographic: use the whole photo, or give --camera MM"
+)
 COLOURED = "the light is coloured: use --light-colour estimate to account for it"
 
 _JOINT = {
