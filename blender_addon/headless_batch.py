@@ -171,6 +171,7 @@ def _make_result(
         max_size=options.max_size,
         threads=options.threads,
         transfer=options.transfer,
+        camera=options.camera,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -220,7 +221,12 @@ def _write_outputs(
 def _create_request(source: Source, options: argparse.Namespace) -> DecomposeRequest:
     """The request of the panel, so that the object can be edited and decomposed again there."""
     method = MethodSettings(
-        options.model, options.separator, options.illumination, options.max_size, options.samples
+        options.model,
+        options.separator,
+        options.illumination,
+        options.max_size,
+        options.samples,
+        options.camera,
     )
     build = BuildOptions(
         size_metres=options.size,

@@ -158,6 +158,12 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         help="prior of the light (default: %(default)s)",
     )
     add(
+        "--camera",
+        default="auto",
+        metavar="NAME|MM",
+        help="camera, as of isc decompose (default: %(default)s)",
+    )
+    add(
         "--transfer",
         default="auto",
         choices=("auto", "srgb", "linear"),

@@ -87,7 +87,11 @@ class _Method(_Panel):
     def draw(self, context: Any) -> None:
         """Draw the settings of the decomposition."""
         settings, column = context.scene.isc, self.property_column()
-        for name in ("model", "separator", "illumination", "max_size", "samples"):
+        for name in ("model", "separator", "illumination", "camera"):
+            column.prop(settings, name)
+        if settings.camera == "focal_length":
+            column.prop(settings, "focal_length")
+        for name in ("max_size", "samples"):
             column.prop(settings, name)
 
 

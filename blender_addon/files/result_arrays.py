@@ -42,6 +42,7 @@ _NUMBERS = (
     "roughness",
     "specular_level",
     "crop_scale",
+    "focal_length",
 )
 _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(_COLORS, ("H", "W", 3)),
@@ -54,12 +55,15 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "faces": ("F", 3),
     "environment_map": ("h", "w", 3),
     "photo_size": (2,),
+    "principal_point": (2,),
+    "eye": (3,),
 }
 _DTYPES = {
     "mask": np.dtype(bool),
     **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
 }
-_OPTIONAL, _MAY_BE_NAN = {"specular_variation"}, {"roughness", "specular_level"}
+_CAMERA = ("focal_length", "principal_point", "eye")
+_OPTIONAL, _MAY_BE_NAN = {"specular_variation", *_CAMERA}, {"roughness", "specular_level"}
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
 
@@ -126,6 +130,12 @@ class ResultArrays:
         Map pixels per photo pixel.
     specular_variation : (H, W) ndarray or None
         Spatial factor of the specular level.
+    focal_length : float or None
+        Of the photo's camera in pixels of the maps; None for an orthographic view.
+    principal_point : (2,) ndarray or None
+        Its (x, y) in pixels from the left and upper edge of the maps.
+    eye : (3,) ndarray or None
+        Its place, in metres as `vertices`.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -166,6 +176,9 @@ class ResultArrays:
     photo_size: np.ndarray
     crop_scale: float
     specular_variation: np.ndarray | None = None
+    focal_length: float | None = None
+    principal_point: np.ndarray | None = None
+    eye: np.ndarray | None = None
     description: dict[str, Any] = field(default_factory=dict)
     folder: Path = Path()
 
@@ -260,6 +273,9 @@ def _check_arrays(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
         values[name] = array if shape else float(array)
     if not values["mask"].any() or not values["metres_per_pixel"] > 0 or not len(values["faces"]):
         raise InputError(f"{path} contains no object: decompose the photo again")
+    camera = [name for name in _CAMERA if name in values]
+    if camera and (len(camera) < len(_CAMERA) or not values["focal_length"] > 0):
+        raise InputError(f"{path} is damaged (half a camera): decompose the photo again")
     faces, (rows, columns) = values["faces"], values["vertex_pixel"].T
     outside = faces.min() < 0 or faces.max() >= sizes["V"] or min(rows.min(), columns.min()) < 0
     if outside or rows.max() >= sizes["H"] or columns.max() >= sizes["W"]:

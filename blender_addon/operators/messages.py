@@ -14,6 +14,7 @@ REPORT = "ISC Report"
 _FIELDS = {
     "--max-size": "Size",
     "--illumination": "Light",
+    "--camera": "Camera",
     "--transfer": "Color Space",
     "--threads": "Threads",
     "--separator": "Separator",

@@ -32,6 +32,8 @@ class MethodSettings:
         Value of `--separator`.
     illumination : str
         Value of `--illumination`.
+    camera : str
+        Value of `--camera`.
     max_size : int
         Longer side of the object in pixels; 0 keeps the photo's resolution.
     samples : int
@@ -43,6 +45,7 @@ class MethodSettings:
     illumination: str = "photo"
     max_size: int = 256
     samples: int = 64
+    camera: str = "auto"
 
 
 @dataclass(frozen=True)
@@ -147,11 +150,22 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
         mask=settings.mask.name_full if masked else "",
         scale_mask=settings.scale_mask,
         method=MethodSettings(
-            **{part.name: getattr(settings, part.name) for part in fields(MethodSettings)}
+            **{
+                part.name: getattr(settings, part.name)
+                for part in fields(MethodSettings)
+                if part.name != "camera"
+            },
+            camera=_camera(settings),
         ),
         build=build_options(settings, object_key(settings.image)),
         scene=scene.name_full,
     )
+
+
+def _camera(settings: Any) -> str:
+    """Value of `--camera`."""
+    by_length = settings.camera == "focal_length"
+    return f"{settings.focal_length:g}" if by_length else str(settings.camera)
 
 
 def build_options(settings: Any, name: str) -> BuildOptions:

@@ -76,6 +76,7 @@ def decompose_steps(
         max_size=method.max_size,
         threads=threads,
         transfer=photo.transfer,
+        camera=method.camera,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     yield from _run_worker(lambda: start_decompose(job, environment), names)

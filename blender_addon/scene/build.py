@@ -11,7 +11,7 @@ import numpy as np
 from isc_core.errors import InputError
 
 from ..files.result_arrays import ResultArrays
-from .camera import ensure_camera, set_render_size
+from .camera import ensure_camera, eye_of, set_render_size
 from .camera_background import set_background_photo
 from .closed_back import close_back
 from .collection import ensure_collection, ensure_scene, link_object, use_standard_view
@@ -270,11 +270,12 @@ def _ensure_object(
     obj.shape_key_clear()
     geometry = front_geometry(result, options.size_metres)
     if options.displacement:
-        fill_mesh(obj.data, flatten(geometry))
+        fill_mesh(obj.data, flatten(geometry, eye_of(result, options.size_metres)))
         add_displacement(key, obj, result, options.size_metres)
     else:
         if options.closed_back:
-            geometry = close_back(geometry, _BACK_DISTANCE * options.size_metres)
+            eye = eye_of(result, options.size_metres)
+            geometry = close_back(geometry, _BACK_DISTANCE * options.size_metres, eye)
         fill_mesh(obj.data, geometry)
         remove_displacement(key, obj)
     if not obj.data.materials:

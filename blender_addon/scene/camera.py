@@ -1,5 +1,9 @@
-"""The photo's camera: orthographic, with the frame of the photo. A render of the maps' size matches
-them pixel by pixel.
+"""The photo's camera with the photo's frame: orthographic, or a pinhole where its focal length is
+known. A render of the maps' size matches them pixel by pixel.
+
+Equation: with a focal length of f pixels and a frame of w x h, Blender's lens is f / max(w, h) of
+the sensor's width, and its shift the distance of the frame's middle from the principal point, over
+max(w, h).
 """
 
 import bpy
@@ -8,8 +12,10 @@ from mathutils import Matrix
 
 from ..files.result_arrays import ResultArrays
 from .collection import link_object
-from .mesh import metres_per_pixel
+from .mesh import metres_per_pixel, to_blender
 from .provenance import datablock_name, find_tagged, tag
+
+_SENSOR = 36.0  # millimetres: Blender's usual sensor
 
 
 def ensure_camera(
@@ -46,23 +52,70 @@ def ensure_camera(
         data = tag(bpy.data.cameras.new(name), key, "camera")
         camera = tag(bpy.data.objects.new(name, data), key, "camera")
     link_object(camera, collection)
-    (width, height), step = result.size, metres_per_pixel(result, size_metres)
-    column, row, _ = result.origin.astype(float)
+    if result.focal_length is None:
+        position = _fit_orthographic(camera.data, result, metres_per_pixel(result, size_metres))
+    else:
+        position = _fit_pinhole(camera.data, result, metres_per_pixel(result, size_metres))
+    place = Matrix() if transform is None else Matrix.LocRotScale(*transform.decompose()[:2], None)
+    camera.matrix_basis = (
+        place @ Matrix.Translation(position) @ Matrix.Rotation(0.5 * np.pi, 4, "X")
+    )
+    return camera
+
+
+def eye_of(result: ResultArrays, size_metres: float) -> np.ndarray | None:
+    """Return the place of a pinhole camera.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    size_metres : float
+        Longer side of the object.
+
+    Returns
+    -------
+    (3,) ndarray or None
+        Metres in Blender's axes, from the object's origin; None for an orthographic view.
+    """
+    if result.eye is None:
+        return None
+    scale = metres_per_pixel(result, size_metres) / result.metres_per_pixel
+    return to_blender(result.eye.astype(float)) * scale
+
+
+def _fit_orthographic(
+    data: bpy.types.Camera, result: ResultArrays, step: float
+) -> tuple[float, float, float]:
+    """Set lens and clipping for pixels of `step` metres; the camera's place."""
+    (width, height), (column, row, _) = result.size, result.origin.astype(float)
     # Far enough for everything in the frame: the object's own depth, and objects beside it.
     distance = (
         4 * max(width, height) * step
         + float(result.vertices[:, 2].max()) * step / result.metres_per_pixel
     )
     position = ((0.5 * (width - 1) - column) * step, -distance, (row - 0.5 * (height - 1)) * step)
-    data = camera.data
     data.type, data.sensor_fit, data.ortho_scale = "ORTHO", "AUTO", max(width, height) * step
     data.shift_x = data.shift_y = 0.0
     data.clip_start, data.clip_end = 0.01 * distance, 3 * distance
-    place = Matrix() if transform is None else Matrix.LocRotScale(*transform.decompose()[:2], None)
-    camera.matrix_basis = (
-        place @ Matrix.Translation(position) @ Matrix.Rotation(0.5 * np.pi, 4, "X")
-    )
-    return camera
+    return position
+
+
+def _fit_pinhole(
+    data: bpy.types.Camera, result: ResultArrays, step: float
+) -> tuple[float, float, float]:
+    """Set lens, shift and clipping for pixels of `step` metres; the camera's place."""
+    assert result.focal_length is not None
+    assert result.principal_point is not None
+    assert result.eye is not None
+    (width, height), (x, y) = result.size, result.principal_point.astype(float)
+    longest = max(width, height)
+    data.type, data.sensor_fit, data.sensor_width = "PERSP", "AUTO", _SENSOR
+    data.lens = _SENSOR * result.focal_length / longest
+    data.shift_x, data.shift_y = (0.5 * width - x) / longest, (y - 0.5 * height) / longest
+    right, behind, up = to_blender(result.eye.astype(float)) * (step / result.metres_per_pixel)
+    data.clip_start, data.clip_end = -0.01 * behind, -10 * behind
+    return float(right), float(behind), float(up)
 
 
 def set_render_size(scene: bpy.types.Scene, size: tuple[int, int]) -> None:

@@ -15,7 +15,9 @@ import numpy as np
 from .mesh import MeshGeometry
 
 
-def close_back(sheet: MeshGeometry, thickness: float) -> MeshGeometry:
+def close_back(
+    sheet: MeshGeometry, thickness: float, eye: np.ndarray | None = None
+) -> MeshGeometry:
     """Add a wall and a flat back to an open mesh.
 
     Parameters
@@ -24,6 +26,8 @@ def close_back(sheet: MeshGeometry, thickness: float) -> MeshGeometry:
         Triangles with a normal per vertex, or none.
     thickness : float
         Metres from the furthest vertex of the sheet to the back, above 0.
+    eye : (3,) ndarray, optional
+        Place of a pinhole camera: the wall then runs along its rays, so that the front hides it.
 
     Returns
     -------
@@ -35,7 +39,12 @@ def close_back(sheet: MeshGeometry, thickness: float) -> MeshGeometry:
     rim = _outline(faces)
     wall = np.stack([rim[:, 1], rim[:, 0], rim[:, 0] + n, rim[:, 1] + n], -1)
     behind = front.vertices.copy()
-    behind[:, 1] = behind[:, 1].max() + thickness
+    depth = behind[:, 1].max() + thickness
+    if eye is None:
+        behind[:, 1] = depth
+    else:
+        ray = behind - eye
+        behind = eye + ray * ((depth - eye[1]) / ray[:, 1:2])
     vertices = np.concatenate([front.vertices, behind])
     corners = np.concatenate([faces.ravel(), (faces[:, ::-1] + n).ravel(), wall.ravel()]).astype(
         np.int32

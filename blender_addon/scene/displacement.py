@@ -3,6 +3,8 @@ for more or less relief.
 
 The image contains metres toward the viewer, relative to the grid: strength 1 is the recovered
 shape. A pixel at a vertex of the height mesh has that vertex's height, so both shapes agree.
+Before a pinhole camera, grid and displacements are along its rays, as vectors: the object looks the
+same from there at any strength.
 
 Limits: the normals are those of the displaced grid, not the recovered ones.
 """
@@ -13,27 +15,37 @@ import bpy
 import numpy as np
 
 from ..files.result_arrays import ResultArrays
+from .camera import eye_of
 from .images import DATA, ensure_image
-from .mesh import UV, MeshGeometry, metres_per_pixel
+from .mesh import UV, MeshGeometry, front_geometry, metres_per_pixel
 from .provenance import datablock_name, find_tagged, tag
 
 MODIFIER = "ISC Displacement"
 
 
-def flatten(sheet: MeshGeometry) -> MeshGeometry:
+def flatten(sheet: MeshGeometry, eye: np.ndarray | None = None) -> MeshGeometry:
     """Return a mesh without its heights and normals.
 
     Parameters
     ----------
     sheet : MeshGeometry
         The visible side of the object, in Blender's axes (y away from the viewer).
+    eye : (3,) ndarray, optional
+        Place of a pinhole camera, along whose rays the vertices are moved.
 
     Returns
     -------
     MeshGeometry
         The mesh in the plane y = 0.
     """
-    return replace(sheet, vertices=sheet.vertices * (1.0, 0.0, 1.0), normals=None)
+    return replace(sheet, vertices=_on_plane(sheet.vertices, eye), normals=None)
+
+
+def _on_plane(vertices: np.ndarray, eye: np.ndarray | None) -> np.ndarray:
+    if eye is None:
+        return np.asarray(vertices * (1.0, 0.0, 1.0))
+    ray = vertices - eye
+    return np.asarray(eye - ray * (eye[1] / ray[:, 1:2]))
 
 
 def displacement_heights(result: ResultArrays, size_metres: float) -> np.ndarray:
@@ -58,6 +70,30 @@ def displacement_heights(result: ResultArrays, size_metres: float) -> np.ndarray
     return metres
 
 
+def displacement_vectors(result: ResultArrays, size_metres: float, eye: np.ndarray) -> np.ndarray:
+    """Return the displacements of the grid before a pinhole camera.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    size_metres : float
+        Longer side of the object.
+    eye : (3,) ndarray
+        The camera's place, see `eye_of`.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Metres in Blender's axes at the pixels of vertices; 0 elsewhere.
+    """
+    vertices = front_geometry(result, size_metres).vertices
+    vectors = np.zeros((*result.mask.shape, 3))
+    rows, columns = result.vertex_pixel.T
+    vectors[rows, columns] = vertices - _on_plane(vertices, eye)
+    return vectors
+
+
 def add_displacement(
     key: str, obj: bpy.types.Object, result: ResultArrays, size_metres: float
 ) -> None:
@@ -74,7 +110,13 @@ def add_displacement(
     size_metres : float
         Longer side of the object.
     """
-    image = ensure_image(key, "displacement", displacement_heights(result, size_metres), DATA)
+    eye = eye_of(result, size_metres)
+    offsets = (
+        displacement_heights(result, size_metres)
+        if eye is None
+        else displacement_vectors(result, size_metres, eye)
+    )
+    image = ensure_image(key, "displacement", offsets, DATA)
     texture = find_tagged(bpy.data.textures, key, "displacement")
     texture = texture or tag(
         bpy.data.textures.new(datablock_name(key, "displacement"), "IMAGE"), key, "displacement"
@@ -82,7 +124,8 @@ def add_displacement(
     texture.image, texture.use_interpolation, texture.extension = image, False, "EXTEND"
     modifier = obj.modifiers.get(MODIFIER) or obj.modifiers.new(MODIFIER, "DISPLACE")
     modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV
-    modifier.direction, modifier.mid_level = "NORMAL", 0.0
+    modifier.direction, modifier.mid_level = "NORMAL" if eye is None else "RGB_TO_XYZ", 0.0
+    texture.use_clamp = eye is None  # vectors have negative parts
 
 
 def remove_displacement(key: str, obj: bpy.types.Object) -> None:

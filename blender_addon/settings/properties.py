@@ -94,6 +94,15 @@ ILLUMINATIONS = _numbered(
     ("natural", "Natural", "Smooth light from all directions, of any color"),
     ("laboratory", "Laboratory", "One strong light source in a dark room"),
 )
+CAMERAS = _numbered(
+    (
+        "auto",
+        "Automatic",
+        "Focal length of the photo's metadata, orthographic where they give none",
+    ),
+    ("orthographic", "Orthographic", "Parallel rays"),
+    ("focal_length", "Perspective", "A given focal length"),
+)
 MASK_SOURCES = _numbered(
     (
         "ALPHA",
@@ -214,6 +223,18 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Prior of the light",
         items=ILLUMINATIONS,
         default="photo",
+    )
+    camera: EnumProperty(
+        name="Camera", description="Camera of the photo", items=CAMERAS, default="auto"
+    )
+    focal_length: FloatProperty(
+        name="Focal Length",
+        description="35 mm equivalent focal length, by the diagonal, in millimeters",
+        subtype="DISTANCE_CAMERA",
+        default=28.0,
+        min=8.0,
+        max=3000.0,
+        soft_max=200.0,
     )
     max_size: IntProperty(
         name="Size",

@@ -63,6 +63,8 @@ class DecomposeJob:
         Number of threads; 0 uses one per core.
     transfer : str
         Value of `--transfer`.
+    camera : str
+        Value of `--camera`.
     """
 
     photo: Path
@@ -74,6 +76,7 @@ class DecomposeJob:
     max_size: int
     threads: int = 0
     transfer: str = "auto"
+    camera: str = "auto"
 
 
 @dataclass(frozen=True)
@@ -147,7 +150,8 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
         If the worker cannot be started.
     """
     words = ["decompose", _absolute(job.photo), "--arrays", "-o", _absolute(job.output)]
-    for name in ("model", "separator", "illumination", "max_size", "threads", "transfer"):
+    names = ("model", "separator", "illumination", "max_size", "threads", "transfer", "camera")
+    for name in names:
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]

@@ -16,6 +16,7 @@ _TYPES: dict[str, type] = {
     "model": str,
     "separator": str,
     "illumination": str,
+    "camera": str,
     "max_size": int,
     "full_size": bool,
     "shading_only": bool,

@@ -19,12 +19,14 @@ from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
 from ..scene.known_inputs import DepthObservation, KnownInputs, SceneConstraints
+from ..shading.perspective import view_directions
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import share_in_blocks
 from .expected_error import with_expected_error
 from .layers import shaded
 from .models import DecompositionTask, SceneEstimate, Settings, solve
+from .perspective import before_camera, lobe_before_camera, with_camera
 from .settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
 from .task import Clock
 
@@ -90,6 +92,8 @@ def decompose(
         raise InputError(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
         )
+    known_shape = inputs.height is not None or inputs.depth is not None
+    photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)
         maps = photo if settings.full_size else working
@@ -118,7 +122,7 @@ def decompose(
         estimate.diagnostics,
     )
     with clock.stage("maps"):
-        result = assemble(maps, estimate, provenance)
+        result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
         if estimate.prediction is None or inputs.height is not None:
             return result
         return with_expected_error(result, estimate.prediction, working)
@@ -137,8 +141,10 @@ def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | N
         )
 
 
-def assemble(photo: Photo, estimate: SceneEstimate, provenance: Provenance) -> Decomposition:
-    """Compute the maps that follow from an estimate's height and light.
+def assemble(
+    photo: Photo, estimate: SceneEstimate, provenance: Provenance, *, known_light: bool = False
+) -> Decomposition:
+    """Compute the maps that follow from an estimate's height and light, before the photo's camera.
 
     The identities hold by construction: inside the mask shading = exp(SH(normal)) and reflectance =
     diffuse / shading.
@@ -151,14 +157,21 @@ def assemble(photo: Photo, estimate: SceneEstimate, provenance: Provenance) -> D
         What a model recovered.
     provenance : Provenance
         Origin of the result.
+    known_light : bool, optional
+        Whether the light was given: a camera does not change it.
 
     Returns
     -------
     Decomposition
         The maps.
     """
-    mask, split, height = photo.mask, estimate.split, estimate.height
-    normal, shading = shaded(height, estimate.light, mask)
+    mask, split, height, camera = photo.mask, estimate.split, estimate.height, photo.camera
+    if camera is None:
+        normal, shading = shaded(height, estimate.light, mask)
+        light, brdf = light_from_reference(estimate.light), estimate.brdf
+    else:
+        normal, shading, light = before_camera(estimate, camera, mask, known_light=known_light)
+        brdf = lobe_before_camera(estimate, camera, normal, mask)
     reflectance = np.where(
         mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0
     ).astype(np.float32)
@@ -173,18 +186,23 @@ def assemble(photo: Photo, estimate: SceneEstimate, provenance: Provenance) -> D
         normal,
         np.where(mask, height - height[mask].min(), 0).astype(np.float32),
         mask,
-        _confidence(split, normal, mask),
-        light_from_reference(estimate.light),
+        _confidence(split, normal, photo),
+        light,
         provenance,
-        estimate.brdf,
+        brdf,
+        camera,
     )
 
 
-def _confidence(split: Separation, normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _confidence(split: Separation, normal: np.ndarray, photo: Photo) -> np.ndarray:
     """The confidence where no error can be expected: that of the separation, lower where the
     surface turns away from the viewer.
     """
-    return np.where(mask, split.confidence * np.sqrt(np.clip(normal[..., 2], 0, 1)), 0).astype(
+    facing = normal[..., 2]
+    if photo.camera is not None:
+        height, width = photo.mask.shape
+        facing = (normal * view_directions(photo.camera, (height, width))).sum(axis=2)
+    return np.where(photo.mask, split.confidence * np.sqrt(np.clip(facing, 0, 1)), 0).astype(
         np.float32
     )
 

@@ -6,6 +6,7 @@ from enum import StrEnum
 
 from .. import baselines
 from ..errors import InputError
+from ..io.focal_length import LONGEST_35MM, SHORTEST_35MM
 from ..separation import BEST, METHODS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
@@ -24,6 +25,21 @@ MODEL_SUMMARIES = {
     "sfs-tsai-shah": "linear shape from shading (Tsai and Shah 1994)",
     "sfs-ikeuchi-horn": "variational shape from shading (Ikeuchi and Horn 1981)",
 }
+
+
+class CameraChoice(StrEnum):
+    """How the camera is found where no focal length is given.
+
+    Attributes
+    ----------
+    AUTO
+        From the photo's EXIF; orthographic where it tells no focal length.
+    ORTHOGRAPHIC
+        Parallel rays.
+    """
+
+    AUTO = "auto"
+    ORTHOGRAPHIC = "orthographic"
 
 
 class Illumination(StrEnum):
@@ -178,6 +194,8 @@ class Settings:
         For `SIRFS_MODELS`: the prior of the light.
     shape_prior : ShapePrior or str
         For `SIRFS_MODELS`: the prior of the shape.
+    camera : CameraChoice or str
+        The camera, or its focal length: millimetres, 35-mm equivalent by the diagonal.
     """
 
     model: str = "joint"
@@ -193,6 +211,7 @@ class Settings:
     light_colour: str = LightColour.BALANCED
     light_prior: str = LightPrior.PREDICTED
     shape_prior: str = ShapePrior.PREDICTED
+    camera: str = CameraChoice.AUTO
 
     def __post_init__(self) -> None:
         for setting in _RENAMED:
@@ -219,6 +238,15 @@ class Settings:
     def given_light_colour(self) -> tuple[float, float, float] | None:
         """Linear RGB of mean 1 where the light's colour is given as numbers."""
         return _colour_of(self.light_colour)
+
+    @property
+    def focal_length_35mm(self) -> float | None:
+        """The 35-mm equivalent focal length in millimetres where it is given as a number."""
+        try:
+            millimetres = float(self.camera)
+        except ValueError:
+            return None
+        return millimetres if SHORTEST_35MM <= millimetres <= LONGEST_35MM else None
 
     @property
     def expects_white_light(self) -> bool:
@@ -257,6 +285,11 @@ class Settings:
             raise InputError(
                 f"--light-colour does not apply to {self.model}: "
                 f"use --model {' or '.join(SIRFS_MODELS)}"
+            )
+        if self.camera not in list(CameraChoice) and self.focal_length_35mm is None:
+            raise InputError(
+                f'unknown camera "{self.camera}": choose {", ".join(CameraChoice)}, or a focal '
+                f"length of {SHORTEST_35MM:g} to {LONGEST_35MM:g} (mm, 35-mm equivalent)"
             )
         if self.max_size < 0 or self.threads < 0:
             raise InputError(

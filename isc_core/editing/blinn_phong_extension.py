@@ -108,11 +108,11 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     reflectance = np.maximum(d.reflectance, 0)
     tinted = reflectance * light_color(d)
     tint = tinted / np.maximum(tinted.max(-1, keepdims=True), 1e-6)
-    environment = environment_from_shading(d.illumination, _ENVIRONMENT_ROWS)
+    environment = environment_from_shading(d.illumination, _ENVIRONMENT_ROWS, viewer=d.viewer)
     lobe = Lobe(gloss.exponent or gloss.present or DEFAULT_EXPONENT)
     reflected = np.zeros_like(d.image)
     reflected[d.mask] = reflectance[d.mask] * lobe_in_environment(
-        lobe, d.normal[d.mask], environment
+        lobe, d.normal[d.mask], environment, d.view_inside
     )
     metallic = specular * (1 - gloss.metal + gloss.metal * tint) + gloss.metal * reflected
     return edited(d, (1 - gloss.metal) * d.diffuse, metallic, tuple(notes))
@@ -167,5 +167,5 @@ def _new_lobe(
     unit_light = replace(
         used_light, irradiance=used_light.irradiance / float(luminance(used_light.irradiance))
     )
-    rendered = lobe_under(Lobe(exponent), d.normal, unit_light)
+    rendered = lobe_under(Lobe(exponent), d.normal, unit_light, d.view)
     return strength_of(d, Lobe(exponent), rendered, None) * rendered

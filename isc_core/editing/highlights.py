@@ -57,7 +57,8 @@ def add_highlight(
     power = float(luminance(light.irradiance))
     if power <= 0:
         raise InputError("the light of the highlight is black: give it a colour")
-    rendered = lobe_under(lobe, d.normal, replace(light, irradiance=light.irradiance / power))
+    unit_light = replace(light, irradiance=light.irradiance / power)
+    rendered = lobe_under(lobe, d.normal, unit_light, d.view)
     new = strength_of(d, lobe, rendered, level) * rendered
     facing = bool(rendered[d.mask].max() > 1e-3 * rendered.max()) if rendered.any() else False
     notes = (

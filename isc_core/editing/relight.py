@@ -33,7 +33,7 @@ from ..lobe_fitting.light_direction import explain_specular
 from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
 from ..shading.environment_map import environment_from_shading, resampled, shading_under
-from ..shading.lights import DirectionalLight
+from ..shading.lights import VIEW, DirectionalLight
 from ..shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
 from ..shading.radiance import sh_shading
 from .edited import Edited, edited, light_color
@@ -106,7 +106,7 @@ class NewLight:
             np.asarray(self._environment(_ROWS), float), np.asarray(normals, float)
         )
 
-    def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
+    def lobe(self, lobe: Lobe, normals: np.ndarray, view: np.ndarray = VIEW) -> np.ndarray:
         """Return the radiance of a lobe of strength 1.
 
         Parameters
@@ -114,6 +114,8 @@ class NewLight:
         lobe : Lobe
         normals : (N, 3) ndarray
             Unit normals. Camera frame: x right, y up, z toward the viewer.
+        view : (3,) or (N, 3) ndarray, optional
+            Unit vectors toward the viewer.
 
         Returns
         -------
@@ -121,13 +123,14 @@ class NewLight:
         """
         if self.directional is not None:
             ambient = np.broadcast_to(self.directional.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
-            direct = lobe_under(lobe, normals, self.directional)
-            return direct + lobe_in_environment(lobe, normals, ambient)
-        return lobe_in_environment(lobe, normals, self._environment(_LOBE_ROWS))
+            direct = lobe_under(lobe, normals, self.directional, view)
+            return direct + lobe_in_environment(lobe, normals, ambient, view)
+        viewer = view if view.ndim == 1 else view.mean(axis=0) / np.linalg.norm(view.mean(axis=0))
+        return lobe_in_environment(lobe, normals, self._environment(_LOBE_ROWS, viewer), view)
 
-    def _environment(self, rows: int) -> np.ndarray:
+    def _environment(self, rows: int, viewer: np.ndarray = VIEW) -> np.ndarray:
         if self.coefficients is not None:
-            return environment_from_shading(self.coefficients, rows)
+            return environment_from_shading(self.coefficients, rows, viewer=viewer)
         assert self.environment is not None
         return (
             resampled(self.environment, rows) if len(self.environment) > rows else self.environment
@@ -252,18 +255,20 @@ def _highlights(
         )
         return _as_map(present[d.mask] * np.minimum(ratio, _MAX_SCALE), d.mask), note
     lobe = lobe or Lobe()
-    source = None if rotation is None else _dominant_light(d)
+    view, source = d.view_inside, None if rotation is None else _dominant_light(d)
     if source is None or rotation is None:
-        before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
+        before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals, view)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
         note = (
             ""
             if light.coefficients is None
             else "the highlights are rendered in a smooth light, so they are broad"
         )
-        return _as_map(strength * factor * light.lobe(lobe, normals), d.mask), note
+        return _as_map(strength * factor * light.lobe(lobe, normals, view), d.mask), note
     moved = replace(source, direction=rotation @ source.direction)
-    before, after = (_as_map(lobe_under(lobe, normals, one), d.mask) for one in (source, moved))
+    before, after = (
+        _as_map(lobe_under(lobe, normals, one, view), d.mask) for one in (source, moved)
+    )
     still = (
         _kept_share(source.direction, moved.direction)
         if choice.highlights == "auto" and choice.lobe is None

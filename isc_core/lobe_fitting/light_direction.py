@@ -32,6 +32,7 @@ from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFitOutcome
 from ..shading.brdf.blinn_phong import BlinnPhong
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions
+from ..shading.perspective import far_view_normals
 from ..shading.radiance import directional, radiance
 
 _SAMPLES, _GRID, _BLOCKS = 3000, 600, 8
@@ -163,7 +164,7 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
     DirectionEstimate
         With the exponent.
     """
-    samples = _samples(d, d.specular, _RIM)
+    samples = _samples(d, d.specular, _RIM, mirroring=True)
     if not samples.values.any() or (
         d.brdf is not None and d.brdf.outcome == LobeFitOutcome.NO_SPECULAR
     ):
@@ -214,18 +215,22 @@ def lobe_light(normal: np.ndarray, light: np.ndarray, exponent: float) -> np.nda
     return radiance(BlinnPhong(1.0, exponent), normal, VIEW, directional(light, 1.0))[..., 0]
 
 
-def _samples(d: Decomposition, layer: np.ndarray, rim: float = 0.0) -> _Samples:
+def _samples(
+    d: Decomposition, layer: np.ndarray, rim: float = 0.0, *, mirroring: bool = False
+) -> _Samples:
     """Some of the pixels, evenly; without those whose normal's z is below `rim`, unless that is
-    nearly all of them.
+    nearly all of them. Before a camera, `mirroring` gives normals that mirror the same light to a
+    viewer along z.
     """
-    inside = d.mask & (d.normal[..., 2] >= rim)
+    normals = d.normal if d.camera is None or not mirroring else far_view_normals(d.normal, d.view)
+    inside = d.mask & (normals[..., 2] >= rim)
     rows, columns = np.nonzero(inside if inside.sum() > 0.2 * d.mask.sum() else d.mask)
     step = max(1, len(rows) // _SAMPLES)
     rows, columns = rows[::step], columns[::step]
     across, down = (
         _BLOCKS * (places - places.min()) // (np.ptp(places) + 1) for places in (columns, rows)
     )
-    normal = d.normal[rows, columns].astype(float)
+    normal = normals[rows, columns].astype(float)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     return _Samples(
         normal,

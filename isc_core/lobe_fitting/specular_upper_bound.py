@@ -47,7 +47,8 @@ def bounded_specular(d: Decomposition) -> SpecularFit:
         return gloss
     from ..shading.environment_map import environment_from_shading
 
-    most = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, _ROWS))
+    environment = environment_from_shading(d.illumination, _ROWS, viewer=d.viewer)
+    most = specular_upper_bound(d, gloss.roughness, environment)
     return (
         gloss
         if gloss.specular <= most
@@ -77,7 +78,7 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
 
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
     normal = d.normal[d.mask].astype(float)
-    layer = lobe_in_environment(lobe, normal, resampled(environment, _ROWS))
+    layer = lobe_in_environment(lobe, normal, resampled(environment, _ROWS), d.view_inside)
     seen = d.image[d.mask]
     # A channel of zero carries no information: cameras clip colours outside their gamut there.
     room = np.divide(

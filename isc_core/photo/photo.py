@@ -9,6 +9,7 @@ from ..imaging.area_resize import AreaFilter, resize_apart
 from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
 from ..io.reading_notes import ReadingNote
+from .camera import Camera
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,8 @@ class PhotoSource:
         Name of the colour space that the file states, "" without one.
     notes : tuple of ReadingNote
         What was assumed or left out.
+    cropped : bool
+        The metadata give a focal length, but of a frame of another shape: it does not hold.
     """
 
     sha256: str
@@ -40,6 +43,7 @@ class PhotoSource:
     mask_from: str
     colour_profile: str = ""
     notes: tuple[ReadingNote, ...] = ()
+    cropped: bool = False
 
 
 @dataclass(frozen=True)
@@ -68,6 +72,8 @@ class Photo:
         one.
     exposed : bool
         Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
+    camera : Camera or None
+        The pinhole camera of `image`; None where it is unknown, for an orthographic view.
     """
 
     image: np.ndarray
@@ -77,6 +83,7 @@ class Photo:
     original: PhotoSource
     scale: float = 1.0
     exposed: bool = True
+    camera: Camera | None = None
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -132,6 +139,7 @@ class Photo:
             mask=mask,
             clipped=clipped,
             scale=self.scale * factor,
+            camera=None if self.camera is None else self.camera.scaled(factor),
         )
 
 

@@ -19,6 +19,7 @@ from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
 from ..io.memory import READING, enough_memory
 from ..io.reading_notes import ReadingNote, ReadingNoteKind
+from .camera import Camera
 from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
@@ -134,6 +135,8 @@ def _photo(
     check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
     _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
     height, width = mask.shape
+    lens = raster.focal_length
+    cropped = lens is not None and lens.cropped
     return Photo(
         image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name)),
         mask=mask,
@@ -147,8 +150,10 @@ def _photo(
             mask_from,
             "" if raster.space is None else raster.space.name,
             tuple(_notes(raster, used, linear, mask)),
+            cropped,
         ),
         exposed=raster.peak is not None,
+        camera=None if lens is None or cropped else Camera.of_frame(lens.pixels, (width, height)),
     )
 
 

@@ -16,6 +16,9 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     reflectance_scale ()         k
     metres_per_pixel ()          size of the mesh
     origin (3,)                  column, row, height in pixels of the mesh's origin
+    focal_length ()              of the photo's camera in map pixels; absent for orthographic views
+    principal_point (2,)         x, y in map pixels from the left and upper edge; absent likewise
+    eye (3,)                     the camera's place, in metres as the vertices; absent likewise
     illumination (9, 3)          SH coefficients of log shading, for `reflectance`
     mesh_illumination (9, 3)     the same for `base_color`: the shading divided by k
     sky (h, 2 h, 3)              environment map, radiance, that lights `base_color` accordingly
@@ -45,7 +48,7 @@ import numpy as np
 
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from .mesh import MeshResult, build_mesh
+from .mesh import MeshOptions, MeshResult, build_mesh
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
@@ -68,11 +71,30 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     OSError
         If the file cannot be written.
     """
-    arrays = arrays_of(
-        d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, bounded_specular(d))
-    )
+    arrays = arrays_of(d, built or mesh_of(d))
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
+
+
+def mesh_of(d: Decomposition, options: MeshOptions | None = None) -> MeshResult:
+    """Build the mesh of a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+    options : MeshOptions, optional
+
+    Returns
+    -------
+    MeshResult
+
+    Raises
+    ------
+    InputError
+        If the mask is too small for a mesh.
+    """
+    gloss = bounded_specular(d)
+    return build_mesh(d.height, d.normal, d.mask, d.reflectance, options, gloss, d.camera)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
@@ -88,7 +110,7 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     -------
     dict of str to ndarray
     """
-    values = _maps(d) | _mesh(built) | _light(d, built) | _gloss(d, built)
+    values = _maps(d) | _mesh(built) | _camera(built) | _light(d, built) | _gloss(d, built)
     size, scale = (
         d.provenance.input.get("size", d.mask.shape[::-1]),
         d.provenance.input.get("scale", 1.0),
@@ -124,6 +146,16 @@ def _mesh(built: MeshResult) -> dict[str, np.ndarray]:
     }
 
 
+def _camera(built: MeshResult) -> dict[str, np.ndarray]:
+    if built.camera is None or built.eye is None:
+        return {}
+    return {
+        "focal_length": np.array(built.camera.focal_length),
+        "principal_point": np.array(built.camera.principal_point),
+        "eye": built.eye,
+    }
+
+
 def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     from ..lobe_fitting.light_direction import explain_shading
     from ..shading.environment_map import environment_from_shading
@@ -132,7 +164,7 @@ def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     return {
         "illumination": d.illumination,
         "mesh_illumination": mesh_light,
-        "sky": environment_from_shading(mesh_light),
+        "sky": environment_from_shading(mesh_light, viewer=d.viewer),
         "sun_direction": sun.light.direction,
         "sun_strength": sun.light.irradiance / built.reflectance_scale,
         "sun_ambient": sun.light.ambient / built.reflectance_scale,

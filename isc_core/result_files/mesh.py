@@ -5,9 +5,11 @@ viewer, under the recovered light, that looks like the photo.
 
 Geometry: one vertex per pixel centre (or every `stride`-th), one cell of two triangles where all
 pixels of the cell lie inside the mask. World axes are those of glTF: +X right, +Y up, +Z toward the
-viewer, metres; the origin is the middle of the bounding box. Vertex normals are the recovered ones,
-averaged over a vertex's cell; the tangent-space normal map (green up) holds the difference between
-them and the recovered normal of each pixel. At stride 1 the map is flat.
+viewer, metres; the origin is the middle of the bounding box. Before a camera, vertices are on the
+rays of their pixels (see `shading.perspective`), and a pixel has its size at their mean distance.
+Vertex normals are the recovered ones, averaged over a vertex's cell; the tangent-space normal map
+(green up) holds the difference between them and the recovered normal of each pixel. At stride 1 the
+map is flat.
 
 Rim: the true slope of a smooth object is infinite at its silhouette, so the outermost heights of a
 reconstruction are the least certain and may spike. From the inside out, a height in the last `rim`
@@ -45,13 +47,14 @@ from scipy import ndimage
 from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
+from ..photo.camera import Camera
+from ..shading.lights import VIEW
+from ..shading.perspective import lifted_points, object_axis, view_directions
 from .glb import TexturedMesh, encode_glb
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
-_MIN_NORMAL_Z = (
-    1e-3  # smallest z of a vertex normal: it faces the viewer, and its tangent is defined
-)
+_LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,8 @@ class MeshResult:
     metres_per_pixel : float
         Of the maps.
     origin : tuple of float
-        (column, row, height), in pixels, of the world's origin.
+        (column, row, height), in pixels, of the world's origin; before a camera the height counts
+        from the mean distance.
     stride : int
         Pixels from vertex to vertex.
     vertex_pixel : (V, 2) ndarray
@@ -107,6 +111,10 @@ class MeshResult:
         Unit vectors of the normal map in tangent space.
     options : MeshOptions
     gloss : SpecularFit
+    camera : Camera or None
+        Of the maps; None for an orthographic view.
+    eye : (3,) ndarray or None
+        The camera's place in metres.
     """
 
     mesh: TexturedMesh
@@ -119,6 +127,8 @@ class MeshResult:
     detail: np.ndarray
     options: MeshOptions = field(default_factory=MeshOptions)
     gloss: SpecularFit = field(default_factory=SpecularFit)
+    camera: Camera | None = None
+    eye: np.ndarray | None = None
 
     @property
     def specular(self) -> float:
@@ -206,6 +216,7 @@ def build_mesh(
     reflectance: np.ndarray,
     options: MeshOptions | None = None,
     gloss: SpecularFit | None = None,
+    camera: Camera | None = None,
 ) -> MeshResult:
     """Build the mesh of the pixels inside the mask.
 
@@ -221,6 +232,8 @@ def build_mesh(
     options : MeshOptions, optional
     gloss : optional
         Gloss of the surface; where unknown, the default roughness and no gloss.
+    camera : Camera, optional
+        Of the maps; orthographic by default.
 
     Returns
     -------
@@ -236,15 +249,20 @@ def build_mesh(
     stride, cells = _grid_cells(mask, options.max_faces)
     limited = limit_rim(height, mask, options.rim)
     rows, columns = (np.arange(0, n, stride) for n in mask.shape)
-    smooth = _vertex_normals(normal, mask, stride)
+    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
+    smooth = _vertex_normals(normal, mask, stride, view)
     used, faces = _triangles(cells, (len(rows), len(columns)))
     row, column = (axis.reshape(-1)[used] for axis in np.meshgrid(rows, columns, indexing="ij"))
-    pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
+    if camera is None:
+        pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
+    else:
+        points = lifted_points(limited, camera, object_axis(camera, mask))[row, column]
+        pixels = points * (camera.focal_length / -points[:, 2].mean())
     middle = (pixels.min(0) + pixels.max(0)) / 2
     size = options.metres_per_pixel or options.longest_side / max(
         np.ptp(np.argwhere(mask), axis=0) + 1
     )
-    detail = _detail_normals(normal, mask, smooth, cells, stride)
+    detail = _detail_normals(normal, mask, smooth, cells, stride, view)
     color, k = base_color(reflectance, mask, options.bleed)
     mesh = TexturedMesh(
         (pixels - middle) * size,
@@ -253,6 +271,8 @@ def build_mesh(
         np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
     )
     origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
+    if camera is not None:
+        origin = _seen_origin(middle, camera)
     return MeshResult(
         mesh,
         k,
@@ -264,7 +284,18 @@ def build_mesh(
         detail,
         options,
         gloss,
+        camera,
+        None if camera is None else -middle * size,
     )
+
+
+def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:
+    """Column and row at which a place before the camera is seen, and its height before the focal
+    plane; in pixels.
+    """
+    (x, y), focal = camera.principal_point, camera.focal_length
+    right, up = middle[:2] * (focal / -middle[2])
+    return float(x - 0.5 + right), float(y - 0.5 - up), float(focal + middle[2])
 
 
 def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
@@ -402,29 +433,41 @@ def _triangles(cells: np.ndarray, grid: tuple[int, int]) -> tuple[np.ndarray, np
     return used, faces.reshape(-1, 3)
 
 
-def _vertex_normals(normal: np.ndarray, mask: np.ndarray, stride: int) -> np.ndarray:
+def _vertex_normals(
+    normal: np.ndarray, mask: np.ndarray, stride: int, view: np.ndarray
+) -> np.ndarray:
     """Unit normals, (rows, columns, 3) float32, at the grid's vertices: the mean over one cell's
     size around each.
     """
     sums = np.where(mask[..., None], normal, 0).astype(np.float32)
     if stride > 1:
         sums = ndimage.uniform_filter(sums, (stride, stride, 1), mode="constant")
-    return _facing(sums[::stride, ::stride])
+    return _facing(sums[::stride, ::stride], view if view.ndim == 1 else view[::stride, ::stride])
 
 
-def _facing(vectors: np.ndarray) -> np.ndarray:
-    """Unit vectors that face the viewer; (0, 0, 1) for zero vectors."""
-    vectors = vectors.copy()
+def _facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """Unit vectors that face the viewer; the view itself for zero vectors.
+
+    `view` is (0, 0, 1), or the direction (..., 3) of each.
+    """
+    vectors, view = vectors.copy(), view.astype(vectors.dtype)
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    vectors = np.where(
-        length > 0, vectors / np.where(length > 0, length, 1), np.array([0, 0, 1], vectors.dtype)
-    )
-    vectors[..., 2] = np.maximum(vectors[..., 2], _MIN_NORMAL_Z)
+    vectors = np.where(length > 0, vectors / np.where(length > 0, length, 1), view)
+    if view.ndim == 1:
+        vectors[..., 2] = np.maximum(vectors[..., 2], _LEAST_FACING)
+    else:
+        facing = (vectors * view).sum(axis=-1, keepdims=True)
+        vectors += np.maximum(_LEAST_FACING - facing, 0) * view
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def _detail_normals(
-    normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells: np.ndarray, stride: int
+    normal: np.ndarray,
+    mask: np.ndarray,
+    smooth: np.ndarray,
+    cells: np.ndarray,
+    stride: int,
+    view: np.ndarray,
 ) -> np.ndarray:
     """The normals of the tangent-space map, (H, W, 3): each pixel's normal relative to the
     interpolated vertex normal.
@@ -439,8 +482,11 @@ def _detail_normals(
     covered = np.pad(
         covered, [(0, max(0, n - m)) for n, m in zip(mask.shape, covered.shape, strict=True)]
     )[: mask.shape[0], : mask.shape[1]]
-    base = _facing(_interpolated(smooth, mask.shape, stride))
-    tangent = np.stack([base[..., 2], np.zeros_like(base[..., 0]), -base[..., 0]], -1)
+    base = _facing(_interpolated(smooth, mask.shape, stride), view)
+    if view.ndim == 1:
+        tangent = np.stack([base[..., 2], np.zeros_like(base[..., 0]), -base[..., 0]], -1)
+    else:  # on the surface, and in the plane of the pixel's row through the camera
+        tangent = np.cross(base, np.cross((1.0, 0.0, 0.0), view)).astype(base.dtype)
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     bitangent = np.cross(base, tangent)
     local = np.stack(

@@ -7,16 +7,18 @@ brightest light moved to l; key and fill have the mean colour of the recovered l
 the other side than that light. Where a lobe predicts more light than the specular layer has, it is
 scaled down to it.
 
-Limits: everything is drawn from maps of a panel's size; no cast shadows, no interreflection. The
-back of the object is not known. Without a fitted lobe there are no highlights.
+Limits: everything is drawn from maps of a panel's size, from far away; no cast shadows, no
+interreflection. The back of the object is not known. Without a fitted lobe there are no highlights.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
 
 from ..imaging.luminance import luminance
+from ..photo.camera import Camera
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit
 from ..shading.brdf.ggx import F0
@@ -55,7 +57,7 @@ def turned_panels(
         Two; empty ones for an object too thin for a mesh.
     """
     names = ("From the left", "From the right")
-    mesh = _coarse_mesh(frame, small)
+    mesh = _coarse_mesh(frame, small, d.camera)
     if mesh is None:
         empty = np.zeros((SIDE, SIDE))
         return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
@@ -74,7 +76,9 @@ def turned_panels(
     return panels
 
 
-def _coarse_mesh(frame: Frame, small: Mapping[str, np.ndarray]) -> TexturedMesh | None:
+def _coarse_mesh(
+    frame: Frame, small: Mapping[str, np.ndarray], camera: Camera | None
+) -> TexturedMesh | None:
     """The mesh of a panel's maps in the panel's pixels, a vertex every `_STEP` pixels; None for an
     object too thin for it.
     """
@@ -91,7 +95,16 @@ def _coarse_mesh(frame: Frame, small: Mapping[str, np.ndarray]) -> TexturedMesh 
     )
     options = MeshOptions(metres_per_pixel=float(_STEP), max_faces=2 * inside.size, bleed=0)
     height = height[..., 0] * (frame.zoom / _STEP)
-    return build_mesh(height, unit_normals(normal), inside, np.ones_like(normal), options).mesh
+    if camera is not None:
+        x, y = frame.place(*camera.principal_point)
+        camera = replace(
+            camera,
+            focal_length=camera.focal_length * frame.zoom / _STEP,
+            principal_point=(x / _STEP, y / _STEP),
+        )
+    white = np.ones_like(normal)
+    built = build_mesh(height, unit_normals(normal), inside, white, options, camera=camera)
+    return built.mesh
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:

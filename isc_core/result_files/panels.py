@@ -99,6 +99,34 @@ class Frame:
             0,
         )
 
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """Return where a place of the map is in the panel.
+
+        Parameters
+        ----------
+        x, y : float
+            Pixels from the map's left and upper edge.
+
+        Returns
+        -------
+        tuple of float
+            x and y in the panel.
+        """
+        top, left, height, width = self._window
+        first_row, end_row, first_column, end_column = self.box
+        across, down = width / (end_column - first_column + 2), height / (end_row - first_row + 2)
+        return left + across * (x - first_column + 1), top + down * (y - first_row + 1)
+
+    @cached_property
+    def _window(self) -> tuple[int, int, int, int]:
+        """Top, left, height and width in the panel of the box with a border of one pixel."""
+        first_row, end_row, first_column, end_column = self.box
+        height, width = (
+            min(SIDE, max(1, round(self.zoom * (n + 2))))
+            for n in (end_row - first_row, end_column - first_column)
+        )
+        return (SIDE - height) // 2, (SIDE - width) // 2, height, width
+
     @cached_property
     def _weight(self) -> np.ndarray:
         return self._resized(self.mask)
@@ -107,9 +135,8 @@ class Frame:
         first_row, end_row, first_column, end_column = self.box
         # An empty border, so that the object's outline is soft all around.
         window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
-        height, width = (min(SIDE, max(1, round(self.zoom * n))) for n in window.shape)
+        top, left, height, width = self._window
         panel = np.zeros((SIDE, SIDE), np.float32)
-        top, left = (SIDE - height) // 2, (SIDE - width) // 2
         panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
             (width, height), Image.Resampling.BILINEAR
         )

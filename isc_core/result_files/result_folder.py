@@ -26,15 +26,16 @@ from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
-from ..lobe_fitting.specular_upper_bound import bounded_specular
+from ..photo.camera import Camera
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
-from .arrays_file import ARRAYS, write_arrays
+from .arrays_file import ARRAYS, mesh_of, write_arrays
+from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
-from .mesh import MeshOptions, MeshResult, build_mesh
+from .mesh import MeshOptions, MeshResult
 
 SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
 LAYERS = {
@@ -119,7 +120,7 @@ def save(
             write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
         monitor.report("building the mesh", 0.4)
         d = decomposition
-        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, bounded_specular(d))
+        built = mesh_of(d, mesh)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
@@ -174,6 +175,7 @@ def load(folder: Path | str) -> Decomposition:
         provenance=_provenance(description, folder),
         brdf=_brdf(description, channels, folder),
         expected_error=_expected_error(channels, folder / "maps.exr"),
+        camera=_camera(description, folder),
     )
 
 
@@ -269,6 +271,7 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "illumination": {"coefficients": d.illumination, "convention": convention},
+        "camera": camera_to_json(d),
         "brdf": None if d.brdf is None else d.brdf.to_json(),
         "mesh": {
             **built.describe(),
@@ -362,6 +365,16 @@ def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
             f"{folder / 'decomposition.json'} has no illumination of 9 x 3 numbers: it is damaged"
         )
     return light
+
+
+def _camera(description: Mapping[str, Any], folder: Path) -> Camera | None:
+    """The camera; None for an orthographic view, as in results of earlier versions."""
+    try:
+        return camera_from_json(description.get("camera"))
+    except ValueError as error:
+        raise InputError(
+            f"{folder / 'decomposition.json'} has no usable camera: it is damaged ({error})"
+        ) from error
 
 
 def _brdf(

@@ -10,6 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from ..photo.camera import Camera
+from ..shading.lights import VIEW
+from ..shading.perspective import object_axis, view_directions
 from ..shading.spherical_harmonics import real_sh
 from .diagnostics import Diagnostics
 from .expected_error import ExpectedError
@@ -111,7 +114,8 @@ class Decomposition:
     normal : (H, W, 3) ndarray of float32
         Unit vectors, camera frame: x right, y up, z toward the viewer; (0, 0, 1) outside the mask.
     height : (H, W) ndarray of float32
-        Pixels toward the viewer; 0 outside the mask.
+        Pixels toward the viewer; 0 outside the mask. Before a camera: along the axis toward the
+        object, see `shading.perspective`.
     mask : (H, W) ndarray of bool
         The object.
     confidence : (H, W) ndarray
@@ -124,6 +128,8 @@ class Decomposition:
         Lobe fitted to the specular layer; None where no fit was tried.
     expected_error : ExpectedError or None
         How wrong normals and reflectance probably are; None where it is not known.
+    camera : Camera or None
+        Pinhole camera of the maps; None for an orthographic view.
     """
 
     image: np.ndarray
@@ -140,6 +146,24 @@ class Decomposition:
     provenance: Provenance
     brdf: LobeFit | None = None
     expected_error: ExpectedError | None = None
+    camera: Camera | None = None
+
+    @property
+    def view(self) -> np.ndarray:
+        """Unit vectors toward the viewer, camera frame: (3,), or (H, W, 3) before a camera."""
+        if self.camera is None:
+            return VIEW
+        return view_directions(self.camera, (self.mask.shape[0], self.mask.shape[1]))
+
+    @property
+    def viewer(self) -> np.ndarray:
+        """Unit vector (3,) from the middle of the object toward the viewer, camera frame."""
+        return VIEW if self.camera is None else -object_axis(self.camera, self.mask)
+
+    @property
+    def view_inside(self) -> np.ndarray:
+        """`view` of the mask's N pixels: (3,) or (N, 3)."""
+        return self.view if self.camera is None else self.view[self.mask]
 
     def identity_errors(self) -> IdentityErrors:
         """Measure how well the maps satisfy the identities inside the mask.

@@ -30,6 +30,8 @@ visible normal, is a guess; the object's own shadows come on top.
 
 import numpy as np
 
+from .lights import VIEW
+from .perspective import rotation_between
 from .spherical_harmonics import real_sh
 
 # Normals at a time: their kernel is a matrix with a column for every pixel of the environment.
@@ -99,7 +101,10 @@ def shading_under(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def environment_from_shading(
-    illumination: np.ndarray, rows: int = 32, iterations: int = 100
+    illumination: np.ndarray,
+    rows: int = 32,
+    iterations: int = 100,
+    viewer: np.ndarray | None = None,
 ) -> np.ndarray:
     """Find an environment in which Lambertian surfaces look as in a recovered light.
 
@@ -110,6 +115,8 @@ def environment_from_shading(
     rows : int
     iterations : int
         Of Richardson-Lucy.
+    viewer : (3,) ndarray, optional
+        Unit vector from the object toward the viewer, camera frame; z by default.
 
     Returns
     -------
@@ -117,6 +124,8 @@ def environment_from_shading(
         Linear radiance, >= 0.
     """
     normals = _facing_normals(24)
+    if viewer is not None and not np.array_equal(viewer, VIEW):
+        normals = np.einsum("ij,nj->ni", rotation_between(VIEW, viewer), normals)
     kernel = _kernel(normals, rows)
     wanted = np.exp(real_sh(normals) @ illumination)
     reach = kernel.sum(0)[:, None]

@@ -1,13 +1,15 @@
 """A specular lobe, and its radiance toward the viewer under a light or an environment map.
 
-Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E, with the viewer along z. It
+Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E. With the viewer along z it
 depends on the normal alone, so under an environment map of many samples it is evaluated on a table
-of normals in the stereographic plane (x, y) / (1 + z) and interpolated there.
+of normals in the stereographic plane (x, y) / (1 + z) and interpolated there. For other views, the
+normal is looked up that mirrors the same light to a viewer along z.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
 doi:10.2312/EGWR/EGSR07/195-206 (see `brdf`).
 
-Limits: no cast shadows, no interreflection.
+Limits: no cast shadows, no interreflection. In an environment the lobe's width and Fresnel's factor
+are those of the view along z.
 """
 
 from dataclasses import dataclass
@@ -21,6 +23,7 @@ from .brdf.model import Model, check_range
 from .brdf.roughness import exponent_from_alpha, fitted_exponent
 from .environment_map import directions, solid_angles
 from .lights import VIEW, DirectionalLight
+from .perspective import far_view_normals
 from .radiance import DistantLights, directional, radiance
 
 DEFAULT_EXPONENT = 60.0
@@ -72,7 +75,9 @@ class Lobe:
         return max(float(rule(self.alpha)), 1.0)
 
 
-def lobe_under(lobe: Lobe, normal: np.ndarray, light: DirectionalLight) -> np.ndarray:
+def lobe_under(
+    lobe: Lobe, normal: np.ndarray, light: DirectionalLight, view: np.ndarray = VIEW
+) -> np.ndarray:
     """Compute the radiance of the lobe toward the viewer under one light, without its ambient part.
 
     Parameters
@@ -81,15 +86,19 @@ def lobe_under(lobe: Lobe, normal: np.ndarray, light: DirectionalLight) -> np.nd
     normal : (..., 3) ndarray
         Unit normals, camera frame.
     light : DirectionalLight
+    view : (3,) or (..., 3) ndarray, optional
+        Unit vectors toward the viewer.
 
     Returns
     -------
     (..., 3) ndarray
     """
-    return radiance(lobe.model, _unit(normal), VIEW, directional(light.direction, light.irradiance))
+    return radiance(lobe.model, _unit(normal), view, directional(light.direction, light.irradiance))
 
 
-def lobe_in_environment(lobe: Lobe, normal: np.ndarray, environment: np.ndarray) -> np.ndarray:
+def lobe_in_environment(
+    lobe: Lobe, normal: np.ndarray, environment: np.ndarray, view: np.ndarray = VIEW
+) -> np.ndarray:
     """Compute the radiance of the lobe toward the viewer in an environment.
 
     Parameters
@@ -99,6 +108,8 @@ def lobe_in_environment(lobe: Lobe, normal: np.ndarray, environment: np.ndarray)
         Unit normals, camera frame.
     environment : (rows, 2 rows, 3) ndarray
         Linear radiance, see `environment_map`.
+    view : (3,) or (N, 3) ndarray, optional
+        Unit vectors toward the viewer.
 
     Returns
     -------
@@ -122,6 +133,8 @@ def lobe_in_environment(lobe: Lobe, normal: np.ndarray, environment: np.ndarray)
     )
     table_normals[_TABLE // 2, _TABLE // 2] = VIEW
     table = radiance(lobe.model, _unit(table_normals), VIEW, lights)
+    if view.ndim > 1:
+        normal = far_view_normals(normal, view)
     places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
     return np.stack(
         [

@@ -318,7 +318,16 @@ def test_the_job_reaches_the_command_line(
     monkeypatch.chdir(tmp_path)
     environment = fake_core("say('done', output='', lines=words)")
     asked = DecomposeJob(
-        Path("-a.png"), Path("out"), Path("m.png"), "mdr", "isc", "laboratory", 300, 2, "linear"
+        photo=Path("-a.png"),
+        output=Path("out"),
+        mask=Path("m.png"),
+        model="mdr",
+        separator="isc",
+        illumination="laboratory",
+        max_size=300,
+        threads=2,
+        transfer="linear",
+        camera="28",
     )
     *words, last = ended(start_decompose(asked, environment)).message.split("\n")
     assert last == "--cancel-at-eof"
@@ -332,6 +341,7 @@ def test_the_job_reaches_the_command_line(
         "--max-size": "300",
         "--threads": "2",
         "--transfer": "linear",
+        "--camera": "28",
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }

@@ -10,7 +10,7 @@ from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError, Rejected
 from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
-from ...result_files.diagnostics_text import note_lines
+from ...result_files.diagnostics_text import CROPPED, note_lines
 from ...result_files.known_inputs import read_height, read_light
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
@@ -179,6 +179,7 @@ def _decompose_one(
         options,
         *reading_note_lines(photo.original.notes),
         *note_lines(result.provenance.diagnostics),
+        *((f"note: {CROPPED}",) if photo.original.cropped and settings.camera == "auto" else ()),
         *(show(preview) if options.open else ()),
         f"see {preview}",
     )

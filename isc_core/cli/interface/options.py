@@ -213,6 +213,13 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         "(default %(default)s)",
     )
     group.add_argument(
+        "--camera",
+        default=defaults.camera,
+        metavar="NAME|MM",
+        help="auto (the focal length of the photo's EXIF, orthographic without), orthographic, or "
+        "a focal length in mm, 35-mm equivalent by the diagonal (default %(default)s)",
+    )
+    group.add_argument(
         "--shading-only", action="store_true", help="shape from shading: the object has one colour"
     )
     group.add_argument(

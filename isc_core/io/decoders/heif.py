@@ -20,6 +20,7 @@ from ..reading_notes import ReadingNote
 from .colour.cicp import space_of_code_points
 from .colour.icc import space_of_profile
 from .colour.space import ColourSpace
+from .exif import with_focal_length
 from .gain_map import gain_map_notes
 from .raster import Raster, check_size, raster_of_codes
 
@@ -61,7 +62,8 @@ def read_heif(data: bytes, path: Path, limits: Limits) -> Raster:
         space=space,
         notes=(*notes, *gain_map_notes(data)),
     )
-    return replace(raster, bit_depth=bits)
+    raster = replace(raster, bit_depth=bits)
+    return with_focal_length(raster, image.info["exif"]) if image.info.get("exif") else raster
 
 
 def _library(path: Path) -> ModuleType:

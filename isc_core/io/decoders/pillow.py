@@ -11,6 +11,7 @@ from ..limits import Limits
 from ..reading_notes import ReadingNote
 from .colour.icc import space_of_profile
 from .colour.space import ColourSpace
+from .exif import with_focal_length
 from .raster import Raster, check_size, raster_of_codes
 
 _ORIENTATION_TAG = 0x0112
@@ -90,7 +91,8 @@ def decode_pillow(
             space, more = space_of_profile(image.info["icc_profile"], 1 if mode == "L" else 3)
             notes = (*notes, *more)
         codes = np.asarray(image.convert(mode))
-        return raster_of_codes(codes, 255, orientation, space=space, notes=notes)
+        raster = raster_of_codes(codes, 255, orientation, space=space, notes=notes)
+        return with_focal_length(raster, image)
     raise InputError(
         f"{path}: pixels of kind {image.mode} are not supported: convert it to an 8- or 16-bit "
         "PNG or an EXR"

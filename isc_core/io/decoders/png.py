@@ -11,6 +11,7 @@ from PIL import PngImagePlugin
 
 from ..limits import Limits
 from .colour.png_chunks import COLOUR_CHUNKS, profile_chunk, space_of_chunks
+from .exif import with_focal_length
 from .opencv import decode_opencv
 from .pillow import decode_pillow, exif_orientation
 from .raster import Raster, as_rgb, check_size, raster_of_codes
@@ -51,7 +52,8 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     space, notes = space_of_chunks(chunks, 1 if kind in _GREY else 3, path)
     if bits == 16:
         codes, orientation = decode_opencv(plain), exif_orientation(image)
-        return raster_of_codes(codes, 65535, orientation, space=space, notes=notes)
+        raster = raster_of_codes(codes, 65535, orientation, space=space, notes=notes)
+        return with_focal_length(raster, image)
     return decode_pillow(image, path, limits, space=space, notes=notes)
 
 

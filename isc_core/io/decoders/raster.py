@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
+from ..focal_length import FocalLength
 from ..limits import Limits
 from ..reading_notes import ReadingNote
 from .colour.space import ColourSpace
@@ -36,6 +37,8 @@ class Raster:
         Where a sensor was saturated; None where the largest code says it.
     notes : tuple of ReadingNote
         What was assumed or left out.
+    focal_length : FocalLength or None
+        Where the metadata give it.
     """
 
     values: np.ndarray
@@ -46,6 +49,7 @@ class Raster:
     space: ColourSpace | None = None
     saturated: np.ndarray | None = None
     notes: tuple[ReadingNote, ...] = ()
+    focal_length: FocalLength | None = None
 
     @property
     def transparency(self) -> np.ndarray | None:

@@ -28,6 +28,7 @@ from ...extras import install_command
 from ..limits import Limits
 from ..reading_notes import ReadingNote, ReadingNoteKind
 from .colour.space import LINEAR, ColourSpace
+from .exif import with_focal_length
 from .raster import Raster, check_size, raster_of_codes
 
 CAMERA_RAW = "camera raw"
@@ -122,7 +123,8 @@ def read_raw(data: bytes, path: Path, limits: Limits) -> Raster:
     raster = raster_of_codes(codes, 65535, space=ColourSpace(CAMERA_RAW, (LINEAR,)), notes=notes)
     peak = (codes == 65535).any(axis=2)
     fits = saturated is not None and saturated.shape == peak.shape
-    return replace(raster, bit_depth=min(bits, 16), saturated=peak | saturated if fits else peak)
+    saturated = peak | saturated if fits else peak
+    return with_focal_length(replace(raster, bit_depth=min(bits, 16), saturated=saturated), data)
 
 
 def _library(path: Path) -> ModuleType:

@@ -9,6 +9,7 @@ from PIL import TiffImagePlugin
 from ...errors import InputError
 from ..limits import Limits
 from .colour.icc import space_of_profile
+from .exif import with_focal_length
 from .opencv import decode_opencv
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
@@ -75,4 +76,5 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         if _PROFILE in tags
         else (None, ())
     )
-    return raster_of_codes(pixels, 65535, premultiplied=extra == 1, space=space, notes=notes)
+    raster = raster_of_codes(pixels, 65535, premultiplied=extra == 1, space=space, notes=notes)
+    return with_focal_length(raster, data)

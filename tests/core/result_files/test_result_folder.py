@@ -42,6 +42,7 @@ CHANNELS += ["normal.X", "normal.Y", "normal.Z", "height.Z", "mask.A", "confiden
 KEYS = (
     "schema_version",
     "illumination",
+    "camera",
     "brdf",
     "settings",
     "seed",
