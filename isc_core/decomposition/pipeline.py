@@ -190,7 +190,7 @@ def assemble(
         light,
         provenance,
         brdf,
-        camera,
+        camera=camera,
     )
 
 
