@@ -4,8 +4,8 @@ Problem: what stands behind a thing in a photo is a room, a street or a wood, a 
 before one of them, or a wall and a cloth of one colour.
 
 Equation: a crop is the perspective picture of a camera in the panorama's middle: pixel (x, y) sees
-along R (x tan(f / 2), y tan(f / 2), -1) for a field of view f and a turn R. A table is a plane below
-the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h).
+along R (x tan(f / 2), y tan(f / 2), -1) for a field of view f and a turn R. A table is a plane
+below the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h).
 
 Limits: panoramas of 512 columns are soft in narrow crops.
 """

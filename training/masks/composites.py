@@ -4,9 +4,9 @@ Problem: a photo shows one thing, none or several; some are in its background or
 Without a hint the thing meant is the one in front; with points or a box it is what they mark.
 
 Equation: from the back to the front, light I <- (1 - a) I (1 - s) + a B for each body B of cover a
-and the shadow s that it casts: its cover sheared onto the ground, I(x + h k_x, b + h k_y) for height
-h over its lowest row b, and blurred; and its cover, moved by a few pixels and blurred, where it
-touches. Then exposure, white balance, and the camera of `training.world.camera`.
+and the shadow s that it casts: its cover sheared onto the ground, to (x + h k_x, b + h k_y) for the
+height h over its lowest row b, and blurred; and its cover, moved by a few pixels and blurred, where
+it touches. Then exposure, white balance, and the camera of `training.world.camera`.
 
 Limits: bodies are not lit by their background; shadows are those of flat cut-outs.
 """
@@ -17,15 +17,15 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from isc_core.networks.mask_network import POINT
+
 from ..world.camera import decoded_srgb, draw_camera, exposed, photographed
 from ..world.random_draws import log_uniform
 from ..world.tensor_batch import TensorBatch
 from .ingredients import LENGTH, SIDE, Ingredients
 from .scenes import MEANT, Scene, Thing, draw_scene
 
-POINT = 2.5  # pixels: radius of a point's disc
 _VISIBLE = 40  # pixels of a thing that a hint may mean
-_SHADOW_BLUR = 4
 
 
 @dataclass(frozen=True)

@@ -26,8 +26,8 @@ from isc_core.io.npy import read_arrays
 from isc_core.networks import scene_network
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
-from ..masks.composites import SIDE, Composites
-from ..masks.ingredients import Ingredients
+from ..masks.composites import Composites
+from ..masks.ingredients import SIDE, Ingredients
 from .mask_module import MaskNetworkModule
 
 _SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
