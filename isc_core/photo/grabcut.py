@@ -16,6 +16,7 @@ mask. Large boxes are solved at one megapixel and the border is interpolated.
 """
 
 import os
+from enum import IntEnum
 from pathlib import Path
 
 import cv2
@@ -60,7 +61,7 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
         no object.
     """
     height, width = image.shape[:2]
-    _check_box(box, width, height)
+    check_box(box, width, height)
     x, y, w, h = box
     left, top, right, bottom = (
         max(x - w // 2, 0),
@@ -82,7 +83,16 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
     return mask
 
 
-def _check_box(box: Box, width: int, height: int) -> None:
+def check_box(box: Box, width: int, height: int) -> None:
+    """Raise `InputError` for a box that is thin, leaves the image, or covers all of it.
+
+    Parameters
+    ----------
+    box : tuple of int
+        (x, y, width, height).
+    width, height : int
+        Of the image.
+    """
     x, y, w, h = box
     name = f"--box {x},{y},{w},{h}"
     if w < MIN_SIDE or h < MIN_SIDE:
@@ -123,6 +133,63 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     )
     probability = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
     return cv2.resize(probability, (width, height), interpolation=cv2.INTER_LINEAR)
+
+
+class Label(IntEnum):
+    """What is known of a pixel."""
+
+    BACKGROUND = cv2.GC_BGD
+    OBJECT = cv2.GC_FGD
+    PROBABLY_BACKGROUND = cv2.GC_PR_BGD
+    PROBABLY_OBJECT = cv2.GC_PR_FGD
+
+
+def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndarray:
+    """Segment an image of which some pixels are known.
+
+    Parameters
+    ----------
+    coded : (H, W, 3) uint8 ndarray
+        RGB.
+    labels : (H, W) uint8 ndarray
+        Of `Label`; some of the object and some of the background.
+    iterations : int
+
+    Returns
+    -------
+    (H, W) bool ndarray
+    """
+    cv2.setRNGSeed(_SEED)
+    found = cv2.grabCut(
+        np.ascontiguousarray(coded[..., ::-1]),
+        labels.copy(),
+        None,
+        np.zeros((1, 65)),
+        np.zeros((1, 65)),
+        iterations,
+        cv2.GC_INIT_WITH_MASK,
+    )[0]
+    return (found == Label.OBJECT) | (found == Label.PROBABLY_OBJECT)
+
+
+def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Change the size of an image: averages of areas, or linear interpolation if it grows.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) float32 ndarray
+    width, height : int
+        New size.
+
+    Returns
+    -------
+    (height, width) or (height, width, C) float32 ndarray
+    """
+    if values.shape[:2] == (height, width):
+        return values
+    grows = width > values.shape[1] or height > values.shape[0]
+    how = cv2.INTER_LINEAR if grows else cv2.INTER_AREA
+    return np.asarray(cv2.resize(np.ascontiguousarray(values), (width, height), interpolation=how))
 
 
 def write_mask(path: str | Path, mask: np.ndarray) -> None:

@@ -23,8 +23,10 @@ from ..world.camera import decoded_srgb, draw_camera, exposed, photographed
 from ..world.random_draws import log_uniform
 from ..world.tensor_batch import TensorBatch
 from .ingredients import LENGTH, SIDE, Ingredients
-from .scenes import MEANT, Scene, Thing, draw_scene
+from .scenes import MEANT, SHARES, Scene, Thing, draw_scene
 
+_HALVED = (0.62, 0.31)  # bodies smaller than that are taken from pictures of half the size
+_COARSE = 2  # pixels of a pixel of shadow
 _VISIBLE = 40  # pixels of a thing that a hint may mean
 
 
@@ -62,18 +64,27 @@ class Composites:
     size : int
         Photos of a batch.
     side : int
-        Of the photos, pixels: at most `SIDE`, a multiple of 32.
+        Of the photos, pixels: a multiple of 32.
     hinted : float
         Share of photos with hints.
+    shares : tuple of float
+        Of scenes without a thing, with one, with several.
     """
 
     def __init__(
-        self, ingredients: Ingredients, size: int, side: int = SIDE, hinted: float = 0.5
+        self,
+        ingredients: Ingredients,
+        size: int,
+        side: int = SIDE,
+        hinted: float = 0.5,
+        shares: tuple[float, ...] = SHARES,
     ) -> None:
-        self._bodies = torch.from_numpy(ingredients.bodies)
+        self._bodies = [torch.from_numpy(ingredients.bodies)]
+        for _ in _HALVED:
+            self._bodies.append(_halved(self._bodies[-1]))
         self._backgrounds = torch.from_numpy(ingredients.backgrounds)
         self._linear = decoded_srgb(torch.arange(256) / 255)
-        self._size, self._side, self._hinted = size, side, hinted
+        self._size, self._side, self._hinted, self._shares = size, side, hinted, shares
 
     def __call__(self, rng: np.random.Generator) -> Composite:
         """Draw a batch.
@@ -86,7 +97,7 @@ class Composites:
         -------
         Composite
         """
-        scenes = [draw_scene(rng, len(self._bodies)) for _ in range(self._size)]
+        scenes = [draw_scene(rng, len(self._bodies[0]), self._shares) for _ in range(self._size)]
         frame = frames(np.array([one.shape for one in scenes]), self._side)
         light = self._grounds(scenes, rng)
         most = max(len(one.things) for one in scenes)
@@ -118,15 +129,19 @@ class Composites:
 
     def _placed(self, things: list[Thing]) -> tuple[torch.Tensor, torch.Tensor]:
         """Light and cover of bodies where they are."""
-        coded = self._bodies[torch.tensor([one.body for one in things])]
-        cover = coded[:, 3:].float() / 255
-        layers = torch.cat([self._linear[coded[:, :3].long()] * cover, cover], dim=1)
-        length = torch.tensor([one.length for one in things]).float() * (self._side / SIDE)
-        layers = _smaller(layers, length / LENGTH)
+        enlarged = self._side / self._bodies[0].shape[-1]
+        factors = [one.length / LENGTH * enlarged for one in things]
+        levels = np.array([sum(factor < limit for limit in _HALVED) for factor in factors])
+        found = torch.zeros(len(things), 4, self._side, self._side)
         theta = torch.from_numpy(np.stack([_inverse(one) for one in things])).float()
-        size = [len(things), 4, self._side, self._side]
-        grid = functional.affine_grid(theta, size, align_corners=False)
-        found = functional.grid_sample(layers, grid, align_corners=False)
+        for level in np.unique(levels):
+            rows = np.flatnonzero(levels == level)
+            coded = self._bodies[level][torch.tensor([things[k].body for k in rows])]
+            cover = coded[:, 3:].float() / 255
+            layers = torch.cat([self._linear[coded[:, :3].long()] * cover, cover], dim=1)
+            size = [len(rows), 4, self._side, self._side]
+            grid = functional.affine_grid(theta[rows], size, align_corners=False)
+            found[rows] = functional.grid_sample(layers, grid, align_corners=False)
         cover = found[:, 3:]
         gain = torch.from_numpy(np.stack([one.gain for one in things])).float()[..., None, None]
         mean = found[:, :3].mean((1, 2, 3)) / cover.mean((1, 2, 3)).clamp(min=1e-4)
@@ -258,18 +273,12 @@ def _inverse(thing: Thing) -> np.ndarray:
     return np.concatenate([scale * turn, -scale * turn @ thing.place[:, None]], axis=1)
 
 
-def _smaller(layers: torch.Tensor, factor: torch.Tensor) -> torch.Tensor:
-    """Average before bodies are made smaller."""
-    found = layers
-    for step, limit in ((2, 0.62), (4, 0.31)):
-        rows = torch.nonzero(factor < limit)[:, 0]
-        if len(rows):
-            coarse = functional.avg_pool2d(layers[rows], step)
-            found = found.clone() if found is layers else found
-            found[rows] = functional.interpolate(
-                coarse, size=layers.shape[2:], mode="bilinear", align_corners=False
-            )
-    return found
+def _halved(bodies: torch.Tensor) -> torch.Tensor:
+    """Bodies (N, 4, s, s) of 8 bits, half as large."""
+    cover = bodies[:, 3:].float()
+    colours = functional.avg_pool2d(bodies[:, :3].float() * cover, 2)
+    cover = functional.avg_pool2d(cover, 2)
+    return torch.cat([colours / cover.clamp(min=1), cover], dim=1).round().byte()
 
 
 def pasted(
@@ -294,7 +303,8 @@ def pasted(
 
 
 def _shadow(cover: torch.Tensor, things: list[Thing]) -> torch.Tensor:
-    side = cover.shape[-1]
+    full, cover = cover.shape[-1], functional.avg_pool2d(cover, _COARSE)
+    side = full // _COARSE
     across = (torch.arange(side) + 0.5) * (2 / side) - 1
     low = torch.where(cover.amax(3)[:, 0] > 0.5, across, -9.0).amax(1)
     theta = torch.zeros(2, len(things), 2, 3)
@@ -312,12 +322,13 @@ def _shadow(cover: torch.Tensor, things: list[Thing]) -> torch.Tensor:
     maps = functional.grid_sample(cover.repeat(2, 1, 1, 1), grid, align_corners=False)
     maps = _blurred(maps, torch.tensor([one.blur for one in things]).repeat(2))
     strength = torch.tensor([one.strength for one in things]).float().T.reshape(-1, 1, 1, 1)
-    return (maps * strength).view(2, len(things), 1, side, side).amax(0)
+    shadow = (maps * strength).view(2, len(things), 1, side, side).amax(0)
+    return functional.interpolate(shadow, (full, full), mode="bilinear", align_corners=False)
 
 
 def _blurred(maps: torch.Tensor, steps: torch.Tensor) -> torch.Tensor:
-    """Maps after 0 to 3 box filters of 3, 5 and 9 pixels."""
-    for k, width in enumerate((3, 5, 9)):
+    """Maps after 0 to 3 box filters of 3, 3 and 5 pixels."""
+    for k, width in enumerate((3, 3, 5)):
         rows = torch.nonzero(steps > k)[:, 0]
         if len(rows):
             maps = maps.clone()

@@ -79,7 +79,12 @@ class Ingredients:
 
 
 def lit_bodies(
-    world: World, split: Split, environments: np.ndarray, rounds: int, rng: np.random.Generator
+    world: World,
+    split: Split,
+    environments: np.ndarray,
+    rounds: int,
+    rng: np.random.Generator,
+    side: int = SIDE,
 ) -> np.ndarray:
     """Light every view and cut the bodies out.
 
@@ -92,10 +97,12 @@ def lit_bodies(
     rounds : int
         How often each view is lit, each time in other light and paint.
     rng : numpy.random.Generator
+    side : int
+        Pixels of a picture.
 
     Returns
     -------
-    (N, 4, SIDE, SIDE) uint8 ndarray
+    (N, 4, side, side) uint8 ndarray
         As `Ingredients.bodies`.
     """
     views, shares, found = world.views[split], Shares(), list[np.ndarray]()
@@ -110,11 +117,11 @@ def lit_bodies(
             )
             lit = make_pictures(batch_of(some), recipes, world.bank)
             light = (lit.layers[:, :3] + lit.layers[:, 3:6]).float()
-            found += cut_out(light, lit.cover.float())
+            found += cut_out(light, lit.cover.float(), side)
     return np.stack(found)
 
 
-def cut_out(light: torch.Tensor, cover: torch.Tensor) -> Iterator[np.ndarray]:
+def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Iterator[np.ndarray]:
     """Bring bodies to one size and to 8 bits.
 
     Parameters
@@ -122,10 +129,12 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor) -> Iterator[np.ndarray]:
     light : (B, 3, H, W) tensor
         Linear.
     cover : (B, 1, H, W) tensor
+    side : int
+        Pixels of a picture.
 
     Yields
     ------
-    (4, SIDE, SIDE) uint8 ndarray
+    (4, side, side) uint8 ndarray
         Of those that are not tiny.
     """
     for picture, body in zip(light, cover, strict=True):
@@ -135,11 +144,11 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor) -> Iterator[np.ndarray]:
         white = torch.quantile(picture.amax(0)[body[0] > 0.5], _WHITE).clamp(min=1e-6)
         layers = torch.cat([(picture / white).clamp(max=1) * body, body])
         part = layers[:, rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-        factor = LENGTH / max(part.shape[1:])
+        factor = LENGTH * side / SIDE / max(part.shape[1:])
         size = [max(round(n * factor), 1) for n in part.shape[1:]]
         small = functional.interpolate(part[None], size, mode="bilinear", antialias=True)[0]
-        placed = torch.zeros(4, SIDE, SIDE)
-        top, left = (SIDE - size[0]) // 2, (SIDE - size[1]) // 2
+        placed = torch.zeros(4, side, side)
+        top, left = (side - size[0]) // 2, (side - size[1]) // 2
         placed[:, top : top + size[0], left : left + size[1]] = small
         seen = placed[3:].clamp(min=1e-3)
         colours = torch.where(placed[3:] > 1e-3, placed[:3] / seen, torch.zeros(()))

@@ -15,7 +15,7 @@ from ..world.random_draws import log_uniform
 from .ingredients import SIDE
 
 MEANT = int(Count.ONE)
-_SHARES = (0.17, 0.58, 0.25)  # of scenes without a thing, with one, with several
+SHARES = (0.17, 0.58, 0.25)  # of scenes without a thing, with one, with several
 _HEAPS = 0.35  # of scenes with several
 _SHAPES = ((1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625))
 
@@ -84,7 +84,7 @@ class Scene:
     count: int
 
 
-def draw_scene(rng: np.random.Generator, bodies: int) -> Scene:
+def draw_scene(rng: np.random.Generator, bodies: int, shares: tuple[float, ...] = SHARES) -> Scene:
     """Draw a scene.
 
     Parameters
@@ -92,6 +92,8 @@ def draw_scene(rng: np.random.Generator, bodies: int) -> Scene:
     rng : numpy.random.Generator
     bodies : int
         How many there are to choose from.
+    shares : tuple of float
+        Of scenes without a thing, with one, with several.
 
     Returns
     -------
@@ -100,7 +102,7 @@ def draw_scene(rng: np.random.Generator, bodies: int) -> Scene:
     shape = _SHAPES[int(rng.integers(len(_SHAPES)))]
     short = SIDE * min(shape)
     level = 0.2 * math.exp(rng.normal(0, 0.5))
-    count = int(rng.choice(len(_SHARES), p=_SHARES))
+    count = int(rng.choice(len(shares), p=shares))
     things, meant = list[Thing](), list[int]()
     if count == Count.SEVERAL:
         things = _several(rng, bodies, np.array(shape), short, level)
