@@ -176,6 +176,7 @@ ROOMS = (
     "shading",
     "scene",
     "networks",
+    "masking",
     "inpainting",
     "thresholding",
     "illuminant",

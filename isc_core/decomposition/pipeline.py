@@ -256,4 +256,5 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "transfer": source.transfer,
         "bit_depth": source.bit_depth,
         "mask_from": source.mask_from,
+        **({} if source.sureness is None else {"mask_sureness": round(source.sureness, 4)}),
     }

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..networks.mask_network import POINT, SIDE, MaskNetwork, predict_mask
-from ..photo.grabcut import resized
+from ..photo.masks import resized
 from .hints import Hints
 
 

@@ -18,8 +18,8 @@ from scipy import ndimage
 
 from ..imaging.guided_filter import affine_fit
 from ..imaging.srgb import linear_to_srgb
-from ..photo.grabcut import Label, resized, segmented
-from ..photo.masks import tidy_mask
+from ..photo.grabcut import Label, segmented
+from ..photo.masks import resized, tidy_mask
 
 SIDE = 384
 _SURE = 0.9  # probability from which the network is believed, away from the outline

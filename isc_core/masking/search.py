@@ -11,15 +11,14 @@ Citation: see `networks.mask_network` and `refinement`.
 Limits: measured in docs/methods/automatic_mask.md.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_box
 from ..networks.mask_network import Count, MaskNetwork
-from ..photo.grabcut import Box, resized
-from ..photo.masks import tidy_mask
+from ..photo.found_mask import FoundMask
+from ..photo.grabcut import Box
+from ..photo.masks import resized, tidy_mask
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
 from .refinement import refined
@@ -28,30 +27,6 @@ WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _LEAST_SHARE = 0.1  # of the largest part: smaller ones are not things of their own
 _LEAST = 1e-6
-
-
-@dataclass(frozen=True)
-class FoundMask:
-    """A mask that was found.
-
-    Attributes
-    ----------
-    cover : (H, W) float32 ndarray
-        Share of each pixel that the thing covers.
-    sureness : float
-        Probability that this is the one thing meant, 0 to 1.
-    counts : (3,) ndarray
-        Probabilities of none, one and several things.
-    """
-
-    cover: np.ndarray
-    sureness: float
-    counts: np.ndarray
-
-    @property
-    def mask(self) -> np.ndarray:
-        """The pixels (H, W) that the thing covers by half or more."""
-        return self.cover >= 0.5
 
 
 def find_mask(

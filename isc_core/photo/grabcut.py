@@ -172,33 +172,13 @@ def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndar
     return (found == Label.OBJECT) | (found == Label.PROBABLY_OBJECT)
 
 
-def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Change the size of an image: averages of areas, or linear interpolation if it grows.
-
-    Parameters
-    ----------
-    values : (H, W) or (H, W, C) float32 ndarray
-    width, height : int
-        New size.
-
-    Returns
-    -------
-    (height, width) or (height, width, C) float32 ndarray
-    """
-    if values.shape[:2] == (height, width):
-        return values
-    grows = width > values.shape[1] or height > values.shape[0]
-    how = cv2.INTER_LINEAR if grows else cv2.INTER_AREA
-    return np.asarray(cv2.resize(np.ascontiguousarray(values), (width, height), interpolation=how))
-
-
 def write_mask(path: str | Path, mask: np.ndarray) -> None:
     """Write a mask as an 8-bit grey PNG, 255 inside, completely or not at all.
 
     Parameters
     ----------
     path : str or Path
-    mask : (H, W) bool ndarray
+    mask : (H, W) bool ndarray, or float cover in [0, 1]
 
     Raises
     ------
@@ -206,9 +186,46 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
         If the file cannot be written.
     """
     _require_png(path)
-    data = cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes()
     with new_file(path) as partial:
-        partial.write_bytes(data)
+        partial.write_bytes(encoded_mask(mask))
+
+
+def encoded_mask(mask: np.ndarray) -> bytes:
+    """Return a mask as the bytes of a PNG, see `write_mask`.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray, or float cover in [0, 1]
+
+    Returns
+    -------
+    bytes
+    """
+    codes = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
+    return bytes(cv2.imencode(".png", codes)[1].tobytes())
+
+
+def check_mask_path(photo_path: str | Path, out_path: str | Path) -> None:
+    """Check, before the work, that a mask can be written.
+
+    Parameters
+    ----------
+    photo_path, out_path : str or Path
+        The photo, and the PNG of its mask.
+
+    Raises
+    ------
+    InputError
+        If it cannot, or would replace the photo.
+    """
+    _require_png(out_path)
+    if (
+        os.path.exists(out_path)
+        and os.path.exists(photo_path)
+        and os.path.samefile(photo_path, out_path)
+    ):
+        raise InputError(f"{out_path} is the photo itself: choose another file for its mask")
+    require_writable_file(out_path)
 
 
 def _require_png(path: str | Path) -> None:
@@ -245,14 +262,7 @@ def cut_out(
         If the photo cannot be read, the box does not fit, nothing is found, or the mask cannot be
         written or would replace the photo.
     """
-    _require_png(out_path)
-    if (
-        os.path.exists(out_path)
-        and os.path.exists(photo_path)
-        and os.path.samefile(photo_path, out_path)
-    ):
-        raise InputError(f"{out_path} is the photo itself: choose another file for its mask")
-    require_writable_file(out_path)
+    check_mask_path(photo_path, out_path)
     image = read_linear(photo_path, transfer, limits)
     white = float(np.percentile(image, 99.9)) or float(image.max())
     if white == 0:

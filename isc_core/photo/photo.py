@@ -8,6 +8,7 @@ from ..errors import InputError
 from ..imaging.area_resize import AreaFilter, resize_apart
 from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
+from .found_mask import FoundMask
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,9 @@ class PhotoSource:
     transfer : str
         The transfer curve used, "srgb" or "linear".
     mask_from : str
-        "file", "alpha", "black border" or "whole frame".
+        "file", "alpha", "black border", "automatic", "hints" or "whole frame".
+    sureness : float or None
+        Of a mask that was found automatically.
     """
 
     sha256: str
@@ -33,6 +36,7 @@ class PhotoSource:
     bit_depth: int
     transfer: str
     mask_from: str
+    sureness: float | None = None
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ class Photo:
         one.
     exposed : bool
         Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
+    found : FoundMask or None
+        The mask at the file's size, where it was found by its looks.
     """
 
     image: np.ndarray
@@ -69,6 +75,7 @@ class Photo:
     original: PhotoSource
     scale: float = 1.0
     exposed: bool = True
+    found: FoundMask | None = None
 
     @property
     def box(self) -> tuple[int, int, int, int]:

@@ -26,6 +26,7 @@ from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
 from ..lobe_fitting.specular_upper_bound import bounded_specular
+from ..photo.grabcut import encoded_mask
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.lobe_fit import LobeFit
@@ -58,12 +59,18 @@ DECOMPOSITION_FILES = (
     "preview.png",
     *(f"maps/{name}.exr" for name in SINGLE),
 )
-_RESULT_FILES = (*DECOMPOSITION_FILES, ARRAYS, *LAYER_PNGS)  # including files written on demand
+MASK = "mask.png"
+_RESULT_FILES = (
+    *DECOMPOSITION_FILES,
+    ARRAYS,
+    MASK,
+    *LAYER_PNGS,
+)  # including files written on demand
 _PREVIEW_COMPRESSION = 2  # of 9: a third of the time of the usual 6 for 16 % more bytes
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
-SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
+SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png", MASK)
 
 
 def save(
@@ -73,6 +80,7 @@ def save(
     mesh: MeshOptions | None = None,
     arrays: bool = False,
     png: bool = False,
+    cover: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> None:
     """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
@@ -86,6 +94,8 @@ def save(
         Write `arrays.npz` too.
     png : bool
         Write the layers as PNG files too, see `layer_pngs`.
+    cover : (H, W) ndarray, optional
+        A mask that was found, at the photo's size, to write as `mask.png`.
     monitor : Monitor, optional
 
     Raises
@@ -121,6 +131,8 @@ def save(
             write_arrays(d, partial / ARRAYS, built)
         if png:
             write_layer_pngs(d, partial)
+        if cover is not None:
+            (partial / MASK).write_bytes(encoded_mask(cover))
         _write_description(d, built, partial / "decomposition.json")
         monitor.report("drawing the preview", 0.7)
         preview.result()
@@ -178,6 +190,7 @@ def save_separation(
     *,
     mask: np.ndarray | None = None,
     title: str = "",
+    cover: np.ndarray | None = None,
 ) -> None:
     """Write the folder of a separation.
 
@@ -190,6 +203,8 @@ def save_separation(
     mask : (H, W) bool ndarray, optional
         By default the pixels that are not black.
     title : str
+    cover : (H, W) ndarray, optional
+        A mask that was found, to write as `mask.png`.
 
     Raises
     ------
@@ -209,6 +224,8 @@ def save_separation(
         for name in ("diffuse", "specular"):
             coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
             Image.fromarray(np.rint(255 * coded).astype(np.uint8)).save(partial / f"{name}.png")
+        if cover is not None:
+            (partial / MASK).write_bytes(encoded_mask(cover))
         sheet = separation_sheet(separation, image, inside, title)
         sheet.save(partial / "preview.png", compress_level=_PREVIEW_COMPRESSION)
 
