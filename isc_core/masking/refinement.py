@@ -1,6 +1,6 @@
 """The outline of a mask at the photo's own pixels.
 
-Problem: the network sees 128 pixels; the outline that it finds is off by one of them.
+Problem: the network sees 96 pixels; the outline that it finds is off by one of them.
 
 Equation: pixels that the network is sure of and that lie away from the outline are known, the
 others are not; GrabCut labels these by colours and contrast (`photo.grabcut`). The soft cover a of

@@ -16,7 +16,7 @@ doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interac
 selection", CVPR 2016, doi:10.1109/CVPR.2016.47; temperature: C. Guo et al. 2017, arXiv:1706.04599.
 Weights, training pictures and losses are our own: `python -m training.networks.mask_network`.
 
-Limits: measured in docs/methods/automatic_mask.md. It sees 128 pixels of the longer side.
+Limits: measured in docs/methods/automatic_mask.md. It sees 96 pixels of the longer side.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ from .layers import (
 )
 from .loader import Network, Parameters
 
-SIDE, BLOCK = 128, 4  # pixels of the network's frame, and of a block
+SIDE, BLOCK = 96, 4  # pixels of the network's frame, and of a block
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
 COARSE = 2  # levels that the number of things is read from, the coarsest ones

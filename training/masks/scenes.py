@@ -1,7 +1,7 @@
 """What stands where in a composite.
 
-Limits: a scene of one thing has others only in its background or cut by its frame; they are less
-than two thirds as long.
+Limits: a scene of one thing has others only in its background or cut by its frame; they are at
+most half as long.
 """
 
 import math
@@ -16,6 +16,7 @@ from .ingredients import SIDE
 
 MEANT = int(Count.ONE)
 SHARES = (0.17, 0.58, 0.25)  # of scenes without a thing, with one, with several
+_TINY = 0.2  # of the frame: things half as long may stand where there is none to be found
 _HEAPS = 0.35  # of scenes with several
 _SHAPES = ((1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625))
 
@@ -108,8 +109,9 @@ def draw_scene(rng: np.random.Generator, bodies: int, shares: tuple[float, ...] 
         things = _several(rng, bodies, np.array(shape), short, level)
         meant = list(range(len(things)))
     else:
-        length = short * log_uniform(rng, 0.27, 1.02)
-        things = _around(rng, bodies, np.array(shape), length, level)
+        length = min(SIDE * log_uniform(rng, 0.27, 0.95), 1.1 * short)
+        shown = length if count == Count.ONE else _TINY * SIDE
+        things = _around(rng, bodies, np.array(shape), shown, level)
         if count == Count.ONE:
             meant = [len(things)]
             things.append(_thing(rng, bodies, length, _middle(rng, shape, length), level))
@@ -151,18 +153,18 @@ def _middle(rng: np.random.Generator, shape: tuple[float, float], length: float)
 def _around(
     rng: np.random.Generator, bodies: int, shape: np.ndarray, length: float, level: float
 ) -> list[Thing]:
-    """Things of the background, and such as the frame cuts."""
+    """Things of the background, and such as the frame cuts, before which one of a length stands."""
     found = []
     for _ in range(int(rng.choice([0, 1, 2, 3, 4], p=[0.42, 0.2, 0.16, 0.12, 0.1]))):
         if rng.random() < 0.5:
-            size = length * rng.uniform(0.15, 0.6)
+            size = length * rng.uniform(0.15, 0.5)
             place = shape * rng.uniform(-1, 1, 2)
         else:
-            size = SIDE * min(shape) * rng.uniform(0.2, 0.8)
+            size = min(SIDE * min(shape) * rng.uniform(0.2, 0.8), 1.3 * max(length, 0.3 * SIDE))
             turn = rng.uniform(0, 2 * math.pi)
             edge = np.array([math.cos(turn), math.sin(turn)])
             edge = edge / np.abs(edge).max()
-            place = edge * (shape + rng.uniform(0.0, 0.6) * size / SIDE)
+            place = edge * (shape + rng.uniform(0.1, 0.7) * size / SIDE)
         found.append(_thing(rng, bodies, size, place, level))
     return found
 

@@ -5,7 +5,7 @@
 FOLDER holds the ingredients that `python -m training.masks.ingredients` writes. Photos are composed
 while the network learns (`training.masks.composites`), and none is used twice. `--weights` starts
 from an archive that an earlier run wrote, `--resume` continues an interrupted one; without either,
-the levels down start as the shipped scene network's. `--side 96` sees photos smaller, which is half
+the levels down start as the shipped scene network's. `--side 64` sees photos smaller, which is half
 of the work. Held-out bodies before held-out panoramas are measured every thousand steps.
 
 Equation: see `training.networks.mask_module`.
@@ -24,10 +24,11 @@ import torch
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
 from isc_core.networks import scene_network
+from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
 from ..masks.composites import Composites
-from ..masks.ingredients import SIDE, Ingredients
+from ..masks.ingredients import Ingredients
 from .mask_module import MaskNetworkModule
 
 _SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
@@ -44,6 +45,7 @@ def main() -> None:
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--side", type=int, default=SIDE, metavar="PX", help="of photos (default: %(default)s)")
     add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
+    add("--hinted", type=float, default=0.5, help="share with hints (default: %(default)s)")
     add_run_arguments(parser, steps=20_000, batch=32)
     arguments = parser.parse_args()
     options = run_options(arguments)
@@ -60,7 +62,7 @@ def main() -> None:
         network.load_arrays(weights)
     fit(
         network,
-        Composites(learned, options.batch, arguments.side),
+        Composites(learned, options.batch, arguments.side, arguments.hinted),
         replace(SCHEDULE, rate=arguments.rate),
         options,
         Composites(judged, options.batch, arguments.side),
