@@ -285,7 +285,7 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
         (
             lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200),
-            "choose a mask image, or cut one out with Draw Box",
+            "choose a mask image, or make one with Add Point or Draw Box",
         ),
     ],
 )
