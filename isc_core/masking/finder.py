@@ -123,7 +123,8 @@ class EachSearch:
         if not self.found:
             raise InputError(f"{name}: no thing stands out: {_REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
-        return FoundMask(cover, min(one.sureness for one in self.found), self.found[0].counts)
+        least = min(self.found, key=lambda one: one.sureness)
+        return replace(least, cover=cover)
 
 
 def read_each(

@@ -3,13 +3,18 @@
 Problem: a photo without mask, alpha channel or plain border shows a thing before something else.
 
 Equation: the network (`networks.mask_network`) looks at the whole photo, then at the surroundings
-of what it found, where the thing is larger. Sureness is P(one thing) o, where o is how far both
-looks agree, the sum of the smaller over the sum of the larger probabilities.
+of what it found, where the thing is larger. They agree by o, the sum of the smaller over the sum of
+the larger probabilities. The log odds of a right mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o)
+for the log odds l of one thing at both looks and of their agreement; w is fitted
+(`training.networks.mask_calibration`).
 
 Citation: see `networks.mask_network` and `refinement`.
 
 Limits: measured in docs/methods/automatic_mask.md.
 """
+
+import math
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
@@ -26,6 +31,7 @@ from .refinement import refined
 WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _LEAST_SHARE = 0.1  # of the largest part: smaller ones are not things of their own
+_UNSURE = 1e-3
 _LEAST = 1e-6
 
 
@@ -127,7 +133,7 @@ def _all_of(light: np.ndarray) -> Part:
 
 def _at_size(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
     cover = resized(found.cover, shape[1], shape[0])
-    return FoundMask(np.clip(cover, 0, 1), found.sureness, found.counts)
+    return replace(found, cover=np.clip(cover, 0, 1))
 
 
 def _second_look(
@@ -136,7 +142,8 @@ def _second_look(
     """Look closer at what the first look found, and refine its outline."""
     inside = _meant(first.cover, hints)
     if not inside.any():
-        return FoundMask(np.zeros_like(first.cover), 0.0, first.counts)
+        nothing = evidence_of(float(first.counts[Count.ONE]), 0, 0)
+        return FoundMask(np.zeros_like(first.cover), 0.0, first.counts, nothing)
     part = _around(mask_box(inside), light.shape)
     second = predict_part(light, part, hints, network)
     before = first.cover[part.slices]
@@ -151,8 +158,30 @@ def _second_look(
         left, top, wide, high = hints.box
         outside[top : top + high, left : left + wide] = False
         cover[outside] = 0
-    sureness = agreement * (1.0 if hints else float(first.counts[Count.ONE]))
-    return FoundMask(cover, sureness, first.counts)
+    looks = float(first.counts[Count.ONE]), float(second.counts[Count.ONE])
+    evidence = evidence_of(*looks, agreement)
+    weights = (network or MaskNetwork.shipped()).sureness
+    sureness = 1 / (1 + math.exp(-float((weights * evidence).sum())))
+    return FoundMask(cover, sureness, first.counts, evidence)
+
+
+def evidence_of(first: float, second: float, agreement: float) -> np.ndarray:
+    """Return what sureness is computed from.
+
+    Parameters
+    ----------
+    first, second : float
+        Probability of one thing at the first and at the second look.
+    agreement : float
+        Of both masks, 0 to 1.
+
+    Returns
+    -------
+    (4,) ndarray
+        1, and log odds of the three.
+    """
+    shares = np.clip([first, second, agreement], _UNSURE, 1 - _UNSURE)
+    return np.concatenate([[1.0], np.log(shares / (1 - shares))])
 
 
 def _meant(cover: np.ndarray, hints: Hints) -> np.ndarray:

@@ -7,14 +7,15 @@ Equation: an encoder of convolutions (`networks.layers`) computes feature maps o
 half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Pixels go
 in and come out in blocks of 4 x 4 (space to depth). Each pixel gets the log odds of being part of
 the thing. Means and maxima of the coarse feature maps give the log odds of none, one and several
-things, divided by a temperature that is fitted to photos that the weights have not seen. Photo and
-mirror image are averaged. Hints, if there are any, are drawn into channels of their own: points on
-the thing, points on the background, a box.
+things. Photo and mirror image are averaged. Hints, if there are any, are drawn into channels of
+their own: points on the thing, points on the background, a box. What the network says together
+makes it as sure as a logistic regression on photos that the weights have not seen tells.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
-selection", CVPR 2016, doi:10.1109/CVPR.2016.47; temperature: C. Guo et al. 2017, arXiv:1706.04599.
-Weights, training pictures and losses are our own: `python -m training.networks.mask_network`.
+selection", CVPR 2016, doi:10.1109/CVPR.2016.47; sureness: J. Platt, "Probabilistic outputs for
+support vector machines", 1999. Weights, training pictures and losses are our own: `python -m
+training.networks.mask_network`.
 
 Limits: measured in docs/methods/automatic_mask.md. It sees 96 pixels of the longer side.
 """
@@ -41,6 +42,7 @@ SIDE, BLOCK = 96, 4  # pixels of the network's frame, and of a block
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
 COARSE = 2  # levels that the number of things is read from, the coarsest ones
+SURENESS = 4
 _LEAST = 1e-6
 
 
@@ -64,8 +66,9 @@ class MaskNetwork(Network):
     dense : tuple of (inputs, outputs) ndarray
         The two layers of the number of things.
     offsets : tuple of (outputs,) ndarray
-    temperature : (1,) ndarray
-        Of the number of things, > 0.
+    sureness : (4,) ndarray
+        Weights of the log odds that a mask is right: a constant, the log odds of one thing at the
+        first and at the second look, those of their agreement.
     """
 
     title = "mask network"
@@ -75,7 +78,7 @@ class MaskNetwork(Network):
     biases: tuple[np.ndarray, ...]
     dense: tuple[np.ndarray, ...]
     offsets: tuple[np.ndarray, ...]
-    temperature: np.ndarray
+    sureness: np.ndarray
 
     def __post_init__(self) -> None:
         if not self._fits():
@@ -106,8 +109,7 @@ class MaskNetwork(Network):
             is_chain(self.weights, self.biases, shapes)
             and [m.shape for m in self.dense] == counts
             and [o.shape for o in self.offsets] == [s[1:] for s in counts]
-            and self.temperature.shape == (1,)
-            and bool(self.temperature[0] > 0)
+            and self.sureness.shape == (SURENESS,)
         )
 
     @classmethod
@@ -134,7 +136,7 @@ class MaskNetwork(Network):
             parameters.biases,
             (others["hidden_weight"], others["count_weight"]),
             (others["hidden_bias"], others["count_bias"]),
-            others["temperature"],
+            others["sureness"],
         )
 
     @property
@@ -154,7 +156,7 @@ class MaskNetwork(Network):
         odds : (H, W) float32 ndarray
             Log odds of the thing.
         counts : (3,) ndarray
-            Log odds of `Count`, not yet divided by the temperature.
+            Log odds of `Count`.
         """
         steps = iter(zip(self.weights, self.biases, strict=True))
         layer, skips = space_to_depth(channels, BLOCK), []
@@ -218,7 +220,7 @@ def predict_mask(
     odds, counts = network(channels_of(light, frame, hints))
     mirrored = network(channels_of(light[:, ::-1], frame[:, ::-1], hints[:, ::-1]))
     odds = (odds + mirrored[0][:, ::-1]) / 2
-    counts = (counts + mirrored[1]) / (2 * float(network.temperature[0]))
+    counts = (counts + mirrored[1]) / 2
     cover = np.where(frame, 1 / (1 + np.exp(-np.clip(odds, -30, 30))), 0)
     return MaskPrediction(cover.astype(np.float32), softmax(counts))
 

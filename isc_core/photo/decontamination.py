@@ -9,7 +9,8 @@ pixels of one kind count most, F = f + a (I - a f - (1 - a) b).
 Citation: M. Forte, "Approximate fast foreground colour estimation", ICIP 2021,
 doi:10.1109/ICIP42928.2021.9506164.
 
-Limits: one step, on a reduced photo, with powers of a instead of a: colours that change within the window are averaged.
+Limits: one step, on a reduced photo, with powers of a instead of a: colours that change within the
+window are averaged.
 """
 
 import numpy as np

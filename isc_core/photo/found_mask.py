@@ -20,11 +20,14 @@ class FoundMask:
         Probability that this is the one thing meant, 0 to 1.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several things.
+    evidence : (4,) ndarray
+        What the sureness was computed from, see `masking.search.evidence_of`.
     """
 
     cover: np.ndarray
     sureness: float
     counts: np.ndarray
+    evidence: np.ndarray
 
     @property
     def mask(self) -> np.ndarray:

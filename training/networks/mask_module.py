@@ -153,7 +153,7 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         for name, layer in (("hidden", self.hidden), ("count", self.count)):
             found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
             found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
-        found["temperature"] = np.ones(1, np.float32)
+        found["sureness"] = np.array([0, 1, 0, 0], np.float32)
         return found
 
     def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:

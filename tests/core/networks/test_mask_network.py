@@ -40,7 +40,7 @@ def weights(seed: int) -> dict[str, np.ndarray]:
     for name, rows, columns in (("hidden", features, HIDDEN), ("count", HIDDEN, len(Count))):
         arrays[f"{name}_weight"] = rng.normal(0, rows**-0.5, (rows, columns)).astype(np.float16)
         arrays[f"{name}_bias"] = rng.normal(0, 0.1, columns).astype(np.float16)
-    return {**arrays, "temperature": np.array([1.5], np.float32)}
+    return {**arrays, "sureness": np.array([0, 1, 0.5, 1], np.float32)}
 
 
 def network(folder: Path, **changes: np.ndarray | None) -> MaskNetwork:
@@ -95,8 +95,8 @@ def test_the_mask_is_the_same_on_any_number_of_threads(tmp_path: Path) -> None:
         {"weight02": np.zeros((9, 4, 7), np.float16)},
         {"bias01": np.zeros(3, np.float16)},
         {"count_bias": np.zeros(4, np.float16)},
-        {"temperature": np.zeros(1, np.float32)},
-        {"temperature": None},
+        {"sureness": np.zeros(3, np.float32)},
+        {"sureness": None},
         {"bias00": np.full(4, np.nan, np.float16)},
     ],
 )
