@@ -16,7 +16,7 @@ from ..photo.reading import photo_from_raster
 from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
-SURE = 0.5  # least sureness of a mask that is used without being asked for
+SURE = 0.4  # least sureness of a mask that is used without being asked for
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 

@@ -8,7 +8,9 @@ the larger probabilities. The log odds of a right mask are w_0 + w_1 l(p_1) + w_
 for the log odds l of one thing at both looks and of their agreement; w is fitted
 (`training.networks.mask_calibration`).
 
-Citation: see `networks.mask_network` and `refinement`.
+Citation: see `networks.mask_network` and `refinement`; a thing reaches the sides of its box: V.
+Lempitsky et al. 2009, doi:10.1109/ICCV.2009.5459262. Where the network's mask does not, the box is
+segmented by colours alone (`photo.grabcut`).
 
 Limits: measured in docs/methods/automatic_mask.md.
 """
@@ -22,7 +24,7 @@ from scipy import ndimage
 from ..imaging.bounding_box import mask_box
 from ..networks.mask_network import Count, MaskNetwork
 from ..photo.found_mask import FoundMask
-from ..photo.grabcut import Box
+from ..photo.grabcut import Box, grabcut
 from ..photo.masks import resized, tidy_mask
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
@@ -31,6 +33,7 @@ from .refinement import refined
 WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _LEAST_SHARE = 0.1  # of the largest part: smaller ones are not things of their own
+_FILLED = 0.6  # of the sides of a box: a smaller mask is not what the box was drawn around
 _UNSURE = 1e-3
 _LEAST = 1e-6
 
@@ -54,9 +57,21 @@ def find_mask(
     FoundMask
         The mirrored photo's is mirrored.
     """
-    small, given = _working(light, hints or Hints())
+    hints = hints or Hints()
+    small, given = _working(light, hints)
     whole = predict_part(small, _all_of(small), given, network)
-    return _at_size(_second_look(small, whole, given, network), light.shape)
+    found = _at_size(_second_look(small, whole, given, network), light.shape)
+    if hints.box is None or hints.points or _fills(found.mask, hints.box):
+        return found
+    return replace(found, cover=grabcut(light, hints.box).astype(np.float32))
+
+
+def _fills(mask: np.ndarray, box: Box) -> bool:
+    """Whether a mask is about as wide and as high as the box that was drawn around the thing."""
+    if not mask.any():
+        return False
+    width, height = mask_box(mask)[2:]
+    return width >= _FILLED * box[2] and height >= _FILLED * box[3]
 
 
 def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[FoundMask]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from ...errors import InputError
 from ...masking.finder import MaskSearch, read_each
 from ...masking.hints import Hints
-from ...photo.grabcut import check_mask_path, cut_out, write_mask
+from ...photo.grabcut import check_mask_path, write_mask
 from ...photo.photo import Photo
 from ...photo.reading import read_photo
 from ...progress import Monitor
@@ -20,8 +20,7 @@ _EXAMPLES = """  isc mask photo.jpg --auto -o mask.png
   isc mask photo.jpg --box 120,80,400,360 -o mask.png
   isc mask shelf.jpg --each -o mask.png              mask_1.png, mask_2.png and so on
 
---auto refuses a photo in which no single thing stands out; points and a box say which is meant.
---box alone cuts the object out by its colours; with points, its looks count too."""
+--auto refuses a photo in which no single thing stands out; points and a box say which is meant."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -85,11 +84,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
     """Write one mask, and return what to print."""
-    limits = limits_of(options)
-    if given.box is not None and not (given.points or given.others):
-        mask = cut_out(file, given.box, options.output, options.transfer, limits)
-        return [f"{options.output}: {int(mask.sum())} pixels; check it before you use it"]
-    photo = read_photo(file, None, options.transfer, limits=limits, finder=MaskSearch(given))
+    limits, finder = limits_of(options), MaskSearch(given)
+    photo = read_photo(file, None, options.transfer, limits=limits, finder=finder)
     return [_write(photo, options.output)]
 
 
