@@ -31,7 +31,7 @@ from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
 from training.masks.held_out import HeldOut, held_out_composites, held_out_ingredients
 
-_TILE = 200  # pixels of the sheet's pictures
+_TILE = 140  # pixels of the sheet's pictures
 _SHOWN = 20
 _SEED = 5
 
@@ -223,7 +223,7 @@ def main() -> None:
         # the first ones of each kind, whatever was found
         shown = _SHOWN // len(things)
         drawn = [one for name in things for one in groups[name][:shown]]
-        sheet(drawn).save(given.sheet, quality=85)
+        sheet(drawn).save(given.sheet, quality=75)
 
 
 if __name__ == "__main__":

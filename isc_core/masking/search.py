@@ -6,7 +6,7 @@ Equation: the network (`networks.mask_network`) looks at the whole photo, then a
 of what it found, where the thing is larger. They agree by o, the sum of the smaller over the sum of
 the larger probabilities. The log odds of a right mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o)
 for the log odds l of one thing at both looks and of their agreement; w is fitted
-(`training.networks.mask_calibration`).
+(`training.masks.mask_calibration`).
 
 Citation: see `networks.mask_network` and `refinement`; a thing reaches the sides of its box: V.
 Lempitsky et al. 2009, doi:10.1109/ICCV.2009.5459262. Where the network's mask does not, the box is

@@ -15,7 +15,7 @@ Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
 selection", CVPR 2016, doi:10.1109/CVPR.2016.47; sureness: J. Platt, "Probabilistic outputs for
 support vector machines", 1999. Weights, training pictures and losses are our own: `python -m
-training.networks.mask_network`.
+training.masks.mask_network`.
 
 Limits: measured in docs/methods/automatic_mask.md. It sees 96 pixels of the longer side.
 """

@@ -10,7 +10,7 @@ pytest.importorskip("torch")
 import torch
 
 from isc_core.networks.mask_network import INPUTS, SIDE, MaskNetwork
-from training.networks.mask_module import MaskNetworkModule
+from training.masks.mask_module import MaskNetworkModule
 
 DOWN, UP = (6, 8, 8, 6), (7, 6, 5)
 

@@ -10,7 +10,7 @@ Limits: a body is not lit by the background that it is pasted before.
 """
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -162,7 +162,7 @@ def _write(path: Path, values: np.ndarray) -> None:
     print(f"{path}: {len(values)}", flush=True)
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -173,7 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--rounds", type=int, default=1, help="lights of each view (default: %(default)s)")
     add("--seed", type=int, default=0, help="default: %(default)s")
     add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="where to write")
-    given = parser.parse_args(arguments)
+    given = parser.parse_args()
     try:
         world = read_world([given.world], given.panoramas, (Split.TRAIN, Split.BODY), given.seed)
         crops = read_crops(given.panoramas, given.seed)

@@ -13,7 +13,7 @@ from isc_core.networks.mask_network import SIDE as FRAME
 from isc_core.networks.mask_network import Count, channels_of
 from training.masks.composites import Composites, draw_hints, frames
 from training.masks.ingredients import LENGTH, SIDE, Ingredients, cut_out
-from training.networks.mask_module import MaskNetworkModule, network_channels
+from training.masks.mask_module import MaskNetworkModule, network_channels
 
 
 @pytest.fixture(autouse=True)

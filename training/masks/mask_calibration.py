@@ -1,6 +1,6 @@
 """Fit how sure a mask network may be, on composites that it has not seen.
 
-  python -m training.networks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
+  python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
 Equation: logistic regression of "the photo shows one thing, and the mask overlaps it by .5 or
 more" on `isc_core.masking.search.evidence_of`, with a small ridge. Photos are those of part A of
@@ -23,7 +23,7 @@ from isc_core.io.npy import read_arrays
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 
-from ..masks.held_out import HeldOut, held_out_composites, held_out_ingredients
+from .held_out import HeldOut, held_out_composites, held_out_ingredients
 
 _RIDGE, _STEPS = 0.1, 50
 _RIGHT = 0.5  # overlap of a mask that counts as right

@@ -20,8 +20,8 @@ from torch.nn import functional
 from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, Count
 
-from ..masks.composites import Composite
-from .blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
+from ..networks.blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
+from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
 HIDDEN = 64

@@ -1,6 +1,6 @@
 """Fit the network of `isc_core.networks.mask_network`.
 
-  python -m training.networks.mask_network FOLDER [--weights NPZ] [--minutes N] -o MASK.npz
+  python -m training.masks.mask_network FOLDER [--weights NPZ] [--minutes N] -o MASK.npz
 
 FOLDER holds the ingredients that `python -m training.masks.ingredients` writes. Photos are composed
 while the network learns (`training.masks.composites`), and none is used twice. `--weights` starts
@@ -8,11 +8,11 @@ from an archive that an earlier run wrote, `--resume` continues an interrupted o
 the levels down start as the shipped scene network's. `--side 64` sees photos smaller, which is half
 of the work. Held-out bodies before held-out panoramas are measured every thousand steps.
 
-Equation: see `training.networks.mask_module`.
+Equation: see `training.masks.mask_module`.
 
 Citation: see `training.loop`.
 
-Limits: sureness is calibrated afterwards, by `training.networks.mask_calibration`.
+Limits: sureness is calibrated afterwards, by `training.masks.mask_calibration`.
 """
 
 import argparse
@@ -27,8 +27,8 @@ from isc_core.networks import scene_network
 from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
-from ..masks.composites import Composites
-from ..masks.ingredients import Ingredients
+from .composites import Composites
+from .ingredients import Ingredients
 from .mask_module import MaskNetworkModule
 
 _SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
