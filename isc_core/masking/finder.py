@@ -121,7 +121,7 @@ class EachSearch:
         """
         self.found = [one for one in find_masks(light) if int(one.mask.sum()) >= MIN_MASK_PIXELS]
         if not self.found:
-            raise InputError(f"{name}: no thing stands out: {_REMEDY}")
+            raise InputError(f"{name}: no things stand out: {_REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
         least = min(self.found, key=lambda one: one.sureness)
         return replace(least, cover=cover)

@@ -34,6 +34,7 @@ WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _LEAST_SHARE = 0.1  # of the largest part: smaller ones are not things of their own
 _FILLED = 0.6  # of the sides of a box: a smaller mask is not what the box was drawn around
+_NOTHING = 0.5  # probability from which a photo shows no things
 _UNSURE = 1e-3
 _LEAST = 1e-6
 
@@ -90,6 +91,8 @@ def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[Fo
     """
     small, hints = _working(light, Hints())
     whole = predict_part(small, _all_of(small), hints, network)
+    if whole.counts[Count.NONE] > _NOTHING:
+        return []
     found = []
     for box in _boxes(whole.cover > 0.5):
         seen = predict_part(small, _all_of(small), Hints(box=box), network)

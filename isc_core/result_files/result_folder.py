@@ -2,7 +2,8 @@
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
-that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`. With a fitted lobe,
+that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
+mask was found in the photo. With a fitted lobe,
 `maps.exr` has one more layer, `lobe`: the specular image that the fit predicts. A separation's
 folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
 completely or not at all (see `io.atomic`).
@@ -70,7 +71,7 @@ _PREVIEW_COMPRESSION = 2  # of 9: a third of the time of the usual 6 for 16 % mo
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
-SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png", MASK)
+SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
 
 
 def save(
@@ -219,7 +220,7 @@ def save_separation(
         {"image": image, **{name: getattr(separation, name) for name in layers}},
         {"image": "RGB", **layers},
     )
-    with new_folder(folder, SEPARATION_FILES) as partial:
+    with new_folder(folder, (*SEPARATION_FILES, MASK)) as partial:
         write_channels(partial / "separation.exr", channels)
         for name in ("diffuse", "specular"):
             coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
@@ -246,7 +247,8 @@ def require_writable_result(
     InputError
         If it cannot.
     """
-    require_writable(folder, SEPARATION_FILES if separation else _RESULT_FILES, inputs)
+    files = (*SEPARATION_FILES, MASK) if separation else _RESULT_FILES
+    require_writable(folder, files, inputs)
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
