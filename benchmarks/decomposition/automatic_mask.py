@@ -25,7 +25,7 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.masking.finder import SURE
+from isc_core.masking.finder import why_refused
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
@@ -57,7 +57,7 @@ class Judged:
     @property
     def accepted(self) -> bool:
         """Whether the mask would be used."""
-        return self.found.sureness >= SURE
+        return not why_refused(self.found)
 
 
 def judged(photo: HeldOut, network: MaskNetwork | None) -> Judged:

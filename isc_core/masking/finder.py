@@ -16,7 +16,8 @@ from ..photo.reading import photo_from_raster
 from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
-SURE = 0.4  # least sureness of a mask that is used without being asked for
+SURE = 0.3  # least sureness of a mask that is used without being asked for
+_SEVERAL = 0.3  # of the largest part: a second one as large is another thing
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 
@@ -62,7 +63,7 @@ class MaskSearch:
         """
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
-        problem = _problem(found, self.hints)
+        problem = why_refused(found, self.hints)
         if not problem:
             return found
         if self.lenient and not self.hints:
@@ -70,15 +71,28 @@ class MaskSearch:
         raise InputError(f"{name}: {problem}")
 
 
-def _problem(found: FoundMask, hints: Hints) -> str:
-    """Why a mask is not used, "" if it is."""
+def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
+    """Return why a mask is not used.
+
+    Parameters
+    ----------
+    found : FoundMask
+    hints : Hints, optional
+        With them a mask need not be sure.
+
+    Returns
+    -------
+    str
+        What is wrong and what to do; "" if the mask is used.
+    """
     enough = int(found.mask.sum()) >= MIN_MASK_PIXELS
     if hints:
         return "" if enough else "no object is found there: put --point on it, or --box around it"
-    if enough and found.sureness >= SURE:
+    several = enough and len(separate_parts(found.mask, _SEVERAL)) > 1
+    if enough and found.sureness >= SURE and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
-    if kind == Count.SEVERAL:
+    if several or kind == Count.SEVERAL:
         return f"it seems to show several things: {_REMEDY}; --each takes each of them"
     if kind == Count.NONE or not enough:
         return f"no single thing stands out: {_REMEDY}"
@@ -193,5 +207,5 @@ def photos_of_each(
 
 
 def _alone(photo: Photo, found: FoundMask) -> Photo:
-    original = replace(photo.original, sureness=found.sureness)
+    original = replace(photo.original, mask_from="each", sureness=None)
     return replace(photo, mask=found.mask, original=original, found=found)

@@ -32,7 +32,6 @@ from .refinement import refined
 
 WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
-_LEAST_SHARE = 0.1  # of the largest part: smaller ones are not things of their own
 _FILLED = 0.6  # of the sides of a box: a smaller mask is not what the box was drawn around
 _NOTHING = 0.5  # probability from which a photo shows no things
 _UNSURE = 1e-3
@@ -94,7 +93,7 @@ def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[Fo
     if whole.counts[Count.NONE] > _NOTHING:
         return []
     found = []
-    for box in _boxes(whole.cover > 0.5):
+    for box in _boxes(_second_look(small, whole, hints, network).mask):
         seen = predict_part(small, _all_of(small), Hints(box=box), network)
         if (seen.cover > 0.5).any():
             one = _second_look(small, seen, Hints(box=box), network)
@@ -102,22 +101,24 @@ def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[Fo
     return found
 
 
-def separate_parts(mask: np.ndarray) -> list[np.ndarray]:
+def separate_parts(mask: np.ndarray, share: float = 0.1) -> list[np.ndarray]:
     """Return the parts of a mask that do not touch, but for small ones.
 
     Parameters
     ----------
     mask : (H, W) bool ndarray
+    share : float
+        Of the largest one's pixels that a part has at least.
 
     Returns
     -------
     list of (H, W) bool ndarray
-        From left to right; those of at least a tenth of the largest one's pixels.
+        From left to right.
     """
     labels, _ = ndimage.label(mask, np.ones((3, 3)))
     areas = np.bincount(labels.ravel())
     areas[0] = 0
-    chosen = np.flatnonzero(areas >= max(_LEAST_SHARE * areas.max(), 1))
+    chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))
     parts = [labels == number for number in chosen]
     return sorted(parts, key=lambda part: mask_box(part)[:2])
 

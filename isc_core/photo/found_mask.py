@@ -5,7 +5,7 @@ from typing import Protocol
 
 import numpy as np
 
-FOUND = ("automatic", "hints")  # what `PhotoSource.mask_from` calls them
+FOUND = ("automatic", "hints", "each")  # what `PhotoSource.mask_from` calls them
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class FoundMask:
     cover : (H, W) float32 ndarray
         Share of each pixel that the thing covers.
     sureness : float
-        Probability that this is the one thing meant, 0 to 1.
+        Probability that this is the one thing meant, 0 to 1; not calibrated with hints.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several things.
     evidence : (4,) ndarray

@@ -26,7 +26,8 @@ class PhotoSource:
     transfer : str
         The transfer curve used, "srgb" or "linear".
     mask_from : str
-        "file", "alpha", "black border", "automatic", "hints" or "whole frame".
+        "file", "alpha", "black border", "automatic", "hints", "each" or "whole
+        frame".
     sureness : float or None
         Of a mask that was found automatically.
     """

@@ -158,7 +158,7 @@ def _photo(
             raster.bit_depth,
             used,
             mask_from,
-            None if found is None else found.sureness,
+            None if found is None or mask_from == "hints" else found.sureness,
         ),
         found=found,
         exposed=raster.peak is not None,

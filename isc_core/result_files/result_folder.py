@@ -3,10 +3,9 @@
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
 that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
-mask was found in the photo. With a fitted lobe,
-`maps.exr` has one more layer, `lobe`: the specular image that the fit predicts. A separation's
-folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
-completely or not at all (see `io.atomic`).
+mask was found in the photo. With a fitted lobe, `maps.exr` has one more layer, `lobe`: the specular
+image that the fit predicts. A separation's folder holds `separation.exr`, `diffuse.png`,
+`specular.png`, `preview.png`. A folder appears completely or not at all (see `io.atomic`).
 """
 
 import json

@@ -15,6 +15,13 @@ from ..interface.options import add_limits, add_photo, add_transfer, limits_of
 from ..interface.parser import describe, hints
 from ..interface.standard_input import photo_file
 
+_SOURCES = {
+    "alpha": "from the alpha channel",
+    "black border": "all that is not black",
+    "hints": "as marked",
+    "each": "one of several things",
+    "file": "part of a mask",
+}
 _EXAMPLES = """  isc mask photo.jpg --auto -o mask.png
   isc mask photo.jpg --point 240,310 --not 90,400 -o mask.png
   isc mask photo.jpg --box 120,80,400,360 -o mask.png
@@ -101,7 +108,6 @@ def _each(file: Path, options: argparse.Namespace) -> list[str]:
 def _write(photo: Photo, path: Path) -> str:
     """Write the mask of a photo; return what to print."""
     write_mask(path, photo.mask if photo.found is None else photo.found.cover)
-    sure = f"from the {photo.original.mask_from}"
-    if photo.original.sureness is not None:
-        sure = f"{photo.original.sureness:.0%} sure"
-    return f"{path}: {int(photo.mask.sum())} pixels, {sure}; check it before you use it"
+    pixels, sureness = int(photo.mask.sum()), photo.original.sureness
+    sure = f"{sureness:.0%} sure" if sureness is not None else _SOURCES[photo.original.mask_from]
+    return f"{path}: {pixels} pixels, {sure}; check it before you use it"
