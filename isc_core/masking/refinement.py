@@ -87,9 +87,12 @@ def soft_cover(codes: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.nd
     Returns
     -------
     (H, W) float32 ndarray
+        0 where the network is sure of no pixel.
     """
     labels = trimap(cover, known)
-    if not {Label.OBJECT, Label.BACKGROUND} <= set(np.unique(labels).tolist()):
+    if not (labels == Label.OBJECT).any():
+        return np.zeros_like(cover)
+    if not (labels == Label.BACKGROUND).any():
         return cover
     mask = tidy_mask(segmented(codes, labels, _ITERATIONS))
     return feathered(codes, mask)
