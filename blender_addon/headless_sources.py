@@ -5,21 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from isc_core.errors import InputError
+from isc_core.photo.names import PHOTO_SUFFIXES
 
 from .files.result_arrays import DESCRIPTION
 
-PHOTO_SUFFIXES = (
-    ".png",
-    ".jpg",
-    ".jpeg",
-    ".tif",
-    ".tiff",
-    ".bmp",
-    ".ppm",
-    ".pgm",
-    ".exr",
-    ".hdr",
-)
 _MASK_SUFFIX = "_mask"
 
 

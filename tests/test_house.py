@@ -23,7 +23,9 @@ PACKAGES = ("isc_core", "synth", "blender_addon", "training", "benchmarks")
 
 # Where image, EXR and mesh libraries may be imported: where files become arrays and arrays become
 # files.
-IMAGE_LIBRARIES = {"cv2", "PIL", "OpenEXR", "trimesh", "imageio", "skimage", "png"}
+IMAGE_LIBRARIES = {
+    *("cv2", "PIL", "OpenEXR", "trimesh", "imageio", "skimage", "png", "pillow_heif", "rawpy"),
+}
 EDGES = ("io/exr.py", "io/decoders/", "photo/masks.py", "photo/grabcut.py", "result_files/")
 RENDERERS = {"mitsuba", "drjit"}
 BLENDER = {"bpy", "mathutils", "bmesh"}

@@ -7,7 +7,8 @@ pixels (see `image_export`).
 
 Limits: byte images in a colour space other than sRGB and linear Rec.709 are refused; Non-Color
 counts as linear. Blender ignores the orientation flag of photos and the worker applies it, so files
-with such a flag are handed over as pixels: masks painted on them stay aligned.
+with such a flag are handed over as pixels: masks painted on them stay aligned. Blender ignores
+colour profiles, too; the worker applies that of a file.
 """
 
 import mmap
@@ -20,6 +21,7 @@ import mathutils
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.photo.names import UNUSUAL_SUFFIXES
 
 MAX_PIXELS = 100_000_000
 MIN_SIDE = 8
@@ -32,6 +34,7 @@ _SUFFIXES = {
     b"#?": ".hdr",
     b"BM": ".bmp",
 }
+_WITH_PROFILE = (".png", ".jpg")
 _HEAD_BYTES = 1 << 18  # cameras write the orientation flag near the start
 _ORIENTATION_TAG = 0x0112
 _LINEAR_SPACES = ("Linear Rec.709", "Linear")
@@ -55,7 +58,8 @@ class ImageSource:
     data : bytes or None
         Packed bytes of such a file.
     transfer : str
-        "srgb" or "linear": coding of the file or of the pixels.
+        "srgb" or "linear": coding of the file or of the pixels; "auto" for a file that may have a
+        colour profile.
     size : tuple of int
         Width and height of the pixels; (0, 0) for a file.
     channels : int
@@ -219,7 +223,7 @@ def _unchanged_file(image: Any) -> ImageSource | None:
         data = bytes(image.packed_file.data)
         if not _reads_alike(data, image.alpha_mode):
             return None
-        return ImageSource(image.name_full, data=data, transfer=transfer)
+        return ImageSource(image.name_full, data=data, transfer=_of_file(transfer, data))
     path = Path(image.filepath_from_user())
     if not path.is_file():  # opening a pipe would wait for its writer
         return None
@@ -229,6 +233,7 @@ def _unchanged_file(image: Any) -> ImageSource | None:
             mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
         ):
             fits = _reads_alike(content[:_HEAD_BYTES], image.alpha_mode)
+            transfer = _of_file(transfer, content[:_HEAD_BYTES])
     except (OSError, ValueError):
         # A missing, unreadable or empty file: the pixels that Blender still has are used.
         return None
@@ -243,6 +248,11 @@ def _transfer(image: Any) -> str:
     return "linear" if space.is_data or space.name in _LINEAR_SPACES else ""
 
 
+def _of_file(transfer: str, head: bytes) -> str:
+    """The same for the file itself: a profile in it may name another curve than sRGB's."""
+    return "auto" if transfer == "srgb" and suffix_of(head) in _WITH_PROFILE else transfer
+
+
 def _reads_alike(head: bytes, alpha_mode: str) -> bool:
     """Whether the worker reads the format with the same alpha and orientation as Blender."""
     suffix = suffix_of(head)
@@ -252,6 +262,12 @@ def _reads_alike(head: bytes, alpha_mode: str) -> bool:
 
 def _no_data_message(image: Any) -> str:
     if image.source == "FILE" and not image.packed_file:
+        path = Path(image.filepath_from_user())
+        if path.suffix.lower() in UNUSUAL_SUFFIXES and path.is_file():
+            return (
+                f"the image {image.name} is a {path.suffix[1:].upper()} file, which Blender cannot "
+                "show: save it as a PNG, or decompose it with isc and import the result"
+            )
         return (
             f"the image {image.name} has no data: its file {image.filepath_from_user()} is missing "
             "or damaged; open it again"

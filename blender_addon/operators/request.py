@@ -10,12 +10,13 @@ from typing import Any
 import bpy
 
 from isc_core.errors import InputError
+from isc_core.photo.names import PHOTO_SUFFIXES
 
 from ..files.image_source import ImageSource, inspect_image
 from ..scene.build import OWN_SHADOWS, BuildOptions
 from ..scene.provenance import KEY, SOURCE_IMAGE
 
-_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".tga", ".webp")
+_SUFFIXES = (*PHOTO_SUFFIXES, ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"
 
 

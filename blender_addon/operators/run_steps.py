@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 
 from isc_core.result_files.diagnostics_text import status_lines
+from isc_core.result_files.reading_notes_text import stored_note_lines
 
 from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
@@ -206,7 +207,10 @@ def result_notes(result: Path) -> str:
     InputError
         If the folder is no result.
     """
-    return join_notes(status_lines(read_description(result / DESCRIPTION).get("status", {})))
+    description = read_description(result / DESCRIPTION)
+    source = description.get("input")
+    stored = source.get("reading_notes") if isinstance(source, dict) else None
+    return join_notes([*stored_note_lines(stored), *status_lines(description.get("status", {}))])
 
 
 def _run_worker(

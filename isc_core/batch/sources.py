@@ -12,11 +12,12 @@ from functools import lru_cache
 from pathlib import Path
 
 from ..errors import InputError
+from ..photo.names import PHOTO_SUFFIXES
 from .fetch import file_system, is_url
 from .item import BatchItem, ImageRecipe
 from .manifest import SUFFIXES, Manifest
 
-PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".pgm", ".exr", ".hdr", ".npy")
+PHOTOS = (*PHOTO_SUFFIXES, ".npy")
 _MASK = "_mask"
 
 

@@ -22,7 +22,7 @@ from scipy import ndimage
 
 from ..networks.scene_network import Kind, ScenePrediction
 from ..photo import Photo
-from ..scene.diagnostics import AssumptionWarning, WarningKind
+from ..scene.diagnostics import AssumptionWarning, Diagnostics, WarningKind
 from .layers import scale_confidence
 from .task import SceneEstimate
 
@@ -31,6 +31,7 @@ _RAGGED = 0.5  # of the mask outside blocks of 2 x 2 pixels, which no mesh cover
 LIKELY_CLEAR = 0.3  # probability of a mirror or glass
 LIKELY_SEVERAL = 0.6  # probability of several lamps
 _LEAST = 0.1  # of the confidence remains
+_COLOURED = 0.5  # of it remains in light of too strong a colour
 
 
 def check_scene(seen: ScenePrediction) -> tuple[AssumptionWarning, ...]:
@@ -92,6 +93,26 @@ def share_in_blocks(mask: np.ndarray) -> float:
     return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
 
 
+def share_that_holds(diagnostics: Diagnostics) -> float:
+    """Compute the factor of the confidence of a photo that violates assumptions.
+
+    Parameters
+    ----------
+    diagnostics : Diagnostics
+
+    Returns
+    -------
+    float
+        The probability of an opaque object under one lamp, at least .1; half of that where light or
+        object have too strong a colour. 1 where the assumptions hold.
+    """
+    checked = (WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS)
+    probable = [one.value or 0.0 for one in diagnostics.warnings if one.kind in checked]
+    share = max(float(np.prod([1 - value for value in probable])), _LEAST)
+    strong = diagnostics.light_colour is not None and diagnostics.light_colour.too_strong
+    return share * (_COLOURED if strong else 1.0)
+
+
 def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -> SceneEstimate:
     """Add the assumption checks to an estimate, and lower its confidence where they fail.
 
@@ -111,8 +132,7 @@ def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -
     """
     warnings, split, lamps = check_scene(seen), estimate.split, seen.lamps
     if warnings:
-        remaining = float(np.prod([1 - (warning.value or 0) for warning in warnings]))
-        split = scale_confidence(split, max(remaining, _LEAST))
+        split = scale_confidence(split, share_that_holds(Diagnostics(warnings=warnings)))
     diagnostics = replace(
         estimate.diagnostics,
         scene_classes={

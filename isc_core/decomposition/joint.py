@@ -8,16 +8,17 @@ reflectance shows them as bright albedo.
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
 form shows of highlights (`separation.network`): t is the part of log(I / D) that the scene network
 is sure of, and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being nearly white
-(`separation.support.light_tint`). SIRFS on D_1 gives shape and light. They
-give a better separation: where the network removed much of what colour had left
-(`ResidualHighlights.unreliable`), too little of the albedo is visible; it is continued from the
-surroundings, in the shading at that place,
+(`separation.support.light_tint`). Colour and form decide together, region by region, what of that
+was a highlight and what was print (`separation.support.highlight_evidence`); the rest is given
+back. SIRFS on D_1 gives shape and light. They give a better separation: where the network removed
+much of what colour had left (`ResidualHighlights.unreliable`), too little of the albedo is visible;
+it is continued from the surroundings, in the shading at that place,
 
     log R = average of log D_1 - SH(normal) over nearby reliable pixels,
     D = min(D_1, R exp(SH(normal)))
 
-An object is changed only where highlights stand out that colour has left
-(`separation.network.highlights_stand_out`); otherwise the result is MDR's.
+Form adds to colour only where highlights stand out that colour has left
+(`separation.network.highlights_stand_out`).
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
 the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
@@ -43,6 +44,7 @@ from ..networks.scene_network import ScenePrediction, predict_scene
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
+from ..separation.support.highlight_evidence import ODDS, supported
 from ..separation.support.light_tint import limit_tint
 from .layers import separated_first, shaded
 from .lobe import fit_specular
@@ -75,11 +77,14 @@ class JointOptions:
         b of the energy.
     network : NetworkOptions
         When light is taken off.
+    odds : float
+        That removed light was a highlight, to be exceeded; above 0.
     """
 
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
     network: NetworkOptions = field(default_factory=NetworkOptions)
+    odds: float = ODDS
 
 
 @dataclass(frozen=True)
@@ -130,7 +135,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     Returns
     -------
     SceneEstimate
-        MDR's where no residual highlights stand out.
+        Its layers keep only what colour and form support.
 
     Raises
     ------
@@ -142,8 +147,8 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     options, monitor, working = options or JointOptions(), task.monitor, task.working
     split, layers = separated_first(task)
     with task.clock.stage("separation"):
-        residual = detect_residual_highlights(
-            working.image, layers.diffuse, working.mask, task.prediction, options
+        layers, residual = supported_layers(
+            working.image, layers, working.mask, task.prediction, options
         )
     weight = confidence_weight(
         without_unreliable(layers.confidence, residual), task.settings.confidence_weights
@@ -152,7 +157,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     outcome = JointOutcome.UNCHANGED
     if residual is not None:
         outcome = JointOutcome.CONTINUED if step.kept else JointOutcome.REMOVED
-        split = _split(split, residual, step, task, options)
+    split = _split(layers if task.one_scale else split, residual, step, task, options)
     lobe = fit_specular(split, step.shape, task, monitor.part(0.92, 0.96))
     diagnostics = replace(step.shape.diagnostics, lobe=lobe.diagnostics, joint=outcome)
     return SceneEstimate(split, step.shape.height, step.shape.light, diagnostics, lobe.brdf)
@@ -176,6 +181,53 @@ def _step(
     before, after = (energy_of(diffuse, shape, task, weight) for diffuse in (start, cleaner))
     kept = lowers_energy(before, after, start, cleaner, mask, options)
     return JointStep(shape, cleaner if kept else start, kept)
+
+
+def supported_layers(
+    image: np.ndarray,
+    split: Separation,
+    mask: np.ndarray,
+    seen: ScenePrediction | None = None,
+    options: JointOptions | None = None,
+) -> tuple[Separation, ResidualHighlights | None]:
+    """Add what form shows of highlights to what colour shows, and keep what both support.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709.
+    split : Separation
+        By colour.
+    mask : (H, W) ndarray of bool
+        The object.
+    seen : ScenePrediction, optional
+        What the scene network says of the image; by default the shipped one is asked.
+    options : JointOptions, optional
+        Thresholds.
+
+    Returns
+    -------
+    split : Separation
+        By colour; where nothing supports a highlight, diffuse is the image and the rest 0.
+    residual : ResidualHighlights or None
+        What form adds; None if nothing.
+    """
+    options, seen = options or JointOptions(), seen or predict_scene(image, mask)
+    residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
+    cleaner = split.diffuse if residual is None else residual.diffuse
+    kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds)
+    inside = np.where(mask[..., None], image, 0).astype(split.diffuse.dtype)
+    chosen = kept[..., None]
+    split = replace(
+        split,
+        diffuse=np.where(chosen, split.diffuse, inside),
+        specular=np.where(chosen, split.specular, 0),
+        residual=np.where(chosen, split.residual, 0),
+    )
+    if residual is None or not kept.any():
+        return split, None
+    diffuse = np.where(chosen, residual.diffuse, inside)
+    return split, ResidualHighlights(diffuse, residual.unreliable & kept)
 
 
 def detect_residual_highlights(
@@ -308,24 +360,26 @@ def lowers_energy(
 
 def _split(
     start: Separation,
-    residual: ResidualHighlights,
+    residual: ResidualHighlights | None,
     step: JointStep,
     task: DecompositionTask,
     options: JointOptions,
 ) -> Separation:
-    """The layers of the maps' photo, whose separation by colour is `start`; `residual` and `step`
-    are those of the working photo.
+    """The layers of the maps' photo, whose separation by colour is `start`, supported where the
+    two scales are one; `residual` and `step` are those of the working photo.
     """
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
-    if not task.one_scale:
+    if not task.one_scale and (residual is not None or start.specular.any()):
         seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
-        of_maps = detect_residual_highlights(photo.image, start.diffuse, photo.mask, seen, options)
-        if of_maps is None:
-            return start
-        residual, diffuse = of_maps, of_maps.diffuse
-        if step.kept:
-            _, shading = shaded(shape.height, shape.light, photo.mask, dtype)
-            diffuse = continue_albedo(of_maps, shading, of_maps.diffuse, photo.mask)
+        start, of_maps = supported_layers(photo.image, start, photo.mask, seen, options)
+        residual = None if residual is None else of_maps
+        if residual is not None:
+            diffuse = residual.diffuse
+            if step.kept:
+                _, shading = shaded(shape.height, shape.light, photo.mask, dtype)
+                diffuse = continue_albedo(residual, shading, diffuse, photo.mask)
+    if residual is None:
+        return start
     diffuse = diffuse.astype(dtype)
     specular = np.where(
         photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0

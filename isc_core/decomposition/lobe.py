@@ -123,7 +123,7 @@ def fit_specular(
 def _recovered(shading: np.ndarray, task: DecompositionTask) -> RecoveredScene | None:
     if task.known.height is not None:
         return None
-    profile = (task.prior_set or shipped_prior_set()).silhouette
+    profile = (task.prior_set or shipped_prior_set(task.settings.illumination)).silhouette
     normals = silhouette_normals(task.maps.mask, profile)
     lamps = None if task.prediction is None else task.prediction.lamps
     return RecoveredScene(shading, normals, lamps)

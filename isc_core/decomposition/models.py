@@ -2,13 +2,14 @@
 and one function that knows their names.
 
 A model is a function from a `DecompositionTask` to a `SceneEstimate`: `sirfs_only.sirfs`,
-`mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with. `light_colour` decides
-which colour of light they see; those that recover shape and light are given what
-a network sees in the photo (`predictions`), and `assumption_checks` lowers the confidence of
-photos that violate what the models assume.
+`mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with. `toning` makes toned
+photos grey, `light_colour` decides which colour of light they see; those that recover shape and
+light are given what a network sees in the photo (`predictions`), and `assumption_checks` lowers the
+confidence of photos that violate what the models assume.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 from .assumption_checks import with_warnings
@@ -16,6 +17,7 @@ from .light_colour import under_given_light, under_light
 from .predictions import with_predictions
 from .settings import SIRFS_MODELS, Settings
 from .task import DecompositionTask, SceneEstimate, SolveOptions
+from .toning import under_tone
 
 
 def solve(task: DecompositionTask) -> SceneEstimate:
@@ -43,7 +45,8 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     solver = _solver(task.settings.model)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    return under_given_light(task, partial(_solved, solver=solver))
+    lit = partial(under_given_light, solver=partial(_solved, solver=solver))
+    return under_tone(task, lit)
 
 
 def _solved(
@@ -51,7 +54,7 @@ def _solved(
 ) -> SceneEstimate:
     """Predict, solve and check."""
     task = with_predictions(task)
-    estimate = under_light(task, solver)
+    estimate = replace(under_light(task, solver), prediction=task.prediction)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, task.prediction)

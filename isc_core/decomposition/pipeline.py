@@ -22,6 +22,7 @@ from ..scene.known_inputs import DepthObservation, KnownInputs, SceneConstraints
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import share_in_blocks
+from .expected_error import with_expected_error
 from .layers import shaded
 from .models import DecompositionTask, SceneEstimate, Settings, solve
 from .settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
@@ -117,7 +118,10 @@ def decompose(
         estimate.diagnostics,
     )
     with clock.stage("maps"):
-        return assemble(maps, estimate, provenance)
+        result = assemble(maps, estimate, provenance)
+        if estimate.prediction is None or inputs.height is not None:
+            return result
+        return with_expected_error(result, estimate.prediction, working)
 
 
 def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | None) -> None:
@@ -177,7 +181,9 @@ def assemble(photo: Photo, estimate: SceneEstimate, provenance: Provenance) -> D
 
 
 def _confidence(split: Separation, normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The confidence of the separation, lower where the surface turns away from the viewer."""
+    """The confidence where no error can be expected: that of the separation, lower where the
+    surface turns away from the viewer.
+    """
     return np.where(mask, split.confidence * np.sqrt(np.clip(normal[..., 2], 0, 1)), 0).astype(
         np.float32
     )
@@ -255,6 +261,8 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "crop_box": list(mask_box(photo.mask)),
         "transfer": source.transfer,
         "bit_depth": source.bit_depth,
+        "colour_profile": source.colour_profile,
+        "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
         **({} if source.sureness is None else {"mask_sureness": round(source.sureness, 4)}),
     }

@@ -32,8 +32,8 @@ class Illumination(StrEnum):
     Attributes
     ----------
     PHOTO
-        A photo of balanced colours in any light: the priors of natural light, and more trust in
-        what the network predicts.
+        A photo of balanced colours in any light: priors of their own, and more trust in what the
+        network predicts.
     NATURAL
         The MIT-Berkeley objects in natural light.
     LABORATORY
@@ -43,11 +43,6 @@ class Illumination(StrEnum):
     PHOTO = "photo"
     NATURAL = "natural"
     LABORATORY = "laboratory"
-
-    @property
-    def statistics(self) -> str:
-        """Illumination of the data set whose statistics are used."""
-        return Illumination.NATURAL if self == Illumination.PHOTO else self
 
 
 class LightColour(StrEnum):
@@ -61,11 +56,14 @@ class LightColour(StrEnum):
         Estimated from the photo's highlights, where they determine it; else as BALANCED.
     FREE
         Highlights are white, but the light on the diffuse image may have any colour.
+    TONED
+        The photo is a toned grey one, such as sepia: its colours are not of the scene.
     """
 
     BALANCED = "balanced"
     ESTIMATE = "estimate"
     FREE = "free"
+    TONED = "toned"
 
 
 class LightPrior(StrEnum):

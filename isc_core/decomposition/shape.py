@@ -28,7 +28,6 @@ from ..sirfs.recover import Recovered, RecoverOptions, recover
 from ..sirfs.settings import PredictionWeights, Weights, isc_weights, prediction_weights
 from ..sirfs.solver import SolverOptions
 from .layers import scaled_light
-from .settings import Illumination
 from .task import DecompositionTask
 
 # Level of the brightest channels' percentile below, white being 1; it is .23 to .87 in the training
@@ -184,9 +183,9 @@ def _recover(
 
 def _priors(task: DecompositionTask, channels: int) -> Priors:
     """The priors for this photo, with what was predicted of its light."""
-    coefficients = task.light_coefficients
-    statistics = Illumination(task.settings.illumination).statistics
-    priors = (task.prior_set or shipped_prior_set()).priors(statistics, channels)
+    coefficients, illumination = task.light_coefficients, task.settings.illumination
+    prior_set = task.prior_set or shipped_prior_set(illumination)
+    priors = prior_set.priors(illumination, channels)
     light = priors.light
     if coefficients is not None:
         temperature = _prediction_weights(task).light_temperature
@@ -198,7 +197,7 @@ def _priors(task: DecompositionTask, channels: int) -> Priors:
 
 
 def _plain_weights(task: DecompositionTask, channels: int) -> Weights:
-    return isc_weights(Illumination(task.settings.illumination).statistics, channels)
+    return isc_weights(task.settings.illumination, channels)
 
 
 def _weights(task: DecompositionTask, channels: int) -> tuple[Weights, float | None]:

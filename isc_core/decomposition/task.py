@@ -177,6 +177,8 @@ class SceneEstimate:
     log_shading : (h, w, 3) ndarray or None
         A baseline's own log shading at the working scale, where it has one. The maps of a result
         never use it, since their shading is that of the light on the normals.
+    prediction : ScenePrediction or None
+        What the scene network says of the working photo, where it was asked.
     """
 
     split: Separation
@@ -185,3 +187,4 @@ class SceneEstimate:
     diagnostics: Diagnostics
     brdf: LobeFit | None = None
     log_shading: np.ndarray | None = None
+    prediction: ScenePrediction | None = None

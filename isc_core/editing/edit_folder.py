@@ -1,7 +1,8 @@
 """The files of an edit: the picture, in the photo's own encoding, and a contact sheet.
 
 `edit.json` records the parameters and measurements; `edited.png` has the photo's bit depth,
-encoding and alpha (none for a photo of floats); `edited.exr` is the same picture in linear light,
+encoding, colour profile and alpha (none for a photo of floats; sRGB of 16 bits where a PNG cannot
+carry the encoding, such as camera raw); `edited.exr` is the same picture in linear light,
 premultiplied by alpha; `before_after.png` is the contact sheet; `clusters.png`, of recolouring,
 shows the clusters to choose from. A folder appears completely or not at all.
 
@@ -20,9 +21,13 @@ import numpy as np
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
 from ..io.decoders import write_png
+from ..io.decoders.raw import CAMERA_RAW
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
-from ..result_files.contact_sheet import MapPanel, Panel, edit_sheet
+from ..photo.primaries import to_rec709
+from ..photo.transfer import PROFILE
+from ..result_files.contact_sheet import MapPanel, edit_sheet
+from ..result_files.panels import Panel
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
 from .compositing import composite
@@ -174,6 +179,7 @@ def _linear_planes(
         original is not None
         and original.path is not None
         and original.path.suffix.lower() == ".exr"
+        and to_rec709(original.raster.space) is None
     ):
         stored = read_channels(original.path)
         for name in planes:
@@ -221,8 +227,10 @@ def _picture(
         )
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
-    peak = None if bits == 32 else 65535 if bits == 16 else 255
-    kind = np.float32 if peak is None else np.uint16 if bits == 16 else np.uint8
+    if transfer == PROFILE or given.get("colour_profile") == CAMERA_RAW:
+        transfer = "srgb"  # a PNG cannot carry the photo's encoding
+    peak = None if bits == 32 else 65535 if bits > 8 else 255
+    kind = np.float32 if peak is None else np.uint16 if bits > 8 else np.uint8
     empty = Raster(
         np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits
     )

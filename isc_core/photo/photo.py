@@ -8,6 +8,7 @@ from ..errors import InputError
 from ..imaging.area_resize import AreaFilter, resize_apart
 from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
+from ..io.reading_notes import ReadingNote
 from .found_mask import FoundMask
 
 
@@ -24,10 +25,13 @@ class PhotoSource:
     bit_depth : int
         Bits a channel.
     transfer : str
-        The transfer curve used, "srgb" or "linear".
+        The transfer curve used: "srgb", "linear", or "profile" for another one of the file.
     mask_from : str
-        "file", "alpha", "black border", "automatic", "hints", "each" or "whole
-        frame".
+        "file", "alpha", "black border", "automatic", "hints", "each" or "whole frame".
+    colour_profile : str
+        Name of the colour space that the file states, "" without one.
+    notes : tuple of ReadingNote
+        What was assumed or left out.
     sureness : float or None
         Of a mask that was found automatically.
     """
@@ -37,6 +41,8 @@ class PhotoSource:
     bit_depth: int
     transfer: str
     mask_from: str
+    colour_profile: str = ""
+    notes: tuple[ReadingNote, ...] = ()
     sureness: float | None = None
 
 
@@ -52,12 +58,13 @@ class Photo:
         The object. Its pixels may have channels that are zero.
     code_value : float
         Smallest step of the file's coding near black, in linear light: `srgb_to_linear(1/255)` for
-        8-bit sRGB, 1/65535 for 16-bit linear. Floats have no such step: 2^-14 of the object's white
-        (its 99.9th percentile), the step of a 14-bit sensor, so that the exposure of a file does
-        not matter. Zero channels are floored at half of it, in logarithms only.
+        8-bit sRGB and other curves, 1/65535 for 16-bit linear. Floats have no such step: 2^-14 of
+        the object's white (its 99.9th percentile), the step of a 14-bit sensor, so that the
+        exposure of a file does not matter. Zero channels are floored at half of it, in logarithms
+        only.
     clipped : (H, W) bool ndarray
-        Some channel is at the coding's maximum, so the light may have been brighter; never in float
-        files. After resizing: some part of the object's pixel is.
+        Some channel is at the coding's maximum, or the sensor was saturated, so the light may have
+        been brighter; never in float files. After resizing: some part of the object's pixel is.
     original : PhotoSource
         The file.
     scale : float

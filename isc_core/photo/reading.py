@@ -1,29 +1,33 @@
 """Reading a photo and its mask as linear light.
 
-Problem: files store codes (8 or 16 bits, mostly sRGB) or floats; everything behind this folder
-works on linear Rec.709 light with a mask.
+Problem: files store codes (8 or 16 bits, mostly sRGB) or floats, in colour spaces of their own;
+everything behind this folder works on linear Rec.709 light with a mask.
 
 Limits: see `transfer` for colour spaces and `io.decoders` for file formats.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.channels import largest
+from ..imaging.channels import largest, smallest
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import USUAL, Limits
 from ..io.memory import READING, enough_memory
+from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .decontamination import without_background
 from .found_mask import FoundMask, MaskFinder
 from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
-from .transfer import resolve_transfer, to_linear
+from .primaries import to_rec709
+from .transfer import PROFILE, resolve_transfer, to_linear
 
 FLOAT_STEP = 2.0**-14
+_MOST_OUTSIDE = 0.01  # of the object's pixels: fewer need no note
 _DEFECTIVE = 1e9  # times the median light of the object: brighter pixels are defective
 
 
@@ -38,18 +42,21 @@ def read_photo(
 ) -> Photo:
     """Read a photo at full size.
 
-    Formats: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM and NumPy's .npy (its integers are
-    codes), recognised by their content. The mask is `mask_path` (inside: above half of its largest
-    value, or its alpha channel where that is not opaque); else the photo's alpha channel (>= 0.5)
-    where that is not opaque; else, on a black border (at most 2/255 in sRGB), the pixels that are
-    not black, with holes filled and parts smaller than 1 % of the largest dropped.
+    Formats: PNG, JPEG, TIFF, HEIC (with the extra `heic`), AVIF, camera raw (with the extra `raw`),
+    EXR, Radiance HDR, BMP, PPM, PGM and NumPy's .npy (its integers are codes), recognised by their
+    content. Colours are converted from the colour space that the file states.
+
+    The mask is `mask_path` (inside: above half of its largest value, or its alpha channel where
+    that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque; else, on
+    a black border (at most 2/255 in sRGB), the pixels that are not black, with holes filled and
+    parts smaller than 1 % of the largest dropped.
 
     Parameters
     ----------
     path : str or Path
     mask_path : str or Path, optional
     transfer : {"auto", "srgb", "linear"}
-        "auto": floats are linear, all others sRGB.
+        "auto": the curve that the file states; without one floats are linear, all others sRGB.
     whole_frame : bool
         Take all pixels where there is no mask, alpha channel or black border.
     limits : Limits
@@ -149,20 +156,44 @@ def _photo(
         image=light if found is None else without_background(light, found.cover),
         mask=mask,
         code_value=_code_value(raster, used, linear, mask),
-        clipped=np.zeros_like(mask)
-        if raster.peak is None
-        else largest(raster.values) == raster.peak,
+        clipped=_clipped(raster),
         original=PhotoSource(
             raster.sha256,
             (width, height),
             raster.bit_depth,
             used,
             mask_from,
+            "" if raster.space is None else raster.space.name,
+            tuple(_notes(raster, used, linear, mask)),
             None if found is None or mask_from == "hints" else found.sureness,
         ),
         found=found,
         exposed=raster.peak is not None,
     )
+
+
+def _clipped(raster: Raster) -> np.ndarray:
+    if raster.saturated is not None:
+        return raster.saturated
+    if raster.peak is None:
+        return np.zeros(raster.values.shape[:2], bool)
+    return np.asarray(largest(raster.values) == raster.peak)
+
+
+def _notes(
+    raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndarray
+) -> Iterator[ReadingNote]:
+    """What was assumed or left out when the raster was read, and when it became linear light."""
+    unused = raster.space is not None and raster.space.is_table and transfer != PROFILE
+    for note in raster.notes:
+        table = note.kind is ReadingNoteKind.TABLE_PROFILE
+        yield ReadingNote(ReadingNoteKind.UNUSED_PROFILE) if unused and table else note
+    if raster.values.shape[2] == 3 and to_rec709(raster.space) is not None:
+        # No channel is black in the file, one is in Rec.709: it was clipped.
+        outside = mask & (smallest(raster.values) > 0) & (smallest(linear) == 0)
+        share = float(outside.sum() / mask.sum())
+        if share > _MOST_OUTSIDE:
+            yield ReadingNote(ReadingNoteKind.OUT_OF_GAMUT, share)
 
 
 def read_linear(
@@ -238,5 +269,6 @@ def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndar
     if raster.peak is None:
         light = largest(linear)[mask]
         return FLOAT_STEP * float(np.percentile(light, 99.9) or light.max())
-    step = 1.0 / raster.peak
-    return float(srgb_to_linear(step)) if transfer == "srgb" else step
+    # Codes of fewer bits may be spread over more.
+    step = max(1.0 / raster.peak, 1.0 / (2**raster.bit_depth - 1))
+    return step if transfer == "linear" else float(srgb_to_linear(step))

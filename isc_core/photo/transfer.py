@@ -1,14 +1,15 @@
-"""The transfer curve of an image file: from stored codes to linear light, and back.
+"""From stored codes to linear Rec.709 light, and back.
 
 Equation, for a code x in [0, 1] (the real sRGB curve, never a power alone):
     linear = x / 12.92                      if x <= 0.04045
              ((x + 0.055) / 1.055)^2.4      otherwise
+A file that names a colour space has the curves and primaries of that, see `primaries`.
 
 Citation: IEC 61966-2-1:1999; M. Stokes, M. Anderson, S. Chandrasekar, R. Motta, "A Standard Default
 Color Space for the Internet - sRGB" (1996).
 
-Limits: colour profiles and chromaticities in the file are not applied: the primaries are taken to
-be those of Rec.709.
+Limits: a curve that the user names replaces that of the file; the file's primaries remain. Float
+files are linear, whatever curve they name. Colours outside of Rec.709 are clipped at 0.
 """
 
 from collections.abc import Callable
@@ -18,12 +19,19 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
+from ..io.decoders.colour.space import ColourSpace
+from ..io.decoders.colour.table_profile import table_to_srgb
 from ..io.decoders.raster import Raster, as_rgb
 from .names import TRANSFERS
+from .primaries import in_rec709, to_rec709
+
+PROFILE = "profile"
+_CODES = np.arange(256) / 255
+_HALF_A_CODE = 0.5 / 255
 
 
 def resolve_transfer(transfer: str, raster: Raster) -> str:
-    """Return the transfer curve to use, "srgb" or "linear".
+    """Return the transfer curve to use.
 
     Parameters
     ----------
@@ -33,6 +41,7 @@ def resolve_transfer(transfer: str, raster: Raster) -> str:
     Returns
     -------
     str
+        "srgb", "linear", or "profile" for another one that the file names.
 
     Raises
     ------
@@ -41,57 +50,134 @@ def resolve_transfer(transfer: str, raster: Raster) -> str:
     """
     if transfer not in TRANSFERS:
         raise InputError(f"--transfer {transfer}: choose one of {', '.join(TRANSFERS)}")
-    if transfer == "auto":
-        return "linear" if raster.peak is None else "srgb"
-    return transfer
+    if transfer != "auto":
+        return transfer
+    return "linear" if raster.peak is None else _curve_of(raster.space)
+
+
+def _curve_of(space: ColourSpace | None) -> str:
+    """The curve of a colour space, by its usual name if it is within half a code of 8 bits."""
+    if space is not None and space.is_table:
+        return PROFILE
+    if space is None or not space.curves:
+        return "srgb"
+    light = np.stack([curve(_CODES) for curve in space.curves])
+    for name, codes in (("srgb", linear_to_srgb(light)), ("linear", light)):
+        if np.abs(codes - _CODES).max() < _HALF_A_CODE:
+            return name
+    return PROFILE
 
 
 def to_linear(raster: Raster, transfer: str) -> np.ndarray:
-    """Convert a raster to linear light.
+    """Convert a raster to linear Rec.709.
 
     Integer codes go through a table, so that each code has one exact value.
 
     Parameters
     ----------
     raster : Raster
-    transfer : {"srgb", "linear"}
+    transfer : {"srgb", "linear", "profile"}
 
     Returns
     -------
     (H, W, 1 or 3) float32 ndarray
     """
-    decode: Callable[[np.ndarray], np.ndarray] = (
-        srgb_to_linear if transfer == "srgb" else np.asarray
-    )
+    space = raster.space
+    if transfer == PROFILE and space is not None and space.is_table and raster.peak is not None:
+        codes = table_to_srgb(raster.values, raster.peak, space.profile)
+        return to_linear(replace(raster, values=codes, peak=255, space=None), "srgb")
+    linear = _decoded(raster, transfer)
+    matrix = to_rec709(space)
+    return linear if matrix is None or linear.shape[2] == 1 else in_rec709(linear, matrix)
+
+
+def _decoded(raster: Raster, transfer: str) -> np.ndarray:
+    """Linear light (H, W, 1 or 3) of the file's own primaries."""
+    curves = curves_of(raster, transfer)
     if raster.peak is None:
-        return decode(raster.values).astype(np.float32, copy=False)
-    table = decode(np.arange(np.iinfo(raster.values.dtype).max + 1) / raster.peak).astype(
-        np.float32
-    )
-    return table[raster.values]
+        return np.asarray(curves[0](raster.values), np.float32)
+    codes = np.arange(np.iinfo(raster.values.dtype).max + 1) / raster.peak
+    tables = [curve(codes).astype(np.float32) for curve in curves]
+    if len(tables) == 1:
+        return tables[0][raster.values]
+    return np.stack([table[raster.values[..., c]] for c, table in enumerate(tables)], axis=2)
+
+
+def curves_of(raster: Raster, transfer: str) -> tuple[Callable[[np.ndarray], np.ndarray], ...]:
+    """Return the curves from codes in [0, 1] to linear light.
+
+    Parameters
+    ----------
+    raster : Raster
+    transfer : {"srgb", "linear", "profile"}
+        The table of a profile counts as sRGB.
+
+    Returns
+    -------
+    tuple of callable
+        One for all channels, or one a channel.
+    """
+    if transfer == PROFILE and raster.space is not None and raster.space.curves:
+        return raster.space.curves
+    return (np.asarray,) if transfer == "linear" else (srgb_to_linear,)
 
 
 def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.ndarray) -> Raster:
     """Encode an image as a raster is encoded, where it changed; other values keep every bit.
 
+    A raster of a colour space that no PNG can carry becomes one of 16-bit sRGB.
+
     Parameters
     ----------
     raster : Raster
         A grey one gets three channels if the new pixels have colour.
-    transfer : {"srgb", "linear"}
+    transfer : {"srgb", "linear", "profile"}
     image : (H, W, 3) ndarray
-        Linear; codes are rounded and clipped to the coding's range.
+        Linear Rec.709; codes are rounded and clipped to the coding's range.
     changed : (H, W) bool ndarray
 
     Returns
     -------
     Raster
     """
+    coloured = bool((np.ptp(image[changed], axis=-1) > 0).any())
+    if raster.peak is not None and not _fits_png(raster, transfer, coloured):
+        raster, transfer = _as_srgb(raster, transfer), "srgb"
     values = raster.values
-    if values.shape[2] == 1 and (np.ptp(image[changed], axis=-1) > 0).any():
+    if values.shape[2] == 1 and coloured:
         values = as_rgb(values)
-    coded = image[changed][:, : values.shape[2]]
-    coded = linear_to_srgb(coded) if transfer == "srgb" else coded
+    light, matrix = image[changed], to_rec709(raster.space)
+    if matrix is not None and values.shape[2] == 3 and raster.peak is not None:
+        light = np.clip(light @ np.linalg.inv(matrix).T.astype(np.float32), 0, 1)
+    coded = _encoded(light[:, : values.shape[2]], raster, transfer)
     result = values.copy()
     result[changed] = coded if raster.peak is None else np.rint(np.clip(coded, 0, 1) * raster.peak)
     return replace(raster, values=result)
+
+
+def _fits_png(raster: Raster, transfer: str, coloured: bool) -> bool:
+    """Whether a PNG can say what the codes mean: by their own profile, or as plain sRGB."""
+    space = raster.space
+    if space is None or (to_rec709(space) is None and transfer == _curve_of(space) == "srgb"):
+        return True
+    return (
+        bool(space.profile) and not space.is_table and (raster.values.shape[2] == 3 or not coloured)
+    )
+
+
+def _as_srgb(raster: Raster, transfer: str) -> Raster:
+    codes = np.rint(65535 * np.clip(linear_to_srgb(to_linear(raster, transfer)), 0, 1))
+    return replace(raster, values=codes.astype(np.uint16), peak=65535, bit_depth=16, space=None)
+
+
+def _encoded(light: np.ndarray, raster: Raster, transfer: str) -> np.ndarray:
+    """Codes in [0, 1] of linear light (N, C)."""
+    if transfer != PROFILE:
+        return linear_to_srgb(light) if transfer == "srgb" else light
+    codes = np.linspace(0.0, 1.0, 65536)
+    curves = curves_of(raster, transfer)
+    planes = (
+        np.interp(light[:, c], curves[min(c, len(curves) - 1)](codes), codes)
+        for c in range(light.shape[1])
+    )
+    return np.stack([*planes], axis=1)

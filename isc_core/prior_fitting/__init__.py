@@ -6,7 +6,7 @@ selection of them into a `PriorSet`; `cross_validation` scores a selection on th
 import `sirfs.priors` only.
 """
 
-from .fit import FitOptions, LightFitOptions, fit_priors
+from .fit import FitOptions, LightFitOptions, fit_photo_priors, fit_priors
 from .statistics import ObjectStatistics, TrainingObject, collect_statistics
 from .training_objects import read_training_objects
 
@@ -16,6 +16,7 @@ __all__ = [
     "ObjectStatistics",
     "TrainingObject",
     "collect_statistics",
+    "fit_photo_priors",
     "fit_priors",
     "read_training_objects",
 ]

@@ -29,19 +29,19 @@ class TrainingObject:
         Where the reflectance is reliable.
     height : (H, W) ndarray
         Pixels toward the viewer, NaN where unknown.
-    natural_light, laboratory_light : (9, 3) ndarray
-        Log-shading SH coefficients, reference convention (`sirfs.priors.priors`).
     mask : (H, W) bool ndarray
         The object.
+    natural_light, laboratory_light : (9, 3) ndarray or None
+        Log-shading SH coefficients, reference convention (`sirfs.priors.priors`), where known.
     """
 
     name: str
     reflectance: np.ndarray
     valid: np.ndarray
     height: np.ndarray
-    natural_light: np.ndarray
-    laboratory_light: np.ndarray
     mask: np.ndarray
+    natural_light: np.ndarray | None = None
+    laboratory_light: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class ObjectStatistics:
     grey_log_reflectance : (n, 1) float32 ndarray
         All valid pixels; grey is the mean of the channels.
     outline : SilhouetteMoments
-    natural_light, laboratory_light : (9, 3) ndarray
+    natural_light, laboratory_light : (9, 3) ndarray or None
+        Where known.
     """
 
     curvature: Magnitudes
@@ -66,8 +67,8 @@ class ObjectStatistics:
     log_reflectance: np.ndarray
     grey_log_reflectance: np.ndarray
     outline: SilhouetteMoments
-    natural_light: np.ndarray
-    laboratory_light: np.ndarray
+    natural_light: np.ndarray | None = None
+    laboratory_light: np.ndarray | None = None
 
     def second_moment(self) -> np.ndarray:
         """Return the mean of a a^T over the log reflectances a, (3, 3)."""

@@ -47,8 +47,8 @@ def read_training_objects(
             laboratory.reflectance,
             laboratory.valid,
             laboratory.height,
+            laboratory.mask,
             natural.light,
             laboratory.light,
-            laboratory.mask,
         )
     return objects

@@ -7,16 +7,15 @@ linear light and encoded as sRGB at the end. Maps are cropped to the object and 
 mask as weight, so that no black bleeds in at the edge.
 
 The height is drawn as a relief lit from the upper left, with contour lines at round distances; the
-light as a white sphere.
+light as a white sphere. `other_views` draws the object from both sides and in another light.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path, PurePath
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFilter, ImageFont
+from PIL import Image, ImageDraw, ImageFont
 
 from ..errors import InputError
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
@@ -25,40 +24,33 @@ from ..io.printable_names import readable
 from ..scene.decomposition import Decomposition, Separation
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.spherical_harmonics import real_sh
+from .error_colors import SCALE, error_colors
+from .other_views import relit_panel, turned_panels
+from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 
-_PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
+_GAP, _EDGE, _LABEL, _HEAD = 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
+_KEY = 10  # pixels: side of a key's square
 _SMALL = 480  # pixels: long side of a sheet's thumbnail
-_MARGIN = 0.06  # room around the object, of the panel's side
 _TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
     (1.0, 0.42, 0.04),
     (0.06, 0.3, 1.0),
     (0.06, 0.06, 0.06),
 )  # linear
+_SHOWN = (
+    "image",
+    "diffuse",
+    "specular",
+    "reflectance",
+    "shading",
+    "normal",
+    "height",
+)  # maps that panels are drawn from
 _FULL_ERROR = 0.1  # of the photo's white: errors above it have the full colour
 
 
-@dataclass(frozen=True)
-class Panel:
-    """One picture of a sheet.
-
-    Attributes
-    ----------
-    color : (N, N, 3) ndarray
-        Linear.
-    coverage : (N, N) ndarray
-        In [0, 1].
-    label, remark : str
-    """
-
-    color: np.ndarray
-    coverage: np.ndarray
-    label: str
-    remark: str = ""
-
-
 def contact_sheet(decomposition: Decomposition) -> Image.Image:
-    """Draw the sheet of a decomposition: eight panels, 4 x 2, and a title from its provenance.
+    """Draw the sheet of a decomposition: twelve panels, 4 x 3, and a title from its provenance.
 
     Parameters
     ----------
@@ -69,41 +61,55 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     PIL.Image.Image
     """
     d = decomposition
-    frame = _Frame.around(d.mask)
+    frame = Frame.around(d.mask)
+    small = {name: frame.scaled(getattr(d, name)) for name in _SHOWN}
     photo, albedo, light = (
-        _exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
+        exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
     )
-    ball, coverage = _ball(d.illumination)
-    ball_light = min(
-        light, _exposure(ball[coverage > 0.5])
-    )  # the ball shows more directions than the object
+    share = f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light"
     colors = [
-        (d.image, photo, "Input", ""),
-        (d.diffuse, photo, "Diffuse", ""),
-        (
-            d.specular,
-            photo,
-            "Specular",
-            f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light",
-        ),
-        (d.reflectance, albedo, "Reflectance", ""),
-        (d.shading, light, "Shading", ""),
+        ("image", photo, "Input", ""),
+        ("diffuse", photo, "Diffuse", ""),
+        ("specular", photo, "Specular", share),
+        ("reflectance", albedo, "Reflectance", ""),
+        ("shading", light, "Shading", ""),
     ]
     panels = [
-        Panel(gain * frame.scaled(values), frame.coverage, label, remark)
-        for values, gain, label, remark in colors
+        Panel(gain * small[name], frame.coverage, label, remark)
+        for name, gain, label, remark in colors
     ]
     panels.append(
         Panel(
-            srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)),
+            srgb_to_linear(0.5 + 0.5 * small["normal"]),
             frame.coverage,
             "Normals",
             "x right, y up, z to viewer",
         )
     )
-    panels.append(_relief(d, frame))
-    panels.append(Panel(ball_light * ball, coverage, "Light", "on a white sphere"))
+    panels += [_relief(d, frame, small), _light_panel(d, light)]
+    panels += [*turned_panels(d, frame, small, photo), relit_panel(d, frame, small)]
+    panels.append(_error_panel(d, frame))
     return _sheet(*_title(d), panels, columns=4)
+
+
+def _light_panel(d: Decomposition, gain: float) -> Panel:
+    """The light on a white sphere, which shows more directions than the object: darker than `gain`
+    where it would be too bright.
+    """
+    ball, coverage = _ball(d.illumination)
+    gain = min(gain, exposure(ball[coverage > 0.5]))
+    return Panel(gain * ball, coverage, "Light", "on a white sphere")
+
+
+def _error_panel(d: Decomposition, frame: Frame) -> Panel:
+    """The expected error of the normals; the confidence where it is not known."""
+    if d.expected_error is None:
+        grey = srgb_to_linear(np.clip(frame.scaled(d.confidence), 0, 1))
+        color = np.repeat(grey[..., None], 3, axis=2)
+        return Panel(color, frame.coverage, "Confidence", "white is 1")
+    color = srgb_to_linear(error_colors(frame.scaled(d.expected_error.normal)))
+    keys = tuple((f"{step}°", code) for step, code in SCALE)
+    return Panel(color, frame.coverage, "Normals off by", "", keys)
 
 
 def thumbnail(sheet: Path, target: Path) -> None:
@@ -145,7 +151,7 @@ def separation_sheet(
     -------
     PIL.Image.Image
     """
-    frame, gain = _Frame.around(mask), _exposure(image[mask])
+    frame, gain = Frame.around(mask), exposure(image[mask])
     share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
     maps = [
         (image, "Input", ""),
@@ -197,7 +203,7 @@ def comparison_sheet(
     -------
     PIL.Image.Image
     """
-    frame, gain = _Frame.around(mask), _exposure(image[mask])
+    frame, gain = Frame.around(mask), exposure(image[mask])
 
     def panel(values: np.ndarray, label: str, remark: str = "") -> Panel:
         return Panel(frame.scaled(values), frame.coverage, label, remark)
@@ -287,12 +293,12 @@ def edit_sheet(
     -------
     PIL.Image.Image
     """
-    first = _exposure(maps[0].values[maps[0].mask])
+    first = exposure(maps[0].values[maps[0].mask])
     panels = []
     for entry in maps:
         frame, gain = (
-            _Frame.around(entry.mask),
-            _exposure(entry.values[entry.mask]) if entry.own_exposure else first,
+            Frame.around(entry.mask),
+            exposure(entry.values[entry.mask]) if entry.own_exposure else first,
         )
         panels.append(
             Panel(gain * frame.scaled(entry.values), frame.coverage, entry.label, entry.remark)
@@ -310,68 +316,6 @@ def _error_colors(error: np.ndarray) -> np.ndarray:
     )
 
 
-@dataclass(frozen=True)
-class _Frame:
-    """Placement of a map in a panel: the object's box, (first row, end row, first column, end
-    column), scaled by `zoom` and centred.
-    """
-
-    mask: np.ndarray
-    box: tuple[int, int, int, int]
-    zoom: float
-
-    @classmethod
-    def around(cls, mask: np.ndarray) -> "_Frame":
-        rows, columns = np.nonzero(mask)
-        box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
-        return cls(mask, box, _PANEL * (1 - 2 * _MARGIN) / max(box[1] - box[0], box[3] - box[2]))
-
-    @cached_property
-    def coverage(self) -> np.ndarray:
-        """Coverage of each pixel of the panel, (N, N), by the object; the outline of a small object
-        is smoothed.
-        """
-        zoom = max(1.0, self.zoom)
-        soft = Image.fromarray(np.rint(255 * self._weight).astype(np.uint8))
-        if zoom > 1:
-            soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
-        return np.clip((np.asarray(soft, np.float32) / 255 - 0.5) * zoom + 0.5, 0, 1)
-
-    def scaled(self, values: np.ndarray) -> np.ndarray:
-        """A map, (H, W) or (H, W, C), scaled to the panel, (N, N) or (N, N, C); 0 outside the
-        mask.
-        """
-        if values.ndim == 3:
-            return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
-        weight = self._weight
-        return np.where(
-            weight > 1e-3,
-            self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
-            0,
-        )
-
-    @cached_property
-    def _weight(self) -> np.ndarray:
-        return self._resized(self.mask)
-
-    def _resized(self, plane: np.ndarray) -> np.ndarray:
-        first_row, end_row, first_column, end_column = self.box
-        # An empty border, so that the object's outline is soft all around.
-        window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
-        height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
-        panel = np.zeros((_PANEL, _PANEL), np.float32)
-        top, left = (_PANEL - height) // 2, (_PANEL - width) // 2
-        panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
-            (width, height), Image.Resampling.BILINEAR
-        )
-        return panel
-
-
-def _exposure(inside: np.ndarray) -> float:
-    bright = float(np.percentile(inside.max(-1), 99.5))
-    return 0.95 / bright if bright > 0 else 1.0
-
-
 def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
     return float(
         part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9)
@@ -380,8 +324,8 @@ def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
 
 def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A white ball under the light, (N, N, 3), and its coverage, (N, N)."""
-    radius = _PANEL * (0.5 - _MARGIN) * 0.9
-    axis = (np.arange(_PANEL) + 0.5 - _PANEL / 2) / radius
+    radius = SIDE * (0.5 - MARGIN) * 0.9
+    axis = (np.arange(SIDE) + 0.5 - SIDE / 2) / radius
     x, y = np.meshgrid(axis, -axis)
     distance = np.hypot(x, y)
     shrink = np.minimum(
@@ -392,13 +336,12 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return color.astype(np.float32), np.clip(coverage, 0, 1).astype(np.float32)
 
 
-def _relief(d: Decomposition, frame: _Frame) -> Panel:
+def _relief(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
     """The height map shaded by a light at the upper left, with contour lines."""
     heights = d.height[d.mask]
     low, high = float(heights.min()), float(heights.max())
     spacing = _round_step((high - low) / 12)
-    normal = frame.scaled(d.normal)
-    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    normal = unit_normals(small["normal"])
     light, low_tone, high_tone, key_tone, fill_tone = np.array(
         [
             [-0.52, 0.58, 0.63],
@@ -413,7 +356,7 @@ def _relief(d: Decomposition, frame: _Frame) -> Panel:
         np.clip((normal @ light + 0.3) / 1.3, 0, 1) ** 1.5,
         0.6 + 0.4 * normal[..., 1],
     )  # an area light: a soft shadow edge
-    height = frame.scaled(d.height)
+    height = small["height"]
     tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
     base = (1 - tint) * low_tone + tint * high_tone
     color = base * (0.95 * key[..., None] * key_tone + 0.16 * fill_light[..., None] * fill_tone)
@@ -471,8 +414,8 @@ def _gloss(fit: LobeFit) -> str:
 
 def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> Image.Image:
     rows = -(-len(panels) // columns)
-    width = 2 * _EDGE + columns * _PANEL + (columns - 1) * _GAP
-    height = _HEAD + rows * (_PANEL + _LABEL) + (rows - 1) * _GAP + _EDGE
+    width = 2 * _EDGE + columns * SIDE + (columns - 1) * _GAP
+    height = _HEAD + rows * (SIDE + _LABEL) + (rows - 1) * _GAP + _EDGE
     sheet = Image.new("RGB", (width, height), _PAGE)
     draw = ImageDraw.Draw(sheet)
     _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
@@ -480,19 +423,30 @@ def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> 
     card = _rounded()
     for index, panel in enumerate(panels):
         row, column = divmod(index, columns)
-        x, y = _EDGE + column * (_PANEL + _GAP), _HEAD + row * (_PANEL + _LABEL + _GAP)
+        x, y = _EDGE + column * (SIDE + _GAP), _HEAD + row * (SIDE + _LABEL + _GAP)
         sheet.paste(_picture(panel), (x, y), card)
-        end = _write(draw, (x + 2, y + _PANEL + 27), panel.label, 18, _TEXT, _PANEL)
-        _write(
-            draw,
-            (x + _PANEL - 2, y + _PANEL + 27),
-            panel.remark,
-            14,
-            _FAINT,
-            x + _PANEL - end - 12,
-            right=True,
-        )
+        end = _write(draw, (x + 2, y + SIDE + 27), panel.label, 18, _TEXT, SIDE)
+        right = _write_keys(draw, (x + SIDE - 2, y + SIDE + 27), panel.keys)
+        _write(draw, (right, y + SIDE + 27), panel.remark, 14, _FAINT, right - end - 10, right=True)
     return sheet
+
+
+def _write_keys(
+    draw: ImageDraw.ImageDraw,
+    place: tuple[float, float],
+    keys: Sequence[tuple[str, tuple[int, int, int]]],
+) -> float:
+    """Draw squares of colour with their texts, the last at the right end `place`; return where they
+    begin.
+    """
+    right, baseline = place
+    font = ImageFont.load_default(14)
+    for text, color in reversed(keys):
+        draw.text((right, baseline), text, fill=_FAINT, font=font, anchor="rs")
+        right -= font.getlength(text) + 4
+        draw.rectangle((right - _KEY, baseline - _KEY, right, baseline), fill=color)
+        right -= _KEY + 8
+    return right
 
 
 def _write(
@@ -531,6 +485,6 @@ def _picture(panel: Panel) -> Image.Image:
 
 def _rounded() -> Image.Image:
     """The card's shape, with smooth round corners."""
-    shape = Image.new("L", (4 * _PANEL, 4 * _PANEL), 0)
-    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * _PANEL - 1, 4 * _PANEL - 1), 48, fill=255)
-    return shape.resize((_PANEL, _PANEL), Image.Resampling.LANCZOS)
+    shape = Image.new("L", (4 * SIDE, 4 * SIDE), 0)
+    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * SIDE - 1, 4 * SIDE - 1), 48, fill=255)
+    return shape.resize((SIDE, SIDE), Image.Resampling.LANCZOS)

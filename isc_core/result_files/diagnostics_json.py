@@ -14,12 +14,14 @@ from typing import Any, TypeVar
 from ..scene.diagnostics import (
     AssumptionWarning,
     Diagnostics,
+    ExpectedErrorDiagnostics,
     IlluminantOutcome,
     JointOutcome,
     LightColourDiagnostics,
     LobeDiagnostics,
     LobeFitOutcome,
     LobeStatus,
+    PhotoColours,
     StopReason,
     WarningKind,
 )
@@ -86,9 +88,11 @@ def diagnostics_from_json(status: Any) -> Diagnostics:
         or _old_meaning(_OLD_JOINT, status.get("joint")),
         lobe=_old_lobe(status.get("gloss")) if old else _lobe(status.get("lobe")),
         light_colour=_light_colour(status.get("light_colour")),
+        photo_colours=_member(PhotoColours, status.get("photo_colours")),
         scene_classes=_numbers(status.get("kinds" if old else "scene_classes")),
         light_counts=_numbers(status.get("lamps" if old else "light_counts")),
         several_lights=_number(status.get("several_lamps" if old else "several_lights")),
+        expected_error=_expected_error(status.get("expected_error")),
         warnings=_old_warnings(status.get("doubts")) if old else _warnings(status.get("warnings")),
     )
 
@@ -115,6 +119,15 @@ def old_lobe_outcome(reason: str) -> LobeFitOutcome:
     if outcome is None:
         raise ValueError(f"unknown reason {reason[:80]!r}")
     return outcome
+
+
+def _expected_error(record: Any) -> ExpectedErrorDiagnostics | None:
+    if not isinstance(record, Mapping):
+        return None
+    normal, reflectance = (_number(record.get(k)) for k in ("normal_degrees", "log_reflectance"))
+    if normal is None or reflectance is None:
+        return None
+    return ExpectedErrorDiagnostics(normal, reflectance)
 
 
 def _lobe(record: Any) -> LobeDiagnostics | None:

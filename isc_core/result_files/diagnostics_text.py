@@ -1,29 +1,36 @@
 """The diagnostics of a result as sentences, for commands and for programs that show a result."""
 
+import math
 from typing import Any
 
 from ..scene.diagnostics import (
     AssumptionWarning,
     Diagnostics,
+    ExpectedErrorDiagnostics,
     JointOutcome,
     LightColourDiagnostics,
     LobeDiagnostics,
     LobeFitOutcome,
     LobeStatus,
+    PhotoColours,
     WarningKind,
 )
 from .diagnostics_json import diagnostics_from_json
 
-STOPPED_EARLY = (
-    "the solver reached its evaluation limit, so the result may not be its best: try a cleaner "
-    "mask or the other --illumination"
-)
-STRONG_COLOUR = (
-    "the light, or all of the object, may have a strong colour: highlights and albedo are less "
-    "reliable; use white light"
-)
-COLOURED = "the light is coloured: use --light-colour estimate to account for it"
+_MOST_LOG = 10.0  # larger errors of the logarithm come from somebody else's file
+STOPPED_EARLY = "the solver reached its limit, so more may be possible: try a cleaner mask"
+STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
+COLOURED = "the light is coloured: use --light-colour estimate"
 
+_COLOURS = {
+    PhotoColours.GREY: (
+        "the photo is grey: the light has no colour, and shape and reflectance are less certain"
+    ),
+    PhotoColours.TONED: (
+        "the photo is a toned grey one, such as sepia: it is solved as grey, and its tone is in "
+        "the reflectance"
+    ),
+}
 _JOINT = {
     JointOutcome.UNCHANGED: "no highlights beyond those that colour shows: the result is mdr's",
     JointOutcome.REMOVED: (
@@ -55,16 +62,14 @@ _LOBE_STATUS = {
 }
 _WARNINGS = {
     WarningKind.MIRROR_OR_GLASS: (
-        "the object looks like a mirror or transparent: the maps describe an opaque object, and "
-        "are unreliable"
+        "it looks transparent or like a mirror: dull it with matting spray, or use an opaque object"
     ),
     WarningKind.SEVERAL_LIGHTS: (
-        "there seem to be several lights, and the models assume one: shape, albedo and roughness "
-        "are less reliable; use one light if you can"
+        "several lights, or a shadow of another thing: use one light with nothing in its way"
     ),
-    WarningKind.CLIPPED: "{share}of the object is clipped, and is a guess there; expose less",
+    WarningKind.CLIPPED: "{share}of the object is clipped, and is a guess there: expose less",
     WarningKind.RAGGED_MASK: (
-        "the mask is so thin or ragged that the mesh leaves out {share}of it: fill the mask"
+        "{share}of the mask is too thin or ragged for a mesh, as hair is: fill the mask"
     ),
 }
 
@@ -96,13 +101,17 @@ def note_lines(diagnostics: Diagnostics) -> list[str]:
     Returns
     -------
     list of str
-        Lines that begin with "note: " or "gloss: ".
+        Lines that begin with "note: ", "gloss: " or "expected error: ".
     """
     lines = [f"note: {STOPPED_EARLY}"] if diagnostics.converged is False else []
     if diagnostics.lobe is not None:
         lines.append(f"gloss: {lobe_text(diagnostics.lobe)}")
+    if diagnostics.expected_error is not None:
+        lines.append(f"expected error: {expected_error_text(diagnostics.expected_error)}")
     advice = light_colour_advice(diagnostics.light_colour)
     lines += [f"note: {advice}"] if advice else []
+    if diagnostics.photo_colours in _COLOURS:
+        lines.append(f"note: {_COLOURS[diagnostics.photo_colours]}")
     return lines + [f"note: {warning_text(warning)}" for warning in diagnostics.warnings]
 
 
@@ -156,6 +165,23 @@ def lobe_text(lobe: LobeDiagnostics) -> str:
     if outcome.bounded:
         return f"roughness at most {high:.2f}: {_LOBE[outcome]}"
     return f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"
+
+
+def expected_error_text(error: ExpectedErrorDiagnostics) -> str:
+    """Write how wrong a result probably is.
+
+    Parameters
+    ----------
+    error : ExpectedErrorDiagnostics
+        Means over the object.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    factor = math.exp(min(error.reflectance, _MOST_LOG))
+    return f"normals {error.normal:.0f} degrees, reflectance a factor of {factor:.2f}"
 
 
 def light_colour_advice(light: LightColourDiagnostics | None) -> str:

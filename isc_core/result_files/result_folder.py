@@ -4,8 +4,9 @@ A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomp
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
 that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
 mask was found in the photo. With a fitted lobe, `maps.exr` has one more layer, `lobe`: the specular
-image that the fit predicts. A separation's folder holds `separation.exr`, `diffuse.png`,
-`specular.png`, `preview.png`. A folder appears completely or not at all (see `io.atomic`).
+image that the fit predicts; where errors can be expected, `expected_error` has them. A separation's
+folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
+completely or not at all (see `io.atomic`).
 """
 
 import json
@@ -29,6 +30,7 @@ from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..photo.grabcut import encoded_mask
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
+from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
 from .arrays_file import ARRAYS, write_arrays
 from .contact_sheet import contact_sheet, separation_sheet
@@ -44,6 +46,7 @@ LAYERS = {
     "confidence": "Y",
 }
 LOBE = {"lobe": "RGB"}
+EXPECTED_ERROR = ("expected_error.normal", "expected_error.reflectance")
 SINGLE = {
     "diffuse": "RGB",
     "specular": "RGB",
@@ -111,6 +114,8 @@ def save(
     channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
     if decomposition.brdf is not None:
         channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
+    if (error := decomposition.expected_error) is not None:
+        channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
     if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     # The pool inside the folder: the preview is done, or has failed, before the folder is removed.
@@ -180,6 +185,7 @@ def load(folder: Path | str) -> Decomposition:
         illumination=_coefficients(description, folder),
         provenance=_provenance(description, folder),
         brdf=_brdf(description, channels, folder),
+        expected_error=_expected_error(channels, folder / "maps.exr"),
     )
 
 
@@ -330,7 +336,8 @@ def _layers(
     channels: Mapping[str, np.ndarray], layers: Mapping[str, str], path: Path
 ) -> dict[str, np.ndarray]:
     names = {
-        layer: [f"{layer}.{letter}" for letter in letters] for layer, letters in layers.items()
+        layer: [f"{layer}.{letter}" for letter in letters] or [layer]
+        for layer, letters in layers.items()
     }
     if missing := [name for group in names.values() for name in group if name not in channels]:
         raise InputError(
@@ -392,6 +399,14 @@ def _brdf(
         ) from error
 
 
+def _expected_error(channels: Mapping[str, np.ndarray], path: Path) -> ExpectedError | None:
+    """None without one, as in results of baselines and of earlier versions."""
+    if not any(name in channels for name in EXPECTED_ERROR):
+        return None
+    maps = _layers(channels, dict.fromkeys(EXPECTED_ERROR, ""), path)
+    return ExpectedError(*(maps[name] for name in EXPECTED_ERROR))
+
+
 def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
     from .diagnostics_json import diagnostics_from_json
 
@@ -427,7 +442,7 @@ def _wrong_input(given: Mapping[str, Any]) -> str:
         return "size"
     texts = (
         name
-        for name in ("name", "sha256", "transfer", "mask_from")
+        for name in ("name", "sha256", "transfer", "mask_from", "colour_profile")
         if not isinstance(given.get(name, ""), str)
     )
     return next(texts, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")

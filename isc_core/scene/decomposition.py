@@ -12,6 +12,7 @@ import numpy as np
 
 from ..shading.spherical_harmonics import real_sh
 from .diagnostics import Diagnostics
+from .expected_error import ExpectedError
 from .lobe_fit import LobeFit
 
 
@@ -114,13 +115,15 @@ class Decomposition:
     mask : (H, W) ndarray of bool
         The object.
     confidence : (H, W) ndarray
-        In [0, 1].
+        In [0, 1]; falls with the expected error of the normals.
     illumination : (9, 3) ndarray of float64
         log shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics.
     provenance : Provenance
         Origin of the result.
     brdf : LobeFit or None
         Lobe fitted to the specular layer; None where no fit was tried.
+    expected_error : ExpectedError or None
+        How wrong normals and reflectance probably are; None where it is not known.
     """
 
     image: np.ndarray
@@ -136,6 +139,7 @@ class Decomposition:
     illumination: np.ndarray
     provenance: Provenance
     brdf: LobeFit | None = None
+    expected_error: ExpectedError | None = None
 
     def identity_errors(self) -> IdentityErrors:
         """Measure how well the maps satisfy the identities inside the mask.

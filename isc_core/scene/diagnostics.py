@@ -125,6 +125,24 @@ class IlluminantOutcome(StrEnum):
     STRONG_HIGHLIGHT_COLOUR = "strong highlight colour"
 
 
+class PhotoColours(StrEnum):
+    """Whether a photo has colours of its own.
+
+    Attributes
+    ----------
+    COLOURED
+        It has.
+    GREY
+        Its channels are equal.
+    TONED
+        It is a grey photo that was toned, such as sepia.
+    """
+
+    COLOURED = "coloured"
+    GREY = "grey"
+    TONED = "toned"
+
+
 class WarningKind(StrEnum):
     """An assumption that a photo violates.
 
@@ -221,6 +239,22 @@ class LightColourDiagnostics:
 
 
 @dataclass(frozen=True)
+class ExpectedErrorDiagnostics:
+    """Means over the object of the expected errors, see `scene.expected_error`.
+
+    Attributes
+    ----------
+    normal : float
+        Degrees.
+    reflectance : float
+        Of the natural logarithm.
+    """
+
+    normal: float
+    reflectance: float
+
+
+@dataclass(frozen=True)
 class Diagnostics:
     """How a decomposition ended. None, or empty, where a step was not run.
 
@@ -242,12 +276,16 @@ class Diagnostics:
         The fitted lobe.
     light_colour : LightColourDiagnostics or None
         The colour of the light.
+    photo_colours : PhotoColours or None
+        Whether the photo has colours.
     scene_classes : dict of str to float
         Probabilities of what the object is made of: "opaque", "mirror" and "glass".
     light_counts : dict of str to float
         Probabilities of "none", "one" and "several" lights.
     several_lights : float or None
         Probability of several lights.
+    expected_error : ExpectedErrorDiagnostics or None
+        How wrong normals and reflectance probably are.
     warnings : tuple of AssumptionWarning
         Violated assumptions.
     """
@@ -261,14 +299,16 @@ class Diagnostics:
     joint: JointOutcome | None = None
     lobe: LobeDiagnostics | None = None
     light_colour: LightColourDiagnostics | None = None
+    photo_colours: PhotoColours | None = None
     scene_classes: dict[str, float] = field(default_factory=dict)
     light_counts: dict[str, float] = field(default_factory=dict)
     several_lights: float | None = None
+    expected_error: ExpectedErrorDiagnostics | None = None
     warnings: tuple[AssumptionWarning, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Return the entry `status` of decomposition.json, without the steps that were not run."""
-        lobe, light = self.lobe, self.light_colour
+        lobe, light, error = self.lobe, self.light_colour, self.expected_error
         entries: dict[str, Any] = {
             "converged": self.converged,
             "reason": self.reason and self.reason.value,
@@ -292,9 +332,12 @@ class Diagnostics:
                 "outcome": light.outcome.value,
                 "coloured": light.coloured,
             },
+            "photo_colours": self.photo_colours and self.photo_colours.value,
             "scene_classes": self.scene_classes,
             "light_counts": self.light_counts,
             "several_lights": self.several_lights,
+            "expected_error": error
+            and {"normal_degrees": error.normal, "log_reflectance": error.reflectance},
         }
         kept = {name: value for name, value in entries.items() if value is not None and value != {}}
         return kept | {

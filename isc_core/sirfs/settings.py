@@ -122,6 +122,9 @@ ISC_GREY_NATURAL = replace(
     starts=ISC_NATURAL.starts,
 )
 
+ISC_PHOTO = ISC_NATURAL
+ISC_GREY_PHOTO = ISC_GREY_NATURAL
+
 
 @dataclass(frozen=True)
 class PredictionWeights:
@@ -248,7 +251,7 @@ def isc_weights(illumination: str, channels: int) -> Weights:
     Parameters
     ----------
     illumination : str
-        "natural" or "laboratory".
+        "photo", "natural" or "laboratory".
     channels : int
         3 or 1.
 
@@ -256,9 +259,11 @@ def isc_weights(illumination: str, channels: int) -> Weights:
     -------
     Weights
     """
-    if channels == 1:
-        return ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
-    return ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+    colour, grey = {
+        "photo": (ISC_PHOTO, ISC_GREY_PHOTO),
+        "natural": (ISC_NATURAL, ISC_GREY_NATURAL),
+    }.get(illumination, (ISC_LABORATORY, ISC_GREY_LABORATORY))
+    return grey if channels == 1 else colour
 
 
 def published_weights(illumination: str, channels: int) -> Weights:

@@ -87,12 +87,12 @@ def known_file(path: Path, kind: type, channels: int = 3) -> np.ndarray:
 def test_an_unchanged_file_is_used_directly(tmp_path: Path) -> None:
     codes16 = known_file(tmp_path / "deep.png", np.uint16)
     path, transfer = given(bpy.data.images.load(str(tmp_path / "deep.png")), tmp_path)
-    assert path == tmp_path / "deep.png" and transfer == "srgb"
+    assert path == tmp_path / "deep.png" and transfer == "auto"
     np.testing.assert_array_equal(read_raster(path).values, codes16[..., ::-1])
 
 
 @pytest.mark.parametrize(
-    ("space", "transfer"), [("sRGB", "srgb"), ("Non-Color", "linear"), ("Linear Rec.709", "linear")]
+    ("space", "transfer"), [("sRGB", "auto"), ("Non-Color", "linear"), ("Linear Rec.709", "linear")]
 )
 def test_the_colour_space_determines_the_transfer(
     tmp_path: Path, space: str, transfer: str
@@ -303,6 +303,16 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     image.filepath = str(tmp_path / "nowhere.png")
     image.reload()
     with pytest.raises(InputError, match=r"photo has no data: its file .*nowhere.png is missing"):
+        inspect_image(image)
+
+
+def test_a_file_that_blender_cannot_show_names_the_remedy(tmp_path: Path) -> None:
+    (tmp_path / "phone.heic").write_bytes(b"\0\0\0\x18ftypheic" + bytes(100))
+    image = generated()
+    image.source = "FILE"
+    image.filepath = str(tmp_path / "phone.heic")
+    image.reload()
+    with pytest.raises(InputError, match="is a HEIC file, which Blender cannot show: save it"):
         inspect_image(image)
 
 

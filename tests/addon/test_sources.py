@@ -23,7 +23,8 @@ def result(folder: Path) -> Path:
 def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_them(
     tmp_path: Path,
 ) -> None:
-    for name in ("b.png", "b_mask.png", "a.JPG", "notes.txt", ".hidden.png"):
+    names = ("b.png", "b_mask.png", "a.JPG", "notes.txt", ".hidden.png", "d.HEIC", "e.cr2")
+    for name in names:
         touch(tmp_path / name)
     result(tmp_path / "c")
     touch(tmp_path / "empty" / "x.png")  # folders in folders are not searched
@@ -31,6 +32,8 @@ def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_t
         Source(tmp_path / "a.JPG", "a"),
         Source(tmp_path / "b.png", "b", mask=tmp_path / "b_mask.png"),
         Source(tmp_path / "c", "c", is_result=True),
+        Source(tmp_path / "d.HEIC", "d"),
+        Source(tmp_path / "e.cr2", "e"),
     ]
 
 

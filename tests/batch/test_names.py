@@ -2,14 +2,15 @@
 
 import os
 import random
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isc_core.batch.item import BatchItem
+from isc_core.batch.item import BatchItem, ImageRecipe
 from isc_core.batch.names import OWN_FILES, Names, check_given, safe_name, wanted_name
+from isc_core.batch.sources import Inputs
 from isc_core.errors import InputError
 
 ANY_NAME = st.text(st.characters(codec=None), max_size=300) | st.binary(max_size=300).map(
@@ -131,3 +132,11 @@ def test_names_lead_into_the_output(tmp_path: Path) -> None:
     for text in HOSTILE:
         folder = (tmp_path / safe_name(text)).resolve()
         assert folder.parent == tmp_path.resolve()
+
+
+def test_photos_of_phones_and_cameras_are_found_in_a_folder(tmp_path: Path) -> None:
+    for name in ("a.HEIC", "b.dng", "c.avif", "d.txt", "b_mask.png"):
+        (tmp_path / name).write_bytes(b"x")
+    found = list(Inputs([str(tmp_path)], None, ImageRecipe()))
+    assert [PurePath(item.image).name for item in found] == ["a.HEIC", "b.dng", "c.avif"]
+    assert [PurePath(item.mask).name for item in found] == ["", "b_mask.png", ""]

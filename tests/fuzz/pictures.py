@@ -13,11 +13,26 @@ from pathlib import Path
 import cv2
 import numpy as np
 import OpenEXR
+import pillow_heif
 from PIL import Image
 
+from isc_core.errors import InputError
 from isc_core.io.exr import read_channels
+from isc_core.io.reading_notes import ReadingNoteKind
 from isc_core.photo import read_photo
 from isc_core.result_files.known_inputs import read_height
+from tests.core.photo.icc_profiles import (
+    P3,
+    SRGB_CURVE,
+    gamma_curve,
+    grey_profile,
+    parametric_curve,
+    rgb_profile,
+    sampled_curve,
+    table_profile,
+    to_d50,
+)
+from tests.core.photo.raw_files import dng, mosaic
 from tests.fuzz.case import Case, Target, words
 
 _PNG_WORDS = words(b"IHDR~IDAT~IEND~PLTE~tRNS~eXIf~iCCP~zTXt~acTL")
@@ -110,6 +125,14 @@ def with_checksums(data: bytes) -> bytes:
 
 def _photo(path: Path) -> object:
     return read_photo(path, whole_frame=True)
+
+
+def _photo_of_profile(path: Path) -> object:
+    """A broken profile is a note, which counts as a refusal here."""
+    photo = read_photo(path, whole_frame=True)
+    if any(note.kind is ReadingNoteKind.BROKEN_PROFILE for note in photo.original.notes):
+        raise InputError("broken")
+    return photo
 
 
 def _mask(path: Path) -> object:
@@ -245,6 +268,53 @@ def _npy() -> tuple[Case, ...]:
     )
 
 
+def _with_profile(profile: bytes) -> bytes:
+    return saved("png", icc_profile=profile)
+
+
+def _with_grey_profile(profile: bytes) -> bytes:
+    return saved("jpeg", "L", icc_profile=profile)
+
+
+def _profiles() -> tuple[Case, ...]:
+    wide, curve = to_d50(P3), parametric_curve(*SRGB_CURVE)
+    files = [rgb_profile(wide, curve, version=4), rgb_profile(wide, gamma_curve(2.2))]
+    files += [rgb_profile(wide, sampled_curve(np.linspace(0, 1, 30) ** 2)), table_profile()]
+    cases = tuple(Case("a.png", data, _photo_of_profile, _with_profile) for data in files)
+    grey = grey_profile(gamma_curve(1.8))
+    return (*cases, Case("a.jpg", grey, _photo_of_profile, _with_grey_profile))
+
+
+def _heif() -> tuple[Case, ...]:
+    profile = rgb_profile(to_d50(P3), parametric_curve(*SRGB_CURVE))
+    files = []
+    for pixels, options in ((codes(), {}), (_with_alpha(8), {"icc_profile": profile})):
+        stream = io.BytesIO()
+        image = pillow_heif.from_pillow(Image.fromarray(pixels))
+        image.save(stream, quality=90, exif=_turned(6).tobytes(), **options)
+        files.append(Case("a.heic", stream.getvalue(), _photo))
+    stream = io.BytesIO()
+    pillow_heif.from_bytes("RGB;16", (20, 24), codes(16).tobytes()).save(stream, quality=90)
+    avif = Case("a.avif", saved("avif", exif=_turned(6), icc_profile=profile), _photo)
+    plain = Case("a.avif", saved("avif"), _photo)
+    return (*files, Case("a.heic", stream.getvalue(), _photo), avif, plain)
+
+
+def _raw() -> tuple[Case, ...]:
+    stored = np.rint(mosaic(np.tile(ball(), (2, 2, 1))) * 16383)
+    files = (dng(stored), dng(stored, orientation=6, black=512), dng(stored, order=">"))
+    return tuple(Case("a.dng", data, _photo) for data in files)
+
+
+_HEIF_WORDS = words(
+    b"ftypheic~mif1~avif~meta~hdlr~pitm~iloc~iinf~infe~iprp~ipco~ipma~ispe~hvcC~colr~nclx~prof~"
+    b"irot~imir~pixi~auxC~grid~tmap~idat~mdat"
+)
+_PROFILE_WORDS = words(b"acsp~RGB ~GRAY~CMYK~XYZ ~curv~para~mluc~desc~mft2~rTRC~rXYZ~A2B0~kTRC")
+_RAW_WORDS = (
+    *_TIFF_WORDS,
+    *words(b"\x12\xc6~\x23\x80~\x25\x88~J\x01~\x1a\xc6~\x1d\xc6~!\xc6~CR\x02"),
+)
 _PLAIN_WORDS = words(b"BM~P5~P6~P3~#~65535 ~\x28\0\0\0~\x01\0\0\0")
 PICTURES = (
     Target("png", _png, _PNG_WORDS),
@@ -254,4 +324,7 @@ PICTURES = (
     Target("hdr", _hdr, _HDR_WORDS),
     Target("bmp-ppm", _plain, _PLAIN_WORDS),
     Target("npy", _npy, _NPY_WORDS),
+    Target("profile", _profiles, _PROFILE_WORDS),
+    Target("heif", _heif, _HEIF_WORDS),
+    Target("raw", _raw, _RAW_WORDS),
 )

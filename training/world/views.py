@@ -95,7 +95,7 @@ def trace_view(name: str, source: str, mesh: Mesh, rng: np.random.Generator) -> 
         distance = np.inf
         if rng.random() > _ORTHOGRAPHIC:
             distance = _NEAREST / rng.uniform(0.02, 1)
-        placed = _in_picture(mesh.rotated(_random_side(rng)), distance)
+        placed = in_picture(mesh.rotated(random_side(rng)), distance)
         tracer = Tracer(placed)
         origins, rays = camera_rays(SIDE, distance)
         hits = tracer.hits(origins, rays)
@@ -162,16 +162,37 @@ def spread_directions(rng: np.random.Generator) -> np.ndarray:
     return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
 
 
-def _random_side(rng: np.random.Generator) -> np.ndarray:
-    """A rotation (3, 3): most bodies stand upright and are seen from a little above."""
+def random_side(rng: np.random.Generator) -> np.ndarray:
+    """Draw the side from which a body is seen: most stand upright, seen from a little above.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    (3, 3) ndarray
+        Rotation of the body.
+    """
     if rng.random() > _UPRIGHT:
         return np.asarray(Rotation.random(random_state=int(rng.integers(2**31))).as_matrix())
     yaw, tilt, roll = rng.uniform(0, 360), rng.uniform(-10, 60), rng.normal(0, 5)
     return np.asarray(Rotation.from_euler("zxy", [roll, tilt, yaw], degrees=True).as_matrix())
 
 
-def _in_picture(mesh: Mesh, distance: float) -> Mesh:
-    """The mesh moved and scaled so that its picture has a longer side of 2 * `FILL`."""
+def in_picture(mesh: Mesh, distance: float) -> Mesh:
+    """Move and scale a body so that its picture has a longer side of 2 * `FILL`.
+
+    Parameters
+    ----------
+    mesh : Mesh
+    distance : float
+        Of the camera; infinite for an orthographic one.
+
+    Returns
+    -------
+    Mesh
+    """
     low, high = mesh.vertices.min(0), mesh.vertices.max(0)
     scale = 2 * FILL / max((high - low)[:2].max(), 1e-9)
     vertices = (mesh.vertices - (low + high) / 2) * scale

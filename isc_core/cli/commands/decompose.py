@@ -13,6 +13,7 @@ from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
 from ...result_files.diagnostics_text import note_lines
 from ...result_files.known_inputs import read_height, read_light
+from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
@@ -201,6 +202,7 @@ def _decompose_photo(
     preview = output / "preview.png"
     return hints(
         options,
+        *reading_note_lines(photo.original.notes),
         *note_lines(result.provenance.diagnostics),
         *(show(preview) if options.open else ()),
         f"see {preview}",

@@ -11,6 +11,7 @@ from ...io.limits import Limits
 from ...masking.finder import MaskSearch
 from ...photo import Photo, read_linear, read_photo
 from ...progress import Monitor
+from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_writable_result, save_separation
 from ...scene.decomposition import Separation
 from ...separation import BEST, IMPROVED, METHODS, separate
@@ -149,6 +150,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     preview = options.output / "preview.png"
     return hints(
         options,
+        *reading_note_lines(photo.original.notes),
         *(f"note: {note}" for note in _notes(options, photo, layers)),
         *(show(preview) if options.open else ()),
         f"see {preview}",

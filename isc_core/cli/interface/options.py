@@ -96,7 +96,7 @@ def add_transfer(parser: argparse.ArgumentParser | Group) -> None:
         "--transfer",
         choices=TRANSFERS,
         default="auto",
-        help="encoding of the photo (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
+        help="curve of the photo (auto: what the file says, else sRGB; floats are linear)",
     )
 
 
@@ -193,7 +193,8 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         default=defaults.light_colour,
         metavar="NAME|r,g,b",
         help="colour of the light: balanced (nearly white, as cameras leave it), estimate (from "
-        "highlights where they determine it), free, or three linear numbers (default %(default)s)",
+        "highlights where they determine it), free, toned (a sepia or otherwise toned grey photo), "
+        "or three linear numbers (default %(default)s)",
     )
     group.add_argument(
         "--light-prior",

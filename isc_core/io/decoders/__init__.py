@@ -16,14 +16,17 @@ from ..limits import USUAL, Limits
 from ..memory import READING, is_available, is_exhausted, memory_error
 from ..native_io import suppress_native_output
 from ..regular_files import read_regular
+from .avif import read_avif
 from .bmp import read_bmp
 from .exr import read_exr
 from .hdr import read_hdr
+from .heif import read_heif
 from .jpeg import read_jpeg
 from .npy import read_npy
 from .png import read_png, write_png
 from .pnm import read_pnm
 from .raster import MIN_SIDE, Raster
+from .raw import is_raw, read_raw
 from .tiff import read_tiff
 
 _DECODING_ERRORS = (
@@ -41,7 +44,8 @@ _DECODING_ERRORS = (
     Image.DecompressionBombError,
 )
 
-_READERS: tuple[tuple[bytes, str, Callable[[bytes, Path, Limits], Raster]], ...] = (
+_Reader = Callable[[bytes, Path, Limits], Raster]
+_READERS: tuple[tuple[bytes, str, _Reader], ...] = (
     (b"\x89PNG\r\n\x1a\n", "PNG", read_png),
     (b"\xff\xd8\xff", "JPEG", read_jpeg),
     (b"II*\0", "TIFF", read_tiff),
@@ -55,6 +59,11 @@ _READERS: tuple[tuple[bytes, str, Callable[[bytes, Path, Limits], Raster]], ...]
     (b"\x93NUMPY", "NPY", read_npy),
     *((b"P%d" % n, "PPM", read_pnm) for n in range(1, 7)),
 )
+
+
+# HEIF files begin with a box `ftyp` that lists what they can be read as.
+_AVIF_BRANDS = {b"avif", b"avis"}
+_HEIF_BRANDS = {b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"mif2", b"msf1"}
 
 
 @dataclass(frozen=True)
@@ -94,14 +103,7 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     if not data:
         raise InputError(f"{path}: the file is empty")
-    kind, reader = next(
-        ((kind, reader) for magic, kind, reader in _READERS if data.startswith(magic)), (None, None)
-    )
-    if reader is None:
-        raise InputError(
-            f"{path}: not an image of a known format (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, "
-            "NPY): convert it to PNG"
-        )
+    kind, reader = _reader_of(data, path)
     checked = _RecordingLimits(limits.max_pixels, limits.max_bytes, limits.max_ratio)
     try:
         with suppress_native_output():
@@ -123,6 +125,26 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
             "again as a plain PNG"
         ) from error
     return replace(raster, values=values, sha256=hashlib.sha256(data).hexdigest())
+
+
+def _reader_of(data: bytes, path: Path) -> tuple[str, _Reader]:
+    """The format of a file and its reader."""
+    if is_raw(data):
+        return "raw", read_raw
+    if data[4:8] == b"ftyp":
+        (size,) = struct.unpack(">I", data[:4])
+        brands = {data[8:12], *(data[k : k + 4] for k in range(16, min(size, 256), 4))}
+        if brands & _AVIF_BRANDS:
+            return "AVIF", read_avif
+        if brands & _HEIF_BRANDS:
+            return "HEIC", read_heif
+    for magic, kind, reader in _READERS:
+        if data.startswith(magic):
+            return kind, reader
+    raise InputError(
+        f"{path}: not an image of a known format (PNG, JPEG, TIFF, HEIC, AVIF, camera raw, EXR, "
+        "HDR, BMP, PPM, PGM, NPY): convert it to PNG"
+    )
 
 
 __all__ = ["MIN_SIDE", "Raster", "read_raster", "write_png"]

@@ -12,6 +12,7 @@ from ...errors import InputError
 from ..exr_header import ExrPart, check_exr, size_of
 from ..limits import Limits
 from ..native_io import memory_file
+from .colour.space import ColourSpace, colorants_of
 from .raster import Raster, check_size, raster_of_codes
 
 # The frame around the data may be blank, and costs as much as data: up to so many pixels, or so
@@ -59,12 +60,23 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     if len({by_name[name][0].shape for name in names}) > 1:
         raise InputError(f"{path}: its channels differ in size: save it as a plain RGB EXR")
     planes = [_in_display_window(*by_name[name]) for name in names]
+    rgb = len(planes) >= 3
     if len(planes) == 2:
         planes = [planes[0]] * 3 + planes[1:]
-    depth = 8 * by_name[names[0]][0].dtype.itemsize
-    return replace(
-        raster_of_codes(np.stack(planes, axis=2), 0, premultiplied=True), bit_depth=depth
+    pixels, header = by_name[names[0]]
+    raster = raster_of_codes(
+        np.stack(planes, axis=2), 0, premultiplied=True, space=_space(header) if rgb else None
     )
+    return replace(raster, bit_depth=8 * pixels.dtype.itemsize)
+
+
+def _space(header: dict[str, Any]) -> ColourSpace | None:
+    """The primaries that the attribute `chromaticities` names; None without usable ones."""
+    try:
+        given = np.array(header["chromaticities"], float).reshape(4, 2)
+        return ColourSpace("chromaticities of the EXR", colorants=colorants_of(given))
+    except (KeyError, TypeError, ValueError):
+        return None
 
 
 def _check_frame(path: Path, claimed: ExrPart) -> None:

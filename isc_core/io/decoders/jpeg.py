@@ -8,6 +8,8 @@ from PIL import JpegImagePlugin
 
 from ...errors import InputError
 from ..limits import Limits
+from .colour.dcf import space_of_exif
+from .gain_map import gain_map_notes
 from .pillow import decode_pillow
 from .raster import Raster
 
@@ -42,7 +44,9 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
         If the file has far more segments than a picture takes.
     """
     check_scans(data, path)
-    return decode_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path, limits)
+    image = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
+    space, notes = space_of_exif(image), gain_map_notes(data)
+    return decode_pillow(image, path, limits, space=space, notes=notes)
 
 
 def check_scans(data: bytes, path: Path | str) -> None:

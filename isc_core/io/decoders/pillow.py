@@ -8,6 +8,9 @@ from PIL import Image
 
 from ...errors import InputError
 from ..limits import Limits
+from ..reading_notes import ReadingNote
+from .colour.icc import space_of_profile
+from .colour.space import ColourSpace
 from .raster import Raster, check_size, raster_of_codes
 
 _ORIENTATION_TAG = 0x0112
@@ -31,7 +34,14 @@ def exif_orientation(image: Image.Image) -> int:
         return 1  # unreadable metadata has no orientation; the pixels are still valid
 
 
-def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool = False) -> Raster:
+def decode_pillow(
+    image: Image.Image,
+    path: Path,
+    limits: Limits,
+    oriented: bool = False,
+    space: ColourSpace | None = None,
+    notes: tuple[ReadingNote, ...] = (),
+) -> Raster:
     """Decode an image of 8 bits a channel. Stricter than OpenCV: a truncated file raises OSError.
 
     Parameters
@@ -42,6 +52,9 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
     limits : Limits
     oriented : bool
         Whether the decoder applies the orientation itself.
+    space : ColourSpace, optional
+        An ICC profile that Pillow finds in the file replaces it.
+    notes : tuple of ReadingNote
 
     Returns
     -------
@@ -73,7 +86,11 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
         "RGBX",
         "YCbCr",
     ):
-        return raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
+        if "icc_profile" in image.info:
+            space, more = space_of_profile(image.info["icc_profile"], 1 if mode == "L" else 3)
+            notes = (*notes, *more)
+        codes = np.asarray(image.convert(mode))
+        return raster_of_codes(codes, 255, orientation, space=space, notes=notes)
     raise InputError(
         f"{path}: pixels of kind {image.mode} are not supported: convert it to an 8- or 16-bit "
         "PNG or an EXR"

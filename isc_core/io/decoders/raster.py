@@ -7,6 +7,8 @@ import numpy as np
 
 from ...errors import InputError
 from ..limits import Limits
+from ..reading_notes import ReadingNote
+from .colour.space import ColourSpace
 
 MAX_ASPECT = 100
 MIN_SIDE = 8
@@ -28,6 +30,12 @@ class Raster:
         Bits a channel.
     sha256 : str
         Of the whole file.
+    space : ColourSpace or None
+        What the file says about its colours; None where it says nothing.
+    saturated : (H, W) bool ndarray or None
+        Where a sensor was saturated; None where the largest code says it.
+    notes : tuple of ReadingNote
+        What was assumed or left out.
     """
 
     values: np.ndarray
@@ -35,6 +43,9 @@ class Raster:
     peak: int | None
     bit_depth: int
     sha256: str = ""
+    space: ColourSpace | None = None
+    saturated: np.ndarray | None = None
+    notes: tuple[ReadingNote, ...] = ()
 
     @property
     def transparency(self) -> np.ndarray | None:
@@ -67,7 +78,12 @@ def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
 
 
 def raster_of_codes(
-    codes: np.ndarray, peak: int, orientation: int = 1, premultiplied: bool = False
+    codes: np.ndarray,
+    peak: int,
+    orientation: int = 1,
+    premultiplied: bool = False,
+    space: ColourSpace | None = None,
+    notes: tuple[ReadingNote, ...] = (),
 ) -> Raster:
     """Build a raster from integer codes or floats.
 
@@ -81,6 +97,8 @@ def raster_of_codes(
         EXIF orientation.
     premultiplied : bool
         Whether colours are multiplied by alpha.
+    space : ColourSpace, optional
+    notes : tuple of ReadingNote
 
     Returns
     -------
@@ -98,7 +116,14 @@ def raster_of_codes(
                 if is_float
                 else np.minimum(np.rint(coded), peak).astype(codes.dtype)
             )
-    return Raster(values, alpha, None if is_float else peak, 32 if is_float else peak.bit_length())
+    return Raster(
+        values,
+        alpha,
+        None if is_float else peak,
+        32 if is_float else peak.bit_length(),
+        space=space,
+        notes=notes,
+    )
 
 
 def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:

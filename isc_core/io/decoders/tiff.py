@@ -8,6 +8,7 @@ from PIL import TiffImagePlugin
 
 from ...errors import InputError
 from ..limits import Limits
+from .colour.icc import space_of_profile
 from .opencv import decode_opencv
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
@@ -15,6 +16,7 @@ from .raster import Raster, check_size, raster_of_codes
 # Number and default of BitsPerSample, SamplesPerPixel, PhotometricInterpretation, SampleFormat,
 # ExtraSamples.
 _TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
+_PROFILE = 34675
 
 
 def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
@@ -68,4 +70,9 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         )
     if pixels.dtype.kind == "f":
         pixels = pixels.astype(np.float32)
-    return raster_of_codes(pixels, 65535, premultiplied=extra == 1)
+    space, notes = (
+        space_of_profile(bytes(tags[_PROFILE]), 1 if pixels.ndim == 2 else 3)
+        if _PROFILE in tags
+        else (None, ())
+    )
+    return raster_of_codes(pixels, 65535, premultiplied=extra == 1, space=space, notes=notes)

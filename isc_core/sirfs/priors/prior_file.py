@@ -1,4 +1,6 @@
-"""Prior sets as files: NumPy archives without pickles, and the set that ships with the package."""
+"""Prior sets as files: NumPy archives without pickles, and the sets that ship with the package:
+`data/photo.npz`, fitted to the project's own world, and `data/priors.npz`, fitted to MIT-Berkeley.
+"""
 
 import dataclasses
 import importlib.resources
@@ -17,12 +19,12 @@ from ...io.regular_files import read_regular
 from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
 from .lights import Contrast, GaussianLight
-from .prior_set import FitRecord, LightPriors, PriorSet
+from .prior_set import ILLUMINATIONS, FitRecord, LightPriors, PriorSet
 from .priors import SilhouetteProfile
 from .scale_mixture import ScaleMixture
 
-SCHEMA_VERSION = 2
-_LIGHTS = ("natural", "laboratory")
+SCHEMA_VERSION = 3
+_READABLE = (2, SCHEMA_VERSION)  # files of version 2 have natural and laboratory light
 _COEFFICIENTS = 27  # of a light of three channels
 
 
@@ -68,8 +70,13 @@ def load_prior_set(path: str | Path) -> PriorSet:
     return _parse(data, str(path))
 
 
-def shipped_prior_set() -> PriorSet:
-    """Read the set that ships with the package.
+def shipped_prior_set(illumination: str = "natural") -> PriorSet:
+    """Read the set that ships with the package for a kind of photo.
+
+    Parameters
+    ----------
+    illumination : str
+        "photo", or "natural" or "laboratory", which share one.
 
     Returns
     -------
@@ -80,7 +87,8 @@ def shipped_prior_set() -> PriorSet:
     InputError
         If it is missing or damaged.
     """
-    resource = importlib.resources.files(__package__) / "data" / "priors.npz"
+    name = "photo.npz" if illumination == "photo" else "priors.npz"
+    resource = importlib.resources.files(__package__) / "data" / name
     try:
         data = resource.read_bytes()
     except OSError as error:
@@ -117,8 +125,10 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
             f"{name}.base": np.array(table.base),
             f"{name}.nodes": np.array(table.nodes),
         }
-    for name in _LIGHTS:
-        light: GaussianLight = getattr(priors.lights, name)
+    for name in ILLUMINATIONS:
+        light: GaussianLight | None = getattr(priors.lights, name)
+        if light is None:
+            continue
         arrays |= {f"lights.{name}.mean": light.mean, f"lights.{name}.covariance": light.covariance}
         arrays[f"lights.{name}.floor"] = np.array(light.floor)
     return arrays
@@ -155,15 +165,13 @@ class _Reader:
 
     def prior_set(self) -> PriorSet:
         version = int(self.numbers("schema_version", ()))
-        if version != SCHEMA_VERSION:
+        if version not in _READABLE:
             raise InputError(
                 f"{self.source} has format version {version}, not {SCHEMA_VERSION}:"
                 " fit the priors again"
             )
         whiten = self.numbers("parsimony_whiten", (3, 3))
-        lights = LightPriors(
-            **{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS}
-        )
+        lights = self.lights()
         return PriorSet(
             curvature=self.mixture("curvature"),
             grey_smoothness=self.mixture("grey_smoothness"),
@@ -235,6 +243,12 @@ class _Reader:
         return SilhouetteProfile(
             mean, self.numbers("silhouette.spread", (len(mean),), positive=True)
         )
+
+    def lights(self) -> LightPriors:
+        found = [name for name in ILLUMINATIONS if f"lights.{name}.mean" in self.arrays]
+        if not found:
+            raise self.wrong("it has no prior of light")
+        return LightPriors(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in found})
 
     def light(self, name: str, size: int) -> GaussianLight:
         mean, covariance = (

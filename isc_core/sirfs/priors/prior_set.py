@@ -15,7 +15,7 @@ from .lights import Contrast, GaussianLight
 from .priors import Priors, SilhouetteProfile
 from .scale_mixture import ScaleMixture
 
-ILLUMINATIONS = ("natural", "laboratory")
+ILLUMINATIONS = ("natural", "laboratory", "photo")
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,28 @@ class LightPriors:
 
     Attributes
     ----------
-    natural, laboratory : GaussianLight
-        In colour (27 coefficients); those for grey photos follow.
+    natural, laboratory, photo : GaussianLight or None
+        In colour (27 coefficients); those for grey photos follow. None where a set has none.
     """
 
-    natural: GaussianLight
-    laboratory: GaussianLight
+    natural: GaussianLight | None = None
+    laboratory: GaussianLight | None = None
+    photo: GaussianLight | None = None
+
+    def of(self, illumination: str) -> GaussianLight | None:
+        """Return the prior of one kind of photo.
+
+        Parameters
+        ----------
+        illumination : str
+            One of `ILLUMINATIONS`; "photo" takes natural light where the set has nothing better.
+
+        Returns
+        -------
+        GaussianLight or None
+        """
+        found: GaussianLight | None = getattr(self, illumination)
+        return self.natural if found is None and illumination == "photo" else found
 
 
 @dataclass(frozen=True)
@@ -41,7 +57,7 @@ class FitRecord:
     objects : tuple of str
         Names of the training objects.
     natural_contrast : Contrast
-        Factors on the environments' contrast.
+        Factors on the contrast of the lights of environments.
     options : dict of str
         Every option of the fit, as text.
     """
@@ -83,7 +99,7 @@ class PriorSet:
         Parameters
         ----------
         illumination : str
-            "natural" or "laboratory".
+            One of `ILLUMINATIONS`.
         channels : int
             3 or 1.
 
@@ -94,7 +110,7 @@ class PriorSet:
         Raises
         ------
         InputError
-            For other values.
+            For other values, and where the set has no lights of this kind.
         """
         if illumination not in ILLUMINATIONS:
             raise InputError(
@@ -102,7 +118,12 @@ class PriorSet:
             )
         if channels not in (1, 3):
             raise InputError(f"priors are for 1 or 3 channels, not {channels}")
-        light = self.lights.natural if illumination == "natural" else self.lights.laboratory
+        light = self.lights.of(illumination)
+        if light is None:
+            raise InputError(
+                f"these priors have no light for --illumination {illumination}:"
+                " use --illumination photo, or fit them to MIT-Berkeley with 'isc fit-priors'"
+            )
         if channels == 1:
             return Priors(
                 channels=1,

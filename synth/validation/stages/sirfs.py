@@ -13,7 +13,6 @@ from functools import cache
 
 import numpy as np
 
-from isc_core.decomposition.settings import Illumination
 from isc_core.errors import InputError
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import (
@@ -221,13 +220,12 @@ def _solved(
         and np.array_equal(inside[:, :1], inside[:, 2:])
         else 3
     )
-    statistics = Illumination(options.illumination).statistics
-    priors = _priors(statistics, channels)
+    priors = _priors(options.illumination, channels)
     log_image = np.where(
         valid[..., None], np.log(np.maximum(diffuse[..., :channels].astype(float), BLACK)), 0.0
     )
     field = None if priors.silhouette is None else normals_from_silhouette(mask, priors.silhouette)
-    weights = isc_weights(statistics, channels)
+    weights = isc_weights(options.illumination, channels)
     problem = Problem(
         log_image, valid, mask, occluding_contour(mask), priors, weights, silhouette=field
     )
@@ -244,7 +242,7 @@ def _solved(
 
 @cache
 def _priors(illumination: str, channels: int) -> Priors:
-    return shipped_prior_set().priors(illumination, channels)
+    return shipped_prior_set(illumination).priors(illumination, channels)
 
 
 def _estimate(

@@ -13,6 +13,7 @@ from isc_core.decomposition.joint import (
     continue_albedo,
     detect_residual_highlights,
     joint,
+    supported_layers,
 )
 from isc_core.decomposition.mdr import mdr
 from isc_core.decomposition.models import DecompositionTask, Settings
@@ -122,7 +123,7 @@ def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
 @pytest.mark.slow
 def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
     d = grey_ball(10)
-    start = detect_residual_highlights(d.image, mdr(task_of(d)).split.diffuse, d.mask)
+    _, start = supported_layers(d.image, mdr(task_of(d)).split, d.mask)
     assert start is not None and start.unreliable.any()
     found = joint(task_of(d), JointOptions(change_of_variables=-1e6))
     np.testing.assert_array_equal(found.split.diffuse, start.diffuse)

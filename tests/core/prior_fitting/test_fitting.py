@@ -17,6 +17,7 @@ from isc_core.prior_fitting.fit import (
     FitOptions,
     LightFitOptions,
     color_histogram,
+    fit_photo_priors,
     fit_priors,
     fit_whitening,
 )
@@ -62,9 +63,9 @@ def painted_ball(seed: int, size: int = 40) -> TrainingObject:
         reflectance,
         inside,
         height,
-        rng.normal(size=(9, 3)),
-        rng.normal(size=(9, 3)),
         inside,
+        rng.normal(size=(9, 3)),
+        rng.normal(size=(9, 3)),
     )
 
 
@@ -476,6 +477,36 @@ class TestFit:
         with pytest.raises(InputError, match="too few"):
             fit_priors({name: balls[name] for name in ("ball0", "ball1")}, environments, plain)
 
+    def test_priors_of_photos_need_no_lights_of_objects(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
+        dark = {
+            name: replace(one, natural_light=None, laboratory_light=None)
+            for name, one in balls.items()
+        }
+        lights_of_photos = environments.transpose(2, 0, 1)
+        fitted = fit_photo_priors(dark, lights_of_photos, FAST)
+        assert fitted.lights.photo is not None and fitted.lights.natural is None
+        plain = fit_priors(balls, environments, FAST)
+        np.testing.assert_array_equal(fitted.curvature.weights, plain.curvature.weights)
+        with pytest.raises(InputError, match="unknown"):
+            fit_priors(dark, environments, FAST)
+
+    def test_relief_and_texture_widen_the_densities(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
+        seen = environments.transpose(2, 0, 1)
+        sharp = fit_photo_priors(balls, seen, FAST)
+        wide = fit_photo_priors(balls, seen, replace(FAST, relief=0.1, texture=0.2))
+        small = np.array([0.05])
+        for name in ("curvature", "grey_smoothness", "color_smoothness"):
+            before, after = (
+                getattr(one, name).log_density(0 * small) - getattr(one, name).log_density(small)
+                for one in (sharp, wide)
+            )
+            assert 0 <= after[0] < before[0]
+        assert np.isclose(wide.curvature.deviations.min(), 0.1, rtol=0.1)
+
     def test_flat_objects_are_a_clear_error(self) -> None:
         with pytest.raises(InputError, match="flat"):
             fit_scale_mixture(Magnitudes.of(np.zeros(5)))
@@ -487,9 +518,9 @@ class TestFit:
             ball.reflectance * 0,
             ball.valid,
             ball.height,
+            ball.mask,
             ball.natural_light,
             ball.laboratory_light,
-            ball.mask,
         )
         with pytest.raises(InputError, match="'ball'"):
             object_statistics(empty)

@@ -15,6 +15,7 @@ from isc_core.result_files.contact_sheet import (
     contact_sheet,
     separation_sheet,
 )
+from isc_core.result_files.error_colors import SCALE, error_colors
 from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from isc_core.scene.diagnostics import (
     AssumptionWarning,
@@ -22,9 +23,14 @@ from isc_core.scene.diagnostics import (
     LobeFitOutcome,
     WarningKind,
 )
+from isc_core.scene.expected_error import ExpectedError
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeLight
 from tests.core.ball_scene import ball
 
-LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")
+LABELS = (
+    *("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light"),
+    *("from the left", "from the right", "relit", "confidence"),
+)
 SIDE, GAP, EDGE, HEAD, LABEL = 320, 20, 40, 104, 38
 
 
@@ -32,7 +38,7 @@ def panels(sheet: Image.Image, columns: int = 4) -> dict[str, np.ndarray]:
     """Each panel as linear light, (320, 320, 3)."""
     linear = srgb_to_linear(np.asarray(sheet.convert("RGB")) / 255.0)
     found = {}
-    for index, label in enumerate(LABELS[: 8 if columns == 4 else 3]):
+    for index, label in enumerate(LABELS[: 12 if columns == 4 else 3]):
         top, left = (
             HEAD + index // columns * (SIDE + LABEL + GAP),
             EDGE + index % columns * (SIDE + GAP),
@@ -109,6 +115,77 @@ def test_contour_lines_show_in_a_dome_and_not_in_a_plain(scene: Decomposition) -
     plain = panels(contact_sheet(flat))["height"].mean(-1)[160, 60:260]
     assert np.ptp(plain) < 0.01
     assert np.count_nonzero(np.diff(dome, 2) > 0.1) >= 6
+
+
+def test_the_turned_ball_ends_where_a_turned_ball_ends(shown: dict[str, np.ndarray]) -> None:
+    """A ball of radius r up to .99 r, turned: r on the side that comes to the front; on the other,
+    where it has no back, as far as its rim, .99 r cos 30 degrees less the rim's height.
+    """
+    radius = 0.44 * SIDE / 0.99  # the ball ends at .99 of its radius
+    card = shown["input"][20, 20]
+    width = radius * (1 + 0.99 * np.cos(np.radians(30)) - np.sqrt(1 - 0.99**2) / 2)
+    for label in ("from the left", "from the right"):
+        covered = np.abs(shown[label] - card).max(axis=-1)[SIDE // 2] > 0.01
+        assert np.count_nonzero(covered) == pytest.approx(width, abs=0.04 * width)
+
+
+def test_from_the_left_the_left_side_is_seen() -> None:
+    """A mark left of the middle moves to the middle of the view from the left."""
+    d = ball((300, 300), 140.0, (150, 150))
+    mark = np.zeros_like(d.diffuse)
+    mark[140:160, 70:90] = 1.0  # 70 of 140 left of the middle: 30 degrees
+    shown = panels(contact_sheet(replace(d, image=mark, diffuse=mark, specular=0 * mark)))
+    columns = {
+        label: np.average(np.arange(SIDE), weights=(shown[label][..., 0] > 0.5).sum(axis=0) + 1e-9)
+        for label in ("input", "from the left", "from the right")
+    }
+    assert columns["from the right"] < columns["input"] < columns["from the left"]
+
+
+def test_the_new_light_comes_from_the_other_side(
+    shown: dict[str, np.ndarray], scene: Decomposition
+) -> None:
+    """The ball's light comes from the left; its new one from the right, of the same colour."""
+    white = np.where(scene.mask[..., None], np.full(3, 0.5), 0.0)
+    relit = panels(contact_sheet(replace(scene, reflectance=white)))["relit"]
+    left, right = (
+        relit[100:220, part].mean(axis=(0, 1)) for part in (slice(60, 100), slice(220, 260))
+    )
+    assert (right > 1.5 * left).all()
+    tint = scene.shading[scene.mask].mean(axis=0)
+    np.testing.assert_allclose(right / right.sum(), tint / tint.sum(), atol=0.02)
+
+
+def test_a_fitted_lobe_moves_with_the_viewer_and_the_light(scene: Decomposition) -> None:
+    """The highlight on a black ball: seen from its own side it is nearer to the middle."""
+    direction = np.array([0.6, 0.0, 0.8])
+    dark = replace(scene, diffuse=0 * scene.diffuse, reflectance=0 * scene.reflectance)
+    light = LobeLight(direction, 5.0, np.ones(3), Interval(0.5, 1.5))
+    fit = replace(
+        LobeFit.without_lobe("ggx", LobeFitOutcome.DETERMINED, scene.image.shape),
+        alpha=0.2,
+        lights=(light,),
+    )
+    shown = panels(contact_sheet(replace(dark, brdf=fit)))
+    place = {
+        label: np.average(np.arange(SIDE), weights=(shown[label][..., 0] > 0.03).sum(axis=0))
+        for label in ("from the left", "from the right", "relit")
+    }
+    assert place["from the left"] > place["from the right"]
+    assert place["relit"] < SIDE / 2
+
+
+def test_expected_errors_have_the_colours_of_the_legend(scene: Decomposition) -> None:
+    for degrees, code in SCALE:
+        error = ExpectedError(np.full(scene.mask.shape, float(degrees)), 0 * scene.confidence)
+        sheet = contact_sheet(replace(scene, expected_error=error))
+        shown = panels(sheet)["confidence"]
+        np.testing.assert_allclose(shown[160, 160], srgb_to_linear(np.array(code) / 255), atol=0.01)
+    top = HEAD + 2 * (SIDE + LABEL + GAP) + SIDE
+    legend = np.asarray(sheet)[top : top + LABEL, -EDGE - SIDE : -EDGE].reshape(-1, 3)
+    assert all((legend == code).all(axis=1).sum() >= 80 for _, code in SCALE)
+    ends = error_colors(np.array([0.0, SCALE[0][0], SCALE[-1][0], 180.0]))
+    assert (ends[0] == ends[1]).all() and (ends[2] == ends[3]).all()
 
 
 def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:

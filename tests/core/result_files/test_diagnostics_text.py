@@ -1,6 +1,7 @@
 """The diagnostics of a result: as JSON, of both schemas, and as sentences."""
 
 import json
+from dataclasses import replace
 
 import pytest
 
@@ -18,6 +19,7 @@ from isc_core.result_files.diagnostics_text import (
 from isc_core.scene.diagnostics import (
     AssumptionWarning,
     Diagnostics,
+    ExpectedErrorDiagnostics,
     IlluminantOutcome,
     JointOutcome,
     LightColourDiagnostics,
@@ -43,6 +45,7 @@ ALL = Diagnostics(
     scene_classes={"ordinary": 0.2, "mirror": 0.8},
     light_counts={"none": 0.0, "one": 1.0, "several": 0.0},
     several_lights=0.1,
+    expected_error=ExpectedErrorDiagnostics(14.2, 0.1823),
     warnings=(
         AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.8),
         AssumptionWarning(WarningKind.CLIPPED, 0.23),
@@ -148,6 +151,7 @@ def test_each_entry_has_its_line() -> None:
     assert note_lines(ALL) == [
         f"note: {STOPPED_EARLY}",
         "gloss: roughness 0.24, 0.20 to 0.29 with a probability of 68 %",
+        "expected error: normals 14 degrees, reflectance a factor of 1.20",
         f"note: {COLOURED}",
         *(f"note: {warning_text(warning)}" for warning in ALL.warnings),
     ]
@@ -168,6 +172,22 @@ def test_every_value_has_a_sentence() -> None:
         *(warning_text(AssumptionWarning(kind)) for kind in WarningKind),
     ]
     assert len(set(lines)) == len(lines) and all(lines)
+
+
+def test_a_note_is_one_short_line_that_says_what_to_do() -> None:
+    """Whatever else is known, a note fits a terminal's line, and no two say the same."""
+    notes = [
+        STOPPED_EARLY,
+        STRONG_COLOUR,
+        COLOURED,
+        *(warning_text(AssumptionWarning(kind, 0.23)) for kind in WarningKind),
+    ]
+    assert all(len(note) <= 100 and "\n" not in note for note in notes)
+    doing = ("try", "photograph", "use", "dull", "expose", "fill")
+    assert all(any(f" {verb} " in note for verb in doing) for note in notes)
+    every = replace(ALL, warnings=tuple(AssumptionWarning(kind, 0.5) for kind in WarningKind))
+    lines = note_lines(every)
+    assert len(lines) == len(set(lines)) == 4 + len(WarningKind)
 
 
 def test_somebody_elses_file_does_no_harm() -> None:

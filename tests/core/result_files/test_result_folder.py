@@ -15,6 +15,7 @@ from PIL import Image
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.io.exr import write_channels
 from isc_core.lobe_fitting import GivenLight, fit_lobe
 from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files import result_folder
@@ -28,6 +29,7 @@ from isc_core.result_files.result_folder import (
     save_separation,
 )
 from isc_core.scene.decomposition import Decomposition, Separation
+from isc_core.scene.expected_error import ExpectedError
 from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
 from tests.core.ball_scene import ball
 
@@ -103,6 +105,33 @@ def test_every_channel_is_the_map_it_is_named_after(saved: Path) -> None:
     assert (found["height.Z"] == d.height).all()
     assert (found["mask.A"] == d.mask).all()
     assert (found["confidence.Y"] == d.confidence).all()
+
+
+def test_expected_errors_are_read_back_bit_by_bit(tmp_path: Path) -> None:
+    d = ball()
+    error = ExpectedError(np.where(d.mask, np.float32(14.5), 0), 0.2 * d.confidence)
+    save(replace(d, expected_error=error), tmp_path / "with")
+    found = channels(tmp_path / "with" / "maps.exr")
+    assert (found["expected_error.normal"] == error.normal).all()
+    back = load(tmp_path / "with").expected_error
+    assert back is not None
+    assert (back.normal == error.normal).all() and (back.reflectance == error.reflectance).all()
+    assert back.normal.dtype == back.reflectance.dtype == np.float32
+
+
+def test_a_result_without_expected_errors_is_read(saved: Path) -> None:
+    assert load(saved).expected_error is None
+
+
+def test_half_of_the_expected_errors_is_damage(tmp_path: Path) -> None:
+    d = ball()
+    error = ExpectedError(d.confidence, d.confidence)
+    save(replace(d, expected_error=error), tmp_path / "with")
+    kept = channels(tmp_path / "with" / "maps.exr")
+    del kept["expected_error.normal"]
+    write_channels(tmp_path / "with" / "maps.exr", kept)
+    with pytest.raises(InputError, match=r"lacks the channel expected_error\.normal"):
+        load(tmp_path / "with")
 
 
 def test_the_single_layer_files_can_be_read_by_plain_programs(saved: Path) -> None:

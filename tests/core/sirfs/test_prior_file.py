@@ -74,6 +74,38 @@ def test_round_trip_is_exact(prior_set: PriorSet, tmp_path: Path) -> None:
     assert_same(load_prior_set(path), prior_set)
 
 
+def test_a_set_of_photos_alone_round_trips_and_says_what_it_lacks(
+    prior_set: PriorSet, tmp_path: Path
+) -> None:
+    alone = dataclasses.replace(prior_set, lights=LightPriors(photo=prior_set.lights.natural))
+    path = tmp_path / "priors.npz"
+    save_prior_set(path, alone)
+    found = load_prior_set(path)
+    assert_same(found, alone)
+    assert found.priors("photo").light.mean.shape == (27,)
+    with pytest.raises(InputError, match="no light for --illumination natural"):
+        found.priors("natural")
+
+
+def test_photos_take_natural_light_where_a_set_has_nothing_better(prior_set: PriorSet) -> None:
+    photo, natural = prior_set.priors("photo"), prior_set.priors("natural")
+    np.testing.assert_array_equal(photo.light.covariance, natural.light.covariance)
+
+
+def test_files_of_version_2_are_read(prior_set: PriorSet, tmp_path: Path) -> None:
+    path = tmp_path / "priors.npz"
+    save_prior_set(path, prior_set)
+    rewrite(path, {"schema_version": np.array(2)})
+    assert_same(load_prior_set(path), prior_set)
+
+
+def test_a_set_without_any_light_is_refused(prior_set: PriorSet, tmp_path: Path) -> None:
+    path = tmp_path / "priors.npz"
+    save_prior_set(path, dataclasses.replace(prior_set, lights=LightPriors()))
+    with pytest.raises(InputError, match="no prior of light"):
+        load_prior_set(path)
+
+
 def test_same_priors_give_the_same_bytes(prior_set: PriorSet, tmp_path: Path) -> None:
     save_prior_set(tmp_path / "a.npz", prior_set)
     save_prior_set(tmp_path / "b.npz", prior_set)
@@ -178,6 +210,12 @@ def test_unknown_kinds_of_photo(prior_set: PriorSet) -> None:
 
 
 class TestShipped:
+    def test_the_priors_of_photos_have_learned_from_made_bodies_alone(self) -> None:
+        shipped = shipped_prior_set("photo")
+        assert all(name.startswith(("built/", "family/")) for name in shipped.record.objects)
+        assert shipped.lights.natural is None and shipped.lights.laboratory is None
+        assert shipped.lights.photo is not None
+
     @pytest.mark.slow
     def test_expands_for_every_kind_of_photo(self) -> None:
         shipped = shipped_prior_set()

@@ -11,6 +11,7 @@ from ....errors import InputError
 from ....imaging.srgb import linear_to_srgb
 from ....photo import read_photo, read_raster
 from ....photo.found_mask import FOUND
+from ....photo.transfer import PROFILE
 from ....progress import Monitor
 from ....result_files.result_folder import MASK, load
 from ....scene.decomposition import Decomposition
@@ -182,6 +183,7 @@ def _changed_options(options: argparse.Namespace) -> str:
 def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     given = d.provenance.input
     transfer = options.transfer or str(given.get("transfer", "auto"))
+    transfer = "auto" if transfer == PROFILE else transfer
     if given.get("mask_from") == "file" and options.mask is None:
         raise InputError("the result was made with a separate mask: give the same one with --mask")
     mask = options.mask

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from ....editing.clusters import Clusters
 from ....editing.edited import Edited
-from ....result_files.contact_sheet import Panel
+from ....result_files.panels import Panel
 from ....scene.decomposition import Decomposition
 
 

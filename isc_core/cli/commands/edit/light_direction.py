@@ -10,7 +10,7 @@ from ....lobe_fitting.light_direction import (
     share_explained,
 )
 from ....networks.scene_network import predict_scene
-from ....result_files.contact_sheet import Panel
+from ....result_files.panels import Panel
 from ....scene.decomposition import Decomposition
 from ....scene.light_estimate import LightEstimate
 from ....shading.lights import DirectionalLight, toward

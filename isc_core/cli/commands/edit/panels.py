@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ....editing.spheres import render_sphere, sphere_normals
-from ....result_files.contact_sheet import Panel
+from ....result_files.panels import Panel
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight
 from ....shading.spherical_harmonics import real_sh

@@ -1,0 +1,171 @@
+"""Fit the weights by which colour and form decide what was a highlight.
+
+  python -m benchmarks.separation.print_rule WORLD --panoramas DIR [--count N]
+
+WORLD is a folder of `isc world build`. Regions of light that colour and network take off bodies of
+`Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
+whose removal raises it. Logistic regression, each region with the root of its squared light over
+that of its photo as weight, gives `highlight_evidence.WEIGHTS`. On the bodies of `Part.CHOICE` the
+least odds are chosen that keep all matt bodies at 1 % and no glossy body above 1; `prints` reports
+on others.
+"""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from isc_core.decomposition.joint import detect_residual_highlights
+from isc_core.errors import InputError
+from isc_core.networks.scene_network import predict_scene
+from isc_core.separation import separate
+from isc_core.separation.support.highlight_evidence import highlight_evidence
+
+from .print_set import Part, PrintScene, print_scenes
+
+ODDS = (1.0, 1.5, 2.0, 2.5, 3.0)
+_RIDGE, _STEPS = 0.01, 50
+
+
+@dataclass(frozen=True)
+class Regions:
+    """The regions of light taken off one photo, K of them.
+
+    Attributes
+    ----------
+    values : (K, 3) ndarray
+        Of `highlight_evidence.Evidence`.
+    light, squares : (K,) ndarray
+        Light taken off over that of the photo; the same of squares.
+    gain : (K,) ndarray
+        By how much the squared error falls, over the photo's squares.
+    specular : float
+        True specular light, squared, over the photo's squares; 0 for a matt body.
+    """
+
+    values: np.ndarray
+    light: np.ndarray
+    squares: np.ndarray
+    gain: np.ndarray
+    specular: float
+
+
+def regions_of(scene: PrintScene) -> Regions:
+    """Take light off a photo and judge the regions.
+
+    Parameters
+    ----------
+    scene : PrintScene
+
+    Returns
+    -------
+    Regions
+    """
+    photo, mask, inside = scene.photo, scene.mask, scene.mask[..., None]
+    seen = predict_scene(photo, mask)
+    diffuse = separate("isc", photo, mask, scene.clipped).diffuse
+    residual = detect_residual_highlights(photo, diffuse, mask, seen)
+    diffuse = diffuse if residual is None else residual.diffuse
+    found = highlight_evidence(photo, diffuse, mask, seen.log_ratio, seen.ratio_scale)
+    removed, truth = (
+        np.where(inside, photo - one, 0).astype(float) for one in (diffuse, scene.diffuse)
+    )
+    squares, fall = np.square(removed), np.square(truth) - np.square(removed - truth)
+
+    def sums(values: np.ndarray) -> np.ndarray:
+        return np.asarray(ndimage.sum(values.sum(axis=2), found.labels, found.numbers), float)
+
+    whole, power = float(photo[mask].sum()), float(np.square(photo[mask]).sum())
+    specular = float(np.square(truth).sum()) / power
+    return Regions(
+        found.values, sums(removed) / whole, sums(squares) / power, sums(fall) / power, specular
+    )
+
+
+def fitted(photos: Sequence[Regions]) -> np.ndarray:
+    """Fit the weights by Newton's method, with a ridge on standardised values.
+
+    Parameters
+    ----------
+    photos : sequence of Regions
+
+    Returns
+    -------
+    (4,) ndarray
+        The constant first.
+    """
+    values = np.vstack([one.values for one in photos])
+    good = np.concatenate([one.gain for one in photos]) > 0
+    share = np.sqrt(np.concatenate([one.squares for one in photos]))
+    share /= share.mean()
+    mean, deviation = values.mean(axis=0), values.std(axis=0)
+    rows = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
+    penalty = _RIDGE * len(values) * np.array([0.0, 1, 1, 1])
+    weights = np.zeros(4)
+    for _ in range(_STEPS):
+        likely = 1 / (1 + np.exp(-rows @ weights))
+        bend = (rows * (share * likely * (1 - likely))[:, None]).T @ rows + np.diag(penalty)
+        slope = rows.T @ (share * (good - likely)) - penalty * weights
+        weights += np.linalg.solve(bend, slope)
+    scaled = weights[1:] / deviation
+    return np.concatenate([[weights[0] - scaled @ mean], scaled])
+
+
+def kept(photos: Sequence[Regions], weights: np.ndarray, odds: float) -> tuple[float, float, float]:
+    """Apply weights and odds.
+
+    Parameters
+    ----------
+    photos : sequence of Regions
+    weights : (4,) ndarray
+    odds : float
+
+    Returns
+    -------
+    worst_share : float
+        Of the light of a matt body.
+    mean_ratio, worst_ratio : float
+        Squared error over that of doing nothing, of the glossy ones.
+    """
+    shares, ratios = [0.0], []
+    for one in photos:
+        accepted = weights[0] + one.values @ weights[1:] > np.log(odds)
+        if one.specular > 0:
+            ratios.append(1 - float(one.gain[accepted].sum()) / one.specular)
+        else:
+            shares.append(float(one.light[accepted].sum()))
+    return max(shares), float(np.mean(ratios)), max(ratios)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("world", type=Path, metavar="WORLD", help="folder of isc world build")
+    parser.add_argument("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    parser.add_argument("--count", type=int, default=140, help="photos (default: %(default)s)")
+    given = parser.parse_args()
+    try:
+        fit, choice = (
+            [
+                regions_of(scene)
+                for glossy in (False, True)
+                for scene in print_scenes(given.world, given.panoramas, part, count, glossy)
+            ]
+            for part, count in ((Part.FIT, given.count), (Part.CHOICE, 60))
+        )
+    except InputError as error:
+        parser.error(str(error))
+    weights = fitted(fit)
+    print("weights", *weights.round(3))
+    for odds in ODDS:
+        share, mean, worst = kept(choice, weights, odds)
+        print(f"odds {odds}: matt, worst {share:.2%}; glossy, mean {mean:.3f}, worst {worst:.3f}")
+
+
+if __name__ == "__main__":
+    main()

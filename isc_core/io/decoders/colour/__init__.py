@@ -1,0 +1,1 @@
+"""What image files say about their colours: ICC profiles, code points, chunks."""

@@ -1,0 +1,87 @@
+"""HEIC and HEIF files, by libheif through the optional package pillow-heif.
+
+libheif turns the picture as the file says. An EXIF orientation only repeats that, and is ignored.
+
+Limits: the primary picture alone; no depth maps, bursts and gain maps.
+"""
+
+import io
+from dataclasses import replace
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ...errors import InputError
+from ...extras import install_command
+from ..limits import Limits
+from ..reading_notes import ReadingNote
+from .colour.cicp import space_of_code_points
+from .colour.icc import space_of_profile
+from .colour.space import ColourSpace
+from .gain_map import gain_map_notes
+from .raster import Raster, check_size, raster_of_codes
+
+
+def read_heif(data: bytes, path: Path, limits: Limits) -> Raster:
+    """Decode a HEIC.
+
+    More than 8 bits are spread over 16.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If pillow-heif is missing, or the size or the colours are not supported.
+    """
+    image = _library(path).open_heif(io.BytesIO(data), convert_hdr_to_8bit=False)
+    check_size(path, limits, *image.size)
+    bits = int(image.info.get("bit_depth", 8))
+    codes = np.asarray(image)
+    if codes.dtype == np.uint16:  # the bits are the upper ones
+        spread = np.rint(np.arange(2**bits) * (65535 / (2**bits - 1))).astype(np.uint16)
+        codes = spread[codes >> (16 - bits)]
+    space, notes = _colours(image.info, 1 if codes.ndim == 2 else 3, path)
+    raster = raster_of_codes(
+        codes,
+        int(np.iinfo(codes.dtype).max),
+        premultiplied="a" in image.mode,
+        space=space,
+        notes=(*notes, *gain_map_notes(data)),
+    )
+    return replace(raster, bit_depth=bits)
+
+
+def _library(path: Path) -> ModuleType:
+    try:
+        import pillow_heif
+    except ImportError as error:
+        raise InputError(
+            f"{path}: HEIC needs pillow-heif: install it with `{install_command('heic')}`, or "
+            "save the photo as a JPEG"
+        ) from error
+    return pillow_heif
+
+
+def _colours(
+    info: dict[str, Any], channels: int, path: Path
+) -> tuple[ColourSpace | None, tuple[ReadingNote, ...]]:
+    if "icc_profile" in info:
+        return space_of_profile(info["icc_profile"], channels)
+    points = info.get("nclx_profile", {})
+    primaries, transfer = (
+        int(points.get(name, 2)) for name in ("color_primaries", "transfer_characteristics")
+    )
+    return space_of_code_points(primaries, transfer, path), ()

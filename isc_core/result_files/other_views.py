@@ -1,0 +1,179 @@
+"""The object as a photo does not show it: from the left, from the right, and in another light.
+
+Equation: diffuse light is the same from all sides, so that the turned mesh carries the diffuse
+image; the fitted lobe is evaluated toward the new viewer under the fitted lights, which stay where
+they are. The relit view is reflectance x (key max(0, n . l) + fill), plus the same lobe under its
+brightest light moved to l; key and fill have the mean colour of the recovered light, and l is on
+the other side than that light. Where a lobe predicts more light than the specular layer has, it is
+scaled down to it.
+
+Limits: everything is drawn from maps of a panel's size; no cast shadows, no interreflection. The
+back of the object is not known. Without a fitted lobe there are no highlights.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+from scipy import ndimage
+
+from ..imaging.luminance import luminance
+from ..scene.decomposition import Decomposition
+from ..scene.lobe_fit import LobeFit
+from ..shading.brdf.ggx import F0
+from ..shading.lights import VIEW, DirectionalLight, sphere_directions, toward, turn
+from ..shading.lobe_rendering import Lobe
+from ..shading.radiance import DistantLights, radiance, sh_shading
+from .glb import TexturedMesh
+from .mesh import MeshOptions, build_mesh
+from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
+from .turned_view import turned_view
+
+ANGLE = 30.0  # degrees
+_STEP = 2  # pixels of the panel between vertices of the turned mesh
+_KEY, _FILL = 0.85, 0.15  # shares of the new light
+_NARROWEST = 0.03  # alpha: narrower highlights are smaller than a panel's pixel
+
+
+def turned_panels(
+    d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray], gain: float
+) -> list[Panel]:
+    """Draw the object from the left and from the right.
+
+    Parameters
+    ----------
+    d : Decomposition
+    frame : Frame
+        Of the object.
+    small : mapping of str to ndarray
+        The maps diffuse, specular, normal and height, scaled to the panel.
+    gain : float
+        Exposure.
+
+    Returns
+    -------
+    list of Panel
+        Two; empty ones for an object too thin for a mesh.
+    """
+    names = ("From the left", "From the right")
+    mesh = _coarse_mesh(frame, small)
+    if mesh is None:
+        empty = np.zeros((SIDE, SIDE))
+        return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
+    places = (mesh.uv * (1, -1) + (0, 1)) * SIDE - 0.5
+    panels = []
+    for name, yaw in zip(names, (ANGLE, -ANGLE), strict=True):
+        texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
+        view = turned_view(mesh.vertices, mesh.faces, places, yaw, SIDE, 1.0, 1 - 2 * MARGIN)
+        covered = view.coverage > 0
+        color, (column, row) = np.zeros((SIDE, SIDE, 3)), view.values[covered].T
+        for channel in range(3):
+            color[covered, channel] = ndimage.map_coordinates(
+                texture[..., channel], (row, column), order=1, mode="nearest"
+            )
+        panels.append(Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, in the same light"))
+    return panels
+
+
+def _coarse_mesh(frame: Frame, small: Mapping[str, np.ndarray]) -> TexturedMesh | None:
+    """The mesh of a panel's maps in the panel's pixels, a vertex every `_STEP` pixels; None for an
+    object too thin for it.
+    """
+    weight = frame.coverage > 0.5
+    share = _blocks(weight)
+    inside = share > 0.5
+    if not ndimage.binary_opening(inside, np.ones((2, 2))).any():
+        return None
+    height, normal = (
+        np.stack(
+            [_blocks(np.where(weight, plane, 0)) / np.maximum(share, 1e-3) for plane in planes], -1
+        )
+        for planes in (small["height"][None], np.moveaxis(small["normal"], -1, 0))
+    )
+    options = MeshOptions(metres_per_pixel=float(_STEP), max_faces=2 * inside.size, bleed=0)
+    height = height[..., 0] * (frame.zoom / _STEP)
+    return build_mesh(height, unit_normals(normal), inside, np.ones_like(normal), options).mesh
+
+
+def _blocks(plane: np.ndarray) -> np.ndarray:
+    """Means of a panel's plane (N, N) over blocks of `_STEP` x `_STEP` pixels."""
+    side = SIDE // _STEP
+    return np.asarray(plane.reshape(side, _STEP, side, _STEP).mean(axis=(1, 3), dtype=np.float64))
+
+
+def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
+    """Draw the object under a light from the other side.
+
+    Parameters
+    ----------
+    d : Decomposition
+    frame : Frame
+        Of the object.
+    small : mapping of str to ndarray
+        The maps specular, normal, reflectance and shading, scaled to the panel.
+
+    Returns
+    -------
+    Panel
+        In its own exposure.
+    """
+    inside, normal = frame.coverage > 0, unit_normals(small["normal"])
+    direction, side = _other_side(d)
+    tint = d.shading[d.mask].mean(axis=0, dtype=np.float64)
+    new = DirectionalLight(direction, np.pi * _KEY * tint, _FILL * tint).shading(normal)
+    before, after = (
+        float(luminance(small["reflectance"] * light)[inside].sum())
+        for light in (small["shading"], new)
+    )
+    diffuse = small["reflectance"] * new * (before / max(after, 1e-12))
+    color = diffuse + _highlights(d.brdf, frame, small, VIEW, direction)
+    return Panel(
+        exposure(color[inside]) * color,
+        frame.coverage,
+        "Relit",
+        f"key light from the {side}",
+    )
+
+
+def _other_side(d: Decomposition) -> tuple[np.ndarray, str]:
+    """A unit vector (3,) toward the upper left or right, away from the present light, and which."""
+    around = sphere_directions(256)
+    around = around[around[:, 2] > 0]
+    present = luminance(sh_shading(around, d.illumination)) @ around
+    if d.brdf is not None and d.brdf.direction is not None:
+        present = d.brdf.direction
+    return (
+        (toward(-0.75, 0.5, 0.6), "left") if present[0] > 0 else (toward(0.75, 0.5, 0.6), "right")
+    )
+
+
+def _highlights(
+    fit: LobeFit | None,
+    frame: Frame,
+    small: Mapping[str, np.ndarray],
+    view: np.ndarray,
+    moved: np.ndarray | None,
+) -> np.ndarray:
+    """Specular light (N, N, 3) toward `view`; under the brightest light moved to `moved`, or under
+    all lights where they are.
+    """
+    layer = np.zeros((SIDE, SIDE, 3))
+    if fit is None or fit.alpha is None or not fit.lights:
+        return layer
+    lobe, inside = _lobe(fit), frame.coverage > 0
+    normal = unit_normals(small["normal"])[inside]
+    directions = np.stack([light.direction for light in fit.lights])
+    strengths = np.stack([light.strength_light for light in fit.lights])
+    present = radiance(lobe.model, normal, VIEW, DistantLights(directions, strengths))
+    observed = float(small["specular"][inside].sum())
+    share = min(1.0, observed / max(float(present.sum()), 1e-12))
+    if moved is not None:
+        directions, strengths = moved[None], strengths.sum(axis=0, keepdims=True)
+    layer[inside] = share * radiance(lobe.model, normal, view, DistantLights(directions, strengths))
+    return layer
+
+
+def _lobe(fit: LobeFit) -> Lobe:
+    alpha = float(np.clip(fit.alpha or 1.0, _NARROWEST, 1.0))
+    if fit.model.startswith("ggx"):
+        return Lobe(alpha=alpha, f0=F0)
+    return Lobe(max(2 / alpha**2 - 2, 1.0))

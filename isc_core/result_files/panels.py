@@ -1,0 +1,150 @@
+"""The panels of a contact sheet: squares of one size, each with the object in the same place."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from PIL import Image, ImageFilter
+
+SIDE = 320  # pixels
+MARGIN = 0.06  # room around the object, of the panel's side
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture of a sheet.
+
+    Attributes
+    ----------
+    color : (N, N, 3) ndarray
+        Linear.
+    coverage : (N, N) ndarray
+        In [0, 1].
+    label, remark : str
+    keys : tuple of (str, tuple of int)
+        What colours mean: text and sRGB code, drawn in place of the remark.
+    """
+
+    color: np.ndarray
+    coverage: np.ndarray
+    label: str
+    remark: str = ""
+    keys: tuple[tuple[str, tuple[int, int, int]], ...] = ()
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Placement of a map in a panel: the object's box, scaled and centred.
+
+    Attributes
+    ----------
+    mask : (H, W) bool ndarray
+        The object.
+    box : tuple of int
+        First row, end row, first column, end column.
+    zoom : float
+        Pixels of the panel for a pixel of the map.
+    """
+
+    mask: np.ndarray
+    box: tuple[int, int, int, int]
+    zoom: float
+
+    @classmethod
+    def around(cls, mask: np.ndarray) -> "Frame":
+        """Frame an object.
+
+        Parameters
+        ----------
+        mask : (H, W) bool ndarray
+            Not empty.
+
+        Returns
+        -------
+        Frame
+        """
+        rows, columns = np.nonzero(mask)
+        box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
+        return cls(mask, box, SIDE * (1 - 2 * MARGIN) / max(box[1] - box[0], box[3] - box[2]))
+
+    @cached_property
+    def coverage(self) -> np.ndarray:
+        """Coverage of each pixel of the panel, (N, N), by the object; the outline of a small object
+        is smoothed.
+        """
+        zoom = max(1.0, self.zoom)
+        soft = Image.fromarray(np.rint(255 * self._weight).astype(np.uint8))
+        if zoom > 1:
+            soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
+        return np.clip((np.asarray(soft, np.float32) / 255 - 0.5) * zoom + 0.5, 0, 1)
+
+    def scaled(self, values: np.ndarray) -> np.ndarray:
+        """Scale a map to the panel, with the mask as weight.
+
+        Parameters
+        ----------
+        values : (H, W) or (H, W, C) ndarray
+
+        Returns
+        -------
+        (N, N) or (N, N, C) ndarray
+            0 outside the mask.
+        """
+        if values.ndim == 3:
+            return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
+        weight = self._weight
+        return np.where(
+            weight > 1e-3,
+            self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
+            0,
+        )
+
+    @cached_property
+    def _weight(self) -> np.ndarray:
+        return self._resized(self.mask)
+
+    def _resized(self, plane: np.ndarray) -> np.ndarray:
+        first_row, end_row, first_column, end_column = self.box
+        # An empty border, so that the object's outline is soft all around.
+        window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
+        height, width = (min(SIDE, max(1, round(self.zoom * n))) for n in window.shape)
+        panel = np.zeros((SIDE, SIDE), np.float32)
+        top, left = (SIDE - height) // 2, (SIDE - width) // 2
+        panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
+            (width, height), Image.Resampling.BILINEAR
+        )
+        return panel
+
+
+def exposure(inside: np.ndarray) -> float:
+    """Return the gain that puts the 99.5th percentile of the largest channel at .95.
+
+    Parameters
+    ----------
+    inside : (N, 3) ndarray
+        Linear light of the object.
+
+    Returns
+    -------
+    float
+        1 for a black object, and for none.
+    """
+    bright = float(np.percentile(inside.max(-1), 99.5)) if inside.size else 0.0
+    return 0.95 / bright if bright > 0 else 1.0
+
+
+def unit_normals(scaled: np.ndarray) -> np.ndarray:
+    """Return the unit normals of a scaled map of normals.
+
+    Parameters
+    ----------
+    scaled : (N, N, 3) ndarray
+        As `Frame.scaled` gives them: shorter, and 0 outside the object.
+
+    Returns
+    -------
+    (N, N, 3) ndarray
+        (0, 0, 1) where they have no length.
+    """
+    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    return np.where(length > 1e-6, scaled / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))

@@ -1,0 +1,68 @@
+"""What was assumed or left out when a photo was read, as sentences for commands."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from ..io.reading_notes import ReadingNote, ReadingNoteKind
+
+_TEXTS = {
+    ReadingNoteKind.BROKEN_PROFILE: (
+        "the photo's colour profile is damaged or does not fit its pixels: sRGB was assumed"
+    ),
+    ReadingNoteKind.TABLE_PROFILE: (
+        "the photo's colour profile is a table of colours, which was applied with 8 bits: save the "
+        "photo in sRGB or Adobe RGB for more"
+    ),
+    ReadingNoteKind.UNUSED_PROFILE: (
+        "the photo's colour profile is a table of colours, which --transfer replaced: without the "
+        "option it is applied"
+    ),
+    ReadingNoteKind.GAIN_MAP: "the photo's gain map (HDR) was ignored",
+    ReadingNoteKind.UNKNOWN_CAMERA_COLOURS: (
+        "the raw file does not say which colours its camera sees: hues may be wrong; export it as "
+        "a 16-bit TIFF instead"
+    ),
+    ReadingNoteKind.OUT_OF_GAMUT: (
+        "of the object's pixels {value:.0%} have colours outside of Rec.709: they were clipped"
+    ),
+}
+
+
+def reading_note_lines(notes: Iterable[ReadingNote]) -> list[str]:
+    """Return the lines that a command prints about how it read a photo.
+
+    Parameters
+    ----------
+    notes : iterable of ReadingNote
+
+    Returns
+    -------
+    list of str
+        Each begins with "note: ".
+    """
+    return [f"note: {_TEXTS[one.kind].format(value=one.value or 0.0)}" for one in notes]
+
+
+def stored_note_lines(stored: Any) -> list[str]:
+    """Return these lines for the entry `input.reading_notes` of a decomposition.json.
+
+    Parameters
+    ----------
+    stored : Any
+        The entry; the file may be anybody's, and unusable parts are ignored.
+
+    Returns
+    -------
+    list of str
+    """
+    known = {kind.value: kind for kind in ReadingNoteKind}
+    notes = [one for one in stored if isinstance(one, dict)] if isinstance(stored, list) else []
+    return reading_note_lines(
+        ReadingNote(known[str(one.get("kind"))], _share(one.get("value")))
+        for one in notes
+        if str(one.get("kind")) in known
+    )
+
+
+def _share(value: Any) -> float | None:
+    return float(value) if isinstance(value, int | float) and 0 <= value <= 1 else None
