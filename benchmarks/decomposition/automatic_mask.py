@@ -223,7 +223,7 @@ def main() -> None:
         # the first ones of each kind, whatever was found
         shown = _SHOWN // len(things)
         drawn = [one for name in things for one in groups[name][:shown]]
-        sheet(drawn).save(given.sheet, quality=75)
+        sheet(drawn).save(given.sheet, quality=45)
 
 
 if __name__ == "__main__":
