@@ -69,8 +69,18 @@ class _Mask(_Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the buttons for painting a mask and for cutting it out of a box."""
+        """Draw the buttons for finding a mask, for painting it and for cutting it out of a box."""
         settings = context.scene.isc
+        self.layout.operator("isc.auto_mask", icon="VIEWZOOM")
+        if context.area.type == "IMAGE_EDITOR":
+            row = self.layout.row(align=True)
+            row.operator("isc.mark_point", text="Add Point", icon="ADD").background = False
+            row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
+        column = self.property_column()
+        column.prop(settings, "points")
+        column.prop(settings, "other_points")
+        if settings.points or settings.other_points:
+            self.layout.operator("isc.clear_points", icon="X")
         self.layout.operator("isc.new_mask", icon="BRUSH_DATA")
         if context.area.type == "IMAGE_EDITOR":
             self.layout.operator("isc.draw_box", icon="SELECT_SET")

@@ -18,6 +18,7 @@ from .decomposition import pipeline
 from .decomposition.settings import Settings
 from .errors import InputError
 from .io.decoders import Raster, read_raster
+from .masking.finder import MaskSearch
 from .photo.arrays import raster_from_array
 from .photo.photo import Photo
 from .photo.reading import photo_from_raster
@@ -51,7 +52,7 @@ def decompose(
         Rec.709 floats; or a photo.
     mask : str, Path or (H, W) ndarray, optional
         The object, white on black or True. By default the image's alpha channel, else the pixels
-        inside a black border.
+        inside a black border, else the one thing that stands out.
     settings : Settings, optional
         Model and options, such as `Settings(model="sirfs", max_size=256)`.
     known : KnownInputs, optional
@@ -95,8 +96,8 @@ def separate(
     image : str, Path, ndarray or Photo
         As for `decompose`.
     mask : str, Path or (H, W) ndarray, optional
-        As for `decompose`; an image without mask, alpha channel and black border is used as a
-        whole.
+        As for `decompose`; an image without mask, alpha channel and black border in which no single
+        thing stands out is used as a whole.
     method : str
         One of `isc_core.separation.METHODS`.
     variant : str
@@ -172,7 +173,13 @@ def _photo(
     raster, name = _raster(image, "the image")
     mask_raster, mask_name = (None, "") if mask is None else _raster(mask, "the mask")
     return photo_from_raster(
-        raster, name, mask_raster, mask_name, transfer=transfer, whole_frame=whole_frame
+        raster,
+        name,
+        mask_raster,
+        mask_name,
+        transfer=transfer,
+        whole_frame=whole_frame,
+        finder=MaskSearch(lenient=whole_frame),
     )
 
 

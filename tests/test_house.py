@@ -178,6 +178,7 @@ ROOMS = (
     "shading",
     "scene",
     "networks",
+    "masking",
     "inpainting",
     "thresholding",
     "illuminant",

@@ -49,7 +49,7 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        return _can_cut(cls, context)
+        return can_cut(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run; see `WorkerOperator`.
@@ -81,7 +81,7 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
 
         def finish(context: Any, path: Path) -> str:
             del context
-            _load_mask(path, photo.name, scene)
+            load_mask(path, photo.name, scene)
             remove_folder(folder)
             return "the mask is ready: check its outline before you decompose the photo"
 
@@ -242,7 +242,7 @@ class ISC_OT_draw_box(bpy.types.Operator):
             {"RUNNING_MODAL"} or {"PASS_THROUGH"} while drawing; {"FINISHED"} with a box;
             {"CANCELLED"} on Esc, the right mouse button or too small a box.
         """
-        region = _canvas(context)
+        region = canvas(context)
         position = (event.mouse_x - region.x, event.mouse_y - region.y)
         if event.type in {"ESC", "RIGHTMOUSE"}:
             return self._leave(context, {"CANCELLED"})
@@ -288,7 +288,7 @@ class ISC_OT_draw_box(bpy.types.Operator):
             self._handler = None
             context.window.cursor_modal_restore()
             context.workspace.status_text_set(None)
-            _canvas(context).tag_redraw()
+            canvas(context).tag_redraw()
         return result
 
     def _draw(self) -> None:
@@ -335,7 +335,21 @@ def _small_box_message() -> str:
     )
 
 
-def _load_mask(path: Path, image: str, scene: str) -> None:
+def load_mask(path: Path, image: str, scene: str) -> None:
+    """Make a file the mask of a photo.
+
+    Parameters
+    ----------
+    path : Path
+        File of the mask.
+    image, scene : str
+        Full names of the photo and of the scene that uses the mask.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
+    """
     try:
         bpy.ops.isc.take_mask("EXEC_DEFAULT", True, filepath=str(path), image=image, scene=scene)
     except RuntimeError as error:
@@ -358,7 +372,20 @@ def _replace_mask(mask: Any, name: str) -> None:
     mask.name, mask[_MASK_OF] = name, name
 
 
-def _can_cut(operator: Any, context: Any) -> bool:
+def can_cut(operator: Any, context: Any) -> bool:
+    """Return whether there is a photo and no run is active; else say why not in the tooltip.
+
+    Parameters
+    ----------
+    operator : type
+        Of the button.
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    bool
+    """
     if context.scene.isc.image is None:
         operator.poll_message_set("Select a photo first")
         return False
@@ -368,6 +395,16 @@ def _can_cut(operator: Any, context: Any) -> bool:
     return present is None
 
 
-def _canvas(context: Any) -> Any:
-    """The region that shows the image; the button may be in the sidebar."""
+def canvas(context: Any) -> Any:
+    """Return the region that shows the image; the button may be in the sidebar.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    bpy.types.Region
+    """
     return next(region for region in context.area.regions if region.type == "WINDOW")

@@ -20,10 +20,12 @@ _FIELDS = {
     "--separator": "Separator",
     "--model": "Model",
     "--box": "Box",
+    "--point": "Points",
+    "--not": "Background",
 }
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
-_MASK_ADVICE = "choose a mask image, or cut one out with Draw Box"
+_MASK_ADVICE = "choose a mask image, or make one with Add Point or Draw Box"
 
 
 def translate_message(message: str, names: Mapping[str, str]) -> str:

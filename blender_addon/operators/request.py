@@ -139,11 +139,11 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
     if masked and settings.mask is None:
         raise InputError(
             "no mask image is selected: choose one, cut one out with Draw Box, "
-            "or set Mask to Alpha or Black"
+            "or set Mask to From Photo"
         )
     if masked and settings.mask == settings.image:
         raise InputError(
-            "the mask is the photo itself: choose another image, or set Mask to Alpha or Black"
+            "the mask is the photo itself: choose another image, or set Mask to From Photo"
         )
     return DecomposeRequest(
         image=settings.image.name_full,

@@ -4,6 +4,7 @@ the arrays of a result.
 
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 
 from isc_core.result_files.diagnostics_text import status_lines
@@ -15,8 +16,10 @@ from ..files.result_arrays import ARRAYS, DESCRIPTION, read_description
 from ..worker.commands import (
     Box,
     DecomposeJob,
+    Points,
     WorkerEnvironment,
     start_arrays,
+    start_auto_mask,
     start_box_mask,
     start_decompose,
 )
@@ -109,12 +112,61 @@ def mask_steps(
     RunOutput
         The PNG file of the mask.
     """
+    return (yield from _mask_steps(photo, folder, partial(_box_worker, box, environment)))
+
+
+def auto_mask_steps(
+    photo: ImageSource,
+    points: Points,
+    others: Points,
+    folder: Path,
+    environment: WorkerEnvironment,
+) -> RunSteps:
+    """Find the object by its looks.
+
+    Parameters
+    ----------
+    photo : ImageSource
+        The photo.
+    points, others : sequence of (x, y)
+        Pixels of the object and of the background; may be empty.
+    folder : Path
+        The run's folder.
+    environment : WorkerEnvironment
+        What the worker runs with.
+
+    Returns
+    -------
+    RunOutput
+        The PNG file of the mask.
+    """
+    worker = partial(_auto_worker, points, others, environment)
+    return (yield from _mask_steps(photo, folder, worker))
+
+
+def _box_worker(
+    box: Box, environment: WorkerEnvironment, path: Path, mask: Path, transfer: str
+) -> WorkerProcess:
+    return start_box_mask(path, box, mask, environment, transfer)
+
+
+def _auto_worker(
+    points: Points,
+    others: Points,
+    environment: WorkerEnvironment,
+    path: Path,
+    mask: Path,
+    transfer: str,
+) -> WorkerProcess:
+    return start_auto_mask(path, points, others, mask, environment, transfer)
+
+
+def _mask_steps(
+    photo: ImageSource, folder: Path, worker: Callable[[Path, Path, str], WorkerProcess]
+) -> RunSteps:
     path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
     mask = folder / "mask.png"
-    yield from _run_worker(
-        lambda: start_box_mask(path, box, mask, environment, photo.transfer),
-        {str(path): photo.name},
-    )
+    yield from _run_worker(lambda: worker(path, mask, photo.transfer), {str(path): photo.name})
     return RunOutput(mask)
 
 

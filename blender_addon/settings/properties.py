@@ -106,8 +106,8 @@ CAMERAS = _numbered(
 MASK_SOURCES = _numbered(
     (
         "ALPHA",
-        "Alpha or Black",
-        "Use the photo's transparency, or its black background where it has none",
+        "From Photo",
+        "Use the photo's transparency, or its black background, or find the object that stands out",
     ),
     (
         "IMAGE",
@@ -161,6 +161,13 @@ def _is_still_image(_settings: Any, image: Any) -> bool:
     return image.source in {"FILE", "GENERATED"} or image.type == "COMPOSITING"
 
 
+def _forget_points(settings: Any, context: Any) -> None:
+    """Points belong to one photo."""
+    del context
+    if settings.points or settings.other_points:
+        settings.points = settings.other_points = ""
+
+
 class ISC_PG_settings(bpy.types.PropertyGroup):
     """The settings of one scene."""
 
@@ -169,6 +176,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Photo of one object: an image file, or any image in this file",
         type=bpy.types.Image,
         poll=_is_still_image,
+        update=_forget_points,
     )
     mask_source: EnumProperty(
         name="Mask",
@@ -196,6 +204,17 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         size=4,
         min=0,
         default=(0, 0, 0, 0),
+    )
+    points: StringProperty(
+        name="Points",
+        description=(
+            "Pixels of the object, as column,row from the photo's upper left corner, "
+            "separated by spaces"
+        ),
+    )
+    other_points: StringProperty(
+        name="Background",
+        description="Pixels that do not belong to the object, written as Points",
     )
 
     preset: EnumProperty(

@@ -11,6 +11,7 @@ from isc_core.errors import InputError
 from .process import WorkerProcess
 
 Box = tuple[int, int, int, int]
+Points = Sequence[tuple[int, int]]
 """Left, top, width and height in pixels, from the photo's upper left corner."""
 
 _INHERITED = (
@@ -243,6 +244,44 @@ def start_box_mask(
     numbers = ",".join(map(str, box))
     # The equals sign keeps a negative number from being parsed as an option.
     words = ["mask", _absolute(photo), f"--box={numbers}", "--transfer", transfer]
+    return _start([*words, "-o", _absolute(output)], output, environment)
+
+
+def start_auto_mask(
+    photo: Path,
+    points: Points,
+    others: Points,
+    output: Path,
+    environment: WorkerEnvironment,
+    transfer: str = "auto",
+) -> WorkerProcess:
+    """Start finding the object by its looks.
+
+    Parameters
+    ----------
+    photo : Path
+        Image file or `.npy`.
+    points, others : sequence of (x, y)
+        Pixels of the object and of the background; may be empty.
+    output : Path
+        PNG file of the mask.
+    environment : WorkerEnvironment
+        What the worker runs with.
+    transfer : str, optional
+        Value of `--transfer`.
+
+    Returns
+    -------
+    WorkerProcess
+        The running worker.
+
+    Raises
+    ------
+    InputError
+        If the worker cannot be started.
+    """
+    words = ["mask", _absolute(photo), "--auto", "--transfer", transfer]
+    words += [f"--point={x},{y}" for x, y in points] + [f"--not={x},{y}" for x, y in others]
     return _start([*words, "-o", _absolute(output)], output, environment)
 
 

@@ -17,6 +17,7 @@ from .. import __version__
 from ..decomposition.pipeline import decompose
 from ..errors import Cancelled, InputError
 from ..io.memory import memory_message
+from ..masking.finder import MaskSearch
 from ..photo import read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
@@ -138,7 +139,7 @@ def _decompose(
     monitor: Monitor,
 ) -> None:
     plan, recipe = job.plan, job.recipe
-    photo = read_photo(path, mask, recipe.transfer, limits=plan.limits)
+    photo = read_photo(path, mask, recipe.transfer, limits=plan.limits, finder=MaskSearch())
     if photo.original.sha256 != sums[0] or (mask is not None and sha256(mask) != sums[1]):
         raise InputError(f"{job.image} changed while it was read: run again when it is complete")
     require_room(job.folder, 0, arrays=plan.arrays)
@@ -149,7 +150,9 @@ def _decompose(
     )
     source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": expected}
     result = replace(result, provenance=replace(result.provenance, input=source))
-    save(result, job.folder, arrays=plan.arrays, monitor=monitor.part(0.8, 1.0))
+    cover = None if photo.found is None else photo.found.cover
+    writing = monitor.part(0.8, 1.0)
+    save(result, job.folder, arrays=plan.arrays, cover=cover, monitor=writing)
 
 
 def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:

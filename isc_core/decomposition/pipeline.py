@@ -282,4 +282,5 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "colour_profile": source.colour_profile,
         "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
+        **({} if source.sureness is None else {"mask_sureness": round(source.sureness, 4)}),
     }

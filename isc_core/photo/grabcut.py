@@ -16,6 +16,7 @@ mask. Large boxes are solved at one megapixel and the border is interpolated.
 """
 
 import os
+from enum import IntEnum
 from pathlib import Path
 
 import cv2
@@ -60,7 +61,7 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
         no object.
     """
     height, width = image.shape[:2]
-    _check_box(box, width, height)
+    check_box(box, width, height)
     x, y, w, h = box
     left, top, right, bottom = (
         max(x - w // 2, 0),
@@ -82,7 +83,16 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
     return mask
 
 
-def _check_box(box: Box, width: int, height: int) -> None:
+def check_box(box: Box, width: int, height: int) -> None:
+    """Raise `InputError` for a box that is thin, leaves the image, or covers all of it.
+
+    Parameters
+    ----------
+    box : tuple of int
+        (x, y, width, height).
+    width, height : int
+        Of the image.
+    """
     x, y, w, h = box
     name = f"--box {x},{y},{w},{h}"
     if w < MIN_SIDE or h < MIN_SIDE:
@@ -125,13 +135,50 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     return cv2.resize(probability, (width, height), interpolation=cv2.INTER_LINEAR)
 
 
+class Label(IntEnum):
+    """What is known of a pixel."""
+
+    BACKGROUND = cv2.GC_BGD
+    OBJECT = cv2.GC_FGD
+    PROBABLY_BACKGROUND = cv2.GC_PR_BGD
+    PROBABLY_OBJECT = cv2.GC_PR_FGD
+
+
+def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndarray:
+    """Segment an image of which some pixels are known.
+
+    Parameters
+    ----------
+    coded : (H, W, 3) uint8 ndarray
+        RGB.
+    labels : (H, W) uint8 ndarray
+        Of `Label`; some of the object and some of the background.
+    iterations : int
+
+    Returns
+    -------
+    (H, W) bool ndarray
+    """
+    cv2.setRNGSeed(_SEED)
+    found = cv2.grabCut(
+        np.ascontiguousarray(coded[..., ::-1]),
+        labels.copy(),
+        None,
+        np.zeros((1, 65)),
+        np.zeros((1, 65)),
+        iterations,
+        cv2.GC_INIT_WITH_MASK,
+    )[0]
+    return (found == Label.OBJECT) | (found == Label.PROBABLY_OBJECT)
+
+
 def write_mask(path: str | Path, mask: np.ndarray) -> None:
     """Write a mask as an 8-bit grey PNG, 255 inside, completely or not at all.
 
     Parameters
     ----------
     path : str or Path
-    mask : (H, W) bool ndarray
+    mask : (H, W) bool ndarray, or float cover in [0, 1]
 
     Raises
     ------
@@ -139,9 +186,46 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
         If the file cannot be written.
     """
     _require_png(path)
-    data = cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes()
     with new_file(path) as partial:
-        partial.write_bytes(data)
+        partial.write_bytes(encoded_mask(mask))
+
+
+def encoded_mask(mask: np.ndarray) -> bytes:
+    """Return a mask as the bytes of a PNG, see `write_mask`.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray, or float cover in [0, 1]
+
+    Returns
+    -------
+    bytes
+    """
+    codes = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
+    return bytes(cv2.imencode(".png", codes)[1].tobytes())
+
+
+def check_mask_path(photo_path: str | Path, out_path: str | Path) -> None:
+    """Check, before the work, that a mask can be written.
+
+    Parameters
+    ----------
+    photo_path, out_path : str or Path
+        The photo, and the PNG of its mask.
+
+    Raises
+    ------
+    InputError
+        If it cannot, or would replace the photo.
+    """
+    _require_png(out_path)
+    if (
+        os.path.exists(out_path)
+        and os.path.exists(photo_path)
+        and os.path.samefile(photo_path, out_path)
+    ):
+        raise InputError(f"{out_path} is the photo itself: choose another file for its mask")
+    require_writable_file(out_path)
 
 
 def _require_png(path: str | Path) -> None:
@@ -178,14 +262,7 @@ def cut_out(
         If the photo cannot be read, the box does not fit, nothing is found, or the mask cannot be
         written or would replace the photo.
     """
-    _require_png(out_path)
-    if (
-        os.path.exists(out_path)
-        and os.path.exists(photo_path)
-        and os.path.samefile(photo_path, out_path)
-    ):
-        raise InputError(f"{out_path} is the photo itself: choose another file for its mask")
-    require_writable_file(out_path)
+    check_mask_path(photo_path, out_path)
     image = read_linear(photo_path, transfer, limits)
     white = float(np.percentile(image, 99.9)) or float(image.max())
     if white == 0:

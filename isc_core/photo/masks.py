@@ -1,5 +1,6 @@
 """Finding the object's mask in a photo, and checking it."""
 
+import cv2
 import numpy as np
 from scipy.ndimage import label
 
@@ -8,6 +9,8 @@ from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import MIN_SIDE, Raster
+from ..io.decoders.raster import as_rgb
+from .found_mask import FoundMask, MaskFinder
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
@@ -59,8 +62,12 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
 
 
 def find_mask(
-    name: str, raster: Raster, linear: np.ndarray, whole_frame: bool
-) -> tuple[np.ndarray, str]:
+    name: str,
+    raster: Raster,
+    linear: np.ndarray,
+    whole_frame: bool,
+    finder: MaskFinder | None = None,
+) -> tuple[np.ndarray | FoundMask, str]:
     """Find the object's mask in the photo itself, and where it comes from.
 
     Parameters
@@ -72,20 +79,23 @@ def find_mask(
     linear : (H, W, 1 or 3) ndarray
         Its linear light.
     whole_frame : bool
-        Take all pixels where there is no alpha channel and no black border.
+        Take all pixels where there is no alpha channel and no black border, and the finder is not
+        sure.
+    finder : MaskFinder, optional
+        Looks for the object where there is no alpha channel and no black border.
 
     Returns
     -------
-    mask : (H, W) bool ndarray
+    mask : (H, W) bool ndarray, or FoundMask
     source : str
-        "alpha", "black border" or "whole frame".
+        "alpha", "black border", "automatic" or "whole frame".
 
     Raises
     ------
     InputError
         If no mask is found.
     """
-    if raster.transparency is not None:
+    if raster.transparency is not None and not (finder is not None and finder.always):
         return raster.transparency >= 0.5, "alpha"
     light = finite_or_zero(largest(linear))
     if not (light > 0).any():
@@ -94,8 +104,15 @@ def find_mask(
         )
     # A float file has no peak value: use its 99th percentile as white.
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
+    if finder is not None and finder.always:
+        found = finder(name, linear_of_white(linear, white))
+        if found is not None:
+            return found, "hints"
     bright = light > white * float(srgb_to_linear(BLACK))
     if bright[0].any() or bright[-1].any() or bright[:, 0].any() or bright[:, -1].any():
+        found = None if finder is None else finder(name, linear_of_white(linear, white))
+        if found is not None:
+            return found, "automatic"
         if whole_frame:
             return np.ones_like(bright), "whole frame"
         raise InputError(
@@ -107,6 +124,24 @@ def find_mask(
             f"{name}: the image is almost black: there is nothing to recover; use another photo"
         )
     return tidy_mask(bright), "black border"
+
+
+def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:
+    """Return light as a `MaskFinder` takes it.
+
+    Parameters
+    ----------
+    linear : (H, W, 1 or 3) ndarray
+    white : float
+        > 0.
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        Finite, not negative, 1 is white.
+    """
+    light = as_rgb(linear if white == 1 else np.maximum(finite_or_zero(linear), 0) / white)
+    return light.astype(np.float32, copy=False)
 
 
 def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
@@ -158,3 +193,23 @@ def finite_or_zero(values: np.ndarray) -> np.ndarray:
         Of the shape and dtype of `values`.
     """
     return np.where(np.isfinite(values), values, np.zeros(1, values.dtype))
+
+
+def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
+    """Change the size of an image: averages of areas, or linear interpolation if it grows.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) float32 ndarray
+    width, height : int
+        New size.
+
+    Returns
+    -------
+    (height, width) or (height, width, C) float32 ndarray
+    """
+    if values.shape[:2] == (height, width):
+        return values
+    grows = width > values.shape[1] or height > values.shape[0]
+    how = cv2.INTER_LINEAR if grows else cv2.INTER_AREA
+    return np.asarray(cv2.resize(np.ascontiguousarray(values), (width, height), interpolation=how))

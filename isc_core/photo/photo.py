@@ -10,6 +10,7 @@ from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
 from ..io.reading_notes import ReadingNote
 from .camera import Camera
+from .found_mask import FoundMask
 
 
 @dataclass(frozen=True)
@@ -27,13 +28,15 @@ class PhotoSource:
     transfer : str
         The transfer curve used: "srgb", "linear", or "profile" for another one of the file.
     mask_from : str
-        "file", "alpha", "black border" or "whole frame".
+        "file", "alpha", "black border", "automatic", "hints", "each" or "whole frame".
     colour_profile : str
         Name of the colour space that the file states, "" without one.
     notes : tuple of ReadingNote
         What was assumed or left out.
     cropped : bool
         The metadata give a focal length, but of a frame of another shape: it does not hold.
+    sureness : float or None
+        Of a mask that was found automatically.
     """
 
     sha256: str
@@ -44,6 +47,7 @@ class PhotoSource:
     colour_profile: str = ""
     notes: tuple[ReadingNote, ...] = ()
     cropped: bool = False
+    sureness: float | None = None
 
 
 @dataclass(frozen=True)
@@ -74,6 +78,8 @@ class Photo:
         Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
     camera : Camera or None
         The pinhole camera of `image`; None where it is unknown, for an orthographic view.
+    found : FoundMask or None
+        The mask at the file's size, where it was found by its looks.
     """
 
     image: np.ndarray
@@ -84,6 +90,7 @@ class Photo:
     scale: float = 1.0
     exposed: bool = True
     camera: Camera | None = None
+    found: FoundMask | None = None
 
     @property
     def box(self) -> tuple[int, int, int, int]:

@@ -20,6 +20,8 @@ from ..io.limits import USUAL, Limits
 from ..io.memory import READING, enough_memory
 from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
+from .decontamination import without_background
+from .found_mask import FoundMask, MaskFinder
 from .masks import check_mask, find_mask, mask_of
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
@@ -37,6 +39,7 @@ def read_photo(
     *,
     whole_frame: bool = False,
     limits: Limits = USUAL,
+    finder: MaskFinder | None = None,
 ) -> Photo:
     """Read a photo at full size.
 
@@ -59,6 +62,9 @@ def read_photo(
         Take all pixels where there is no mask, alpha channel or black border.
     limits : Limits
         Checked by the header, before the file is unpacked.
+    finder : MaskFinder, optional
+        Finds the object where there is no mask, alpha channel or black border
+        (`isc_core.masking`).
 
     Returns
     -------
@@ -72,7 +78,13 @@ def read_photo(
     raster = read_raster(path, limits)
     mask = None if mask_path is None else read_raster(mask_path, limits)
     return photo_from_raster(
-        raster, str(path), mask, str(mask_path), transfer=transfer, whole_frame=whole_frame
+        raster,
+        str(path),
+        mask,
+        str(mask_path),
+        transfer=transfer,
+        whole_frame=whole_frame,
+        finder=finder,
     )
 
 
@@ -84,6 +96,7 @@ def photo_from_raster(
     *,
     transfer: str = "auto",
     whole_frame: bool = False,
+    finder: MaskFinder | None = None,
 ) -> Photo:
     """Make a photo of decoded files.
 
@@ -99,6 +112,7 @@ def photo_from_raster(
         Opens the error messages about it.
     transfer : {"auto", "srgb", "linear"}
     whole_frame : bool
+    finder : MaskFinder, optional
         As for `read_photo`.
 
     Returns
@@ -114,7 +128,7 @@ def photo_from_raster(
     with enough_memory(
         f"{name}: {width} x {height} pixels", READING * width * height, "reduce the image"
     ):
-        return _photo(raster, name, mask_raster, mask_name, transfer, whole_frame)
+        return _photo(raster, name, mask_raster, mask_name, transfer, whole_frame, finder)
 
 
 def _photo(
@@ -124,21 +138,25 @@ def _photo(
     mask_name: str,
     transfer: str,
     whole_frame: bool,
+    finder: MaskFinder | None,
 ) -> Photo:
     used = resolve_transfer(transfer, raster)
     _check_not_constant(raster.values, f"{name}: every pixel")
     linear = to_linear(raster, used)
     if mask_raster is None:
-        mask, mask_from = find_mask(name, raster, linear, whole_frame)
+        seen, mask_from = find_mask(name, raster, linear, whole_frame, finder)
     else:
-        mask, mask_from = mask_of(mask_raster, mask_name, raster), "file"
+        seen, mask_from = mask_of(mask_raster, mask_name, raster), "file"
+    found = seen if isinstance(seen, FoundMask) else None
+    mask = seen.mask if isinstance(seen, FoundMask) else seen
     check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
     _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
     height, width = mask.shape
     lens = raster.focal_length
     cropped = lens is not None and lens.cropped
+    light = as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name))
     return Photo(
-        image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name)),
+        image=light if found is None else without_background(light, found.cover),
         mask=mask,
         code_value=_code_value(raster, used, linear, mask),
         clipped=_clipped(raster),
@@ -151,7 +169,9 @@ def _photo(
             "" if raster.space is None else raster.space.name,
             tuple(_notes(raster, used, linear, mask)),
             cropped,
+            None if found is None or mask_from == "hints" else found.sureness,
         ),
+        found=found,
         exposed=raster.peak is not None,
         camera=None if lens is None or cropped else Camera.of_frame(lens.pixels, (width, height)),
     )

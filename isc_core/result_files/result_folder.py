@@ -2,9 +2,9 @@
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
-that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`. With a fitted lobe,
-`maps.exr` has one more layer, `lobe`: the specular image that the fit predicts; where errors can be
-expected, `expected_error` has them. A separation's
+that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
+mask was found in the photo. With a fitted lobe, `maps.exr` has one more layer, `lobe`: the specular
+image that the fit predicts; where errors can be expected, `expected_error` has them. A separation's
 folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
 completely or not at all (see `io.atomic`).
 """
@@ -27,6 +27,7 @@ from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
 from ..photo.camera import Camera
+from ..photo.grabcut import encoded_mask
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
@@ -62,7 +63,13 @@ DECOMPOSITION_FILES = (
     "preview.png",
     *(f"maps/{name}.exr" for name in SINGLE),
 )
-_RESULT_FILES = (*DECOMPOSITION_FILES, ARRAYS, *LAYER_PNGS)  # including files written on demand
+MASK = "mask.png"
+_RESULT_FILES = (
+    *DECOMPOSITION_FILES,
+    ARRAYS,
+    MASK,
+    *LAYER_PNGS,
+)  # including files written on demand
 _PREVIEW_COMPRESSION = 2  # of 9: a third of the time of the usual 6 for 16 % more bytes
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
@@ -77,6 +84,7 @@ def save(
     mesh: MeshOptions | None = None,
     arrays: bool = False,
     png: bool = False,
+    cover: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> None:
     """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
@@ -90,6 +98,8 @@ def save(
         Write `arrays.npz` too.
     png : bool
         Write the layers as PNG files too, see `layer_pngs`.
+    cover : (H, W) ndarray, optional
+        A mask that was found, at the photo's size, to write as `mask.png`.
     monitor : Monitor, optional
 
     Raises
@@ -127,6 +137,8 @@ def save(
             write_arrays(d, partial / ARRAYS, built)
         if png:
             write_layer_pngs(d, partial)
+        if cover is not None:
+            (partial / MASK).write_bytes(encoded_mask(cover))
         _write_description(d, built, partial / "decomposition.json")
         monitor.report("drawing the preview", 0.7)
         preview.result()
@@ -186,6 +198,7 @@ def save_separation(
     *,
     mask: np.ndarray | None = None,
     title: str = "",
+    cover: np.ndarray | None = None,
 ) -> None:
     """Write the folder of a separation.
 
@@ -198,6 +211,8 @@ def save_separation(
     mask : (H, W) bool ndarray, optional
         By default the pixels that are not black.
     title : str
+    cover : (H, W) ndarray, optional
+        A mask that was found, to write as `mask.png`.
 
     Raises
     ------
@@ -212,11 +227,13 @@ def save_separation(
         {"image": image, **{name: getattr(separation, name) for name in layers}},
         {"image": "RGB", **layers},
     )
-    with new_folder(folder, SEPARATION_FILES) as partial:
+    with new_folder(folder, (*SEPARATION_FILES, MASK)) as partial:
         write_channels(partial / "separation.exr", channels)
         for name in ("diffuse", "specular"):
             coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
             Image.fromarray(np.rint(255 * coded).astype(np.uint8)).save(partial / f"{name}.png")
+        if cover is not None:
+            (partial / MASK).write_bytes(encoded_mask(cover))
         sheet = separation_sheet(separation, image, inside, title)
         sheet.save(partial / "preview.png", compress_level=_PREVIEW_COMPRESSION)
 
@@ -237,7 +254,8 @@ def require_writable_result(
     InputError
         If it cannot.
     """
-    require_writable(folder, SEPARATION_FILES if separation else _RESULT_FILES, inputs)
+    files = (*SEPARATION_FILES, MASK) if separation else _RESULT_FILES
+    require_writable(folder, files, inputs)
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:

@@ -15,6 +15,7 @@ from blender_addon import operators  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
 from blender_addon.operators.mask import box_from_corners  # noqa: E402
+from blender_addon.operators.mask_points import parse_points, point_at  # noqa: E402
 from blender_addon.operators.messages import join_notes, translate_message  # noqa: E402
 from blender_addon.operators.request import request_from_settings  # noqa: E402
 from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
@@ -284,7 +285,7 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
         (
             lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200),
-            "choose a mask image, or cut one out with Draw Box",
+            "choose a mask image, or make one with Add Point or Draw Box",
         ),
     ],
 )
@@ -321,6 +322,50 @@ def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     addon.context.scene.isc.image = photo()
     assert "the worker is missing" in error_of(addon.ops.isc.decompose)
+
+
+@pytest.mark.slow
+def test_a_point_finds_the_mask(addon: Any) -> None:
+    d = bump()
+    settings = addon.context.scene.isc
+    settings.image = picture(
+        "cup.png",
+        np.where(d.mask[..., None], 3 * d.image + 0.2, [0.02, 0.25, 0.03]),
+        float_buffer=True,
+    )
+    rows, columns = np.nonzero(d.mask)
+    settings.points = f"{round(columns.mean())},{round(rows.mean())}"
+    settings.other_points = "1,1"
+    assert addon.ops.isc.auto_mask() == {"FINISHED"}
+    assert settings.mask_source == "IMAGE" and settings.mask.name == "cup.png mask"
+    found = np.empty(len(settings.mask.pixels), np.float32)
+    settings.mask.pixels.foreach_get(found)
+    inside = found.reshape(64, 88, 4)[::-1, :, 0] > 0.5
+    assert (inside & d.mask).sum() / (inside | d.mask).sum() > 0.8
+    assert addon.ops.isc.clear_points() == {"FINISHED"} and not settings.points
+    settings.points = "900,3"
+    assert "lies outside of the photo" in error_of(addon.ops.isc.auto_mask)
+    settings.image = photo()
+    assert not settings.points, "points belong to one photo"
+
+
+def test_wrong_points_are_refused(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    settings.image = photo()
+    settings.points = "12;4"
+    assert "'12;4' is no point" in error_of(addon.ops.isc.auto_mask)
+
+
+@pytest.mark.parametrize(
+    ("place", "point"),
+    [((0.0, 1.0), (0, 0)), ((0.999, 0.001), (99, 199)), ((0.5, 0.25), (50, 150)), ((1, 0.5), None)],
+)
+def test_a_click_is_a_pixel_from_the_top(place: tuple[float, float], point: Any) -> None:
+    assert point_at(place, (100, 200)) == point
+
+
+def test_points_are_read_from_text() -> None:
+    assert parse_points(" 3,4  10,0 ") == [(3, 4), (10, 0)] and parse_points("") == []
 
 
 @pytest.mark.slow
@@ -461,7 +506,7 @@ def test_messages_name_images_and_panel_fields() -> None:
         "give another --mask",
     ):
         assert translate_message(f"/t/a.npy: no object: {advice}", {"/t/a.npy": "cup"}) == (
-            "cup: no object: choose a mask image, or cut one out with Draw Box"
+            "cup: no object: choose a mask image, or make one with Add Point or Draw Box"
         )
 
 

@@ -330,7 +330,7 @@ sys.exit(2)
     )
     run = WorkerRun("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
-    assert run.status.message == "cup: choose a mask image, or cut one out with Draw Box"
+    assert run.status.message == "cup: choose a mask image, or make one with Add Point or Draw Box"
 
 
 def test_following_ends_the_worker_when_it_is_closed() -> None:

@@ -46,81 +46,10 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
+from .blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
-
-
-class Convolution(nn.Module):  # type: ignore[misc]
-    """A 3 x 3 convolution without bias, whose weights are one matrix.
-
-    An optimizer of matrices takes the weights as they are; as a kernel they are a view of the
-    matrix, channels last.
-
-    Parameters
-    ----------
-    inputs, outputs : int
-        Channels.
-    """
-
-    def __init__(self, inputs: int, outputs: int) -> None:
-        super().__init__()
-        self.matrix = nn.Parameter(torch.empty(outputs, 9 * inputs))
-        nn.init.kaiming_normal_(self.matrix, nonlinearity="relu")
-
-    @property
-    def weight(self) -> torch.Tensor:
-        """The kernel (outputs, inputs, 3, 3), a view."""
-        return self.matrix.view(len(self.matrix), 3, 3, -1).permute(0, 3, 1, 2)
-
-    def forward(self, layer: torch.Tensor) -> torch.Tensor:
-        """Convolve.
-
-        Parameters
-        ----------
-        layer : (B, inputs, H, W) tensor
-
-        Returns
-        -------
-        (B, outputs, H, W) tensor
-        """
-        return functional.conv2d(layer, self.weight, padding=1)
-
-
-class Block(nn.Module):  # type: ignore[misc]
-    """Two 3 x 3 convolutions, each followed by batch normalisation and max(0, .).
-
-    Parameters
-    ----------
-    inputs, outputs : int
-        Channels.
-    """
-
-    def __init__(self, inputs: int, outputs: int) -> None:
-        super().__init__()
-        self.c1 = Convolution(inputs, outputs)
-        self.n1 = nn.BatchNorm2d(outputs)
-        self.c2 = Convolution(outputs, outputs)
-        self.n2 = nn.BatchNorm2d(outputs)
-
-    def forward(self, layer: torch.Tensor) -> torch.Tensor:
-        """Apply both convolutions.
-
-        Parameters
-        ----------
-        layer : (B, inputs, H, W) tensor
-
-        Returns
-        -------
-        (B, outputs, H, W) tensor
-        """
-        layer = functional.relu(self.n1(self.c1(layer)))
-        return functional.relu(self.n2(self.c2(layer)))
-
-    @property
-    def pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
-        """The convolutions with their normalisations."""
-        return [(self.c1, self.n1), (self.c2, self.n2)]
 
 
 class SceneNetworkModule(nn.Module):  # type: ignore[misc]
@@ -221,18 +150,18 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        pairs = [_folded(*pair) for pair in self._pairs]
+        pairs = [folded(*pair) for pair in self._pairs]
         pairs.append((self.out.weight, self.out.bias))
         found = {
-            "normalisation": _as_array(torch.cat([_state(norm) for _, norm in self._pairs], 1))
+            "normalisation": as_array(torch.cat([norm_state(norm) for _, norm in self._pairs], 1))
         }
         for k, (weight, bias) in enumerate(pairs):
-            kernel = _as_array(weight).transpose(2, 3, 1, 0)
+            kernel = as_array(weight).transpose(2, 3, 1, 0)
             found[f"weight{k:02d}"] = kernel.reshape(9, *kernel.shape[2:]).astype(np.float16)
-            found[f"bias{k:02d}"] = _as_array(bias).astype(np.float16)
+            found[f"bias{k:02d}"] = as_array(bias).astype(np.float16)
         for name, layer in (("hidden", self.hidden), ("light", self.light)):
-            found[f"{name}_weight"] = _as_array(layer.weight).T.astype(np.float16)
-            found[f"{name}_bias"] = _as_array(layer.bias).astype(np.float16)
+            found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
+            found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
         found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
         return found
 
@@ -277,10 +206,10 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
                     part.copy_(values)
                 gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
                 convolution.weight.copy_(
-                    _kernel(arrays[f"weight{k:02d}"]) / gain[:, None, None, None]
+                    kernel_of(arrays[f"weight{k:02d}"]) / gain[:, None, None, None]
                 )
             last = len(self._pairs)
-            self.out.weight.copy_(_kernel(arrays[f"weight{last:02d}"]))
+            self.out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
             self.out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
             for name, layer in (("hidden", self.hidden), ("light", self.light)):
                 layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
@@ -420,22 +349,3 @@ _WEIGHTS = {
     "place": 0.04,
     "kind": 0.1,
 }
-
-
-def _folded(one: nn.Conv2d, norm: nn.BatchNorm2d) -> tuple[torch.Tensor, torch.Tensor]:
-    """The weight and bias of a convolution that does what both do."""
-    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-    return one.weight * gain[:, None, None, None], norm.bias - gain * norm.running_mean
-
-
-def _state(norm: nn.BatchNorm2d) -> torch.Tensor:
-    return torch.stack([norm.weight, norm.bias, norm.running_mean, norm.running_var]).detach()
-
-
-def _kernel(weight: np.ndarray) -> torch.Tensor:
-    kernel = weight.astype(np.float32).reshape(3, 3, *weight.shape[1:])
-    return torch.from_numpy(kernel.transpose(3, 2, 0, 1).copy())
-
-
-def _as_array(values: torch.Tensor) -> np.ndarray:
-    return np.asarray(values.detach().cpu().numpy())

@@ -8,6 +8,7 @@ from pathlib import Path
 from ...batch.names import safe_name
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError, Rejected
+from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
 from ...result_files.diagnostics_text import CROPPED, note_lines
@@ -16,6 +17,7 @@ from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
+from ..interface.mask_options import add_each, add_hints, hints_of, mask_notes
 from ..interface.options import (
     add_engine,
     add_limits,
@@ -37,6 +39,8 @@ from ..interface.viewer import show
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose cup.png jug.png vase.png -o results      one folder each, results/cup and so on
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
+  isc decompose phone.jpg --point 900,1200 -o result     the object is the thing at that pixel
+  isc decompose shelf.jpg --each -o results              each thing: results/1, results/2, ...
   isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
   curl -s https://example.org/cup.png | isc decompose - -o cup
 
@@ -69,6 +73,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main = parser.add_argument_group("main options")
     add_output(main)
     add_mask(main)
+    add_hints(main)
+    add_each(main, "DIR/1, DIR/2 and so on, from left to right")
     add_main_settings(main)
     main.add_argument(
         "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
@@ -143,6 +149,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
     prior_set = None if options.priors is None else load_prior_set(options.priors)
+    if options.each:
+        return _decompose_each(options, settings, prior_set, monitor)
     if len(options.photo) == 1:
         return _decompose_one(
             options.photo[0], options.output, options, settings, prior_set, monitor
@@ -159,9 +167,25 @@ def _decompose_one(
     monitor: Monitor,
 ) -> list[str]:
     """Decompose a photo, and return the lines to print."""
+    finder = MaskSearch(hints_of(options))
     require_writable_result(output, inputs=(path, options.mask))
     with photo_file(path, options) as file:
-        photo = read_photo(file, options.mask, options.transfer, limits=limits_of(options))
+        photo = read_photo(
+            file, options.mask, options.transfer, limits=limits_of(options), finder=finder
+        )
+    lines = [f"note: {note}" for note in mask_notes(photo)]
+    return lines + _decompose_photo(photo, path, output, options, settings, prior_set, monitor)
+
+
+def _decompose_photo(
+    photo: Photo,
+    path: Path,
+    output: Path,
+    options: argparse.Namespace,
+    settings: Settings,
+    prior_set: PriorSet | None,
+    monitor: Monitor,
+) -> list[str]:
     known = _known_inputs(options, photo)
     require_room(output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(
@@ -173,7 +197,8 @@ def _decompose_one(
         monitor=monitor.part(0.0, 0.8),
     )
     writing = monitor.part(0.8, 1.0)
-    save(result, output, arrays=options.arrays, png=options.png, monitor=writing)
+    cover = None if photo.found is None else photo.found.cover
+    save(result, output, arrays=options.arrays, png=options.png, cover=cover, monitor=writing)
     preview = output / "preview.png"
     return hints(
         options,
@@ -183,6 +208,29 @@ def _decompose_one(
         *(show(preview) if options.open else ()),
         f"see {preview}",
     )
+
+
+def _decompose_each(
+    options: argparse.Namespace, settings: Settings, prior_set: PriorSet | None, monitor: Monitor
+) -> list[str]:
+    """Decompose each of several things of a photo into a folder of its own."""
+    hints_of(options)
+    for option in ("shape", "depth"):
+        if getattr(options, option) is not None:
+            raise InputError(f"--{option} belongs to one thing: leave out --each")
+    if len(options.photo) > 1:
+        raise InputError("--each takes the things of one photo: give one")
+    path: Path = options.photo[0]
+    with photo_file(path, options) as file:
+        photos = read_each(file, options.mask, options.transfer, limits_of(options))
+    outputs = [options.output / str(number) for number in range(1, len(photos) + 1)]
+    for output in outputs:
+        require_writable_result(output, inputs=(path, options.mask))
+    lines, count = list[str](), len(photos)
+    for index, (photo, output) in enumerate(zip(photos, outputs, strict=True)):
+        part = _named(monitor.part(index / count, (index + 1) / count), f"thing {index + 1}")
+        lines += _decompose_photo(photo, path, output, options, settings, prior_set, part)
+    return lines
 
 
 def _decompose_several(
@@ -195,6 +243,8 @@ def _decompose_several(
                 f"--{option} belongs to one photo: give one, or list the photos and their masks "
                 "in a manifest (see `isc batch --help`)"
             )
+    if hints_of(options):
+        raise InputError("--box, --point and --not belong to one photo: give one")
     outputs = dict(_outputs(options.photo, options.output))
     lines, failures = [], []
     for index, (path, output) in enumerate(outputs.items()):

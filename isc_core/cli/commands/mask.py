@@ -1,15 +1,33 @@
-"""`isc mask`: segmentation of the object inside a box."""
+"""`isc mask`: the mask of the object in a photo."""
 
 import argparse
 from pathlib import Path
 
-from ...photo.grabcut import Box, cut_out
+from ...errors import InputError
+from ...masking.finder import MaskSearch, read_each
+from ...masking.hints import Hints
+from ...photo.grabcut import check_mask_path, write_mask
+from ...photo.photo import Photo
+from ...photo.reading import read_photo
 from ...progress import Monitor
+from ..interface.mask_options import add_each, add_hints, hints_of
 from ..interface.options import add_limits, add_photo, add_transfer, limits_of
 from ..interface.parser import describe, hints
 from ..interface.standard_input import photo_file
 
-_EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
+_SOURCES = {
+    "alpha": "from the alpha channel",
+    "black border": "all that is not black",
+    "hints": "as marked",
+    "each": "one of several things",
+    "file": "part of a mask",
+}
+_EXAMPLES = """  isc mask photo.jpg --auto -o mask.png
+  isc mask photo.jpg --point 240,310 --not 90,400 -o mask.png
+  isc mask photo.jpg --box 120,80,400,360 -o mask.png
+  isc mask shelf.jpg --each -o mask.png              mask_1.png, mask_2.png and so on
+
+--auto refuses a photo in which no single thing stands out; points and a box say which is meant."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -23,18 +41,16 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Finds the object inside a box and writes its mask, white on black. Check it before you "
-        "use it: the segmentation uses colours alone.",
+        "Finds the object in a photo and writes its mask, white on black. Check it before you "
+        "use it.",
         examples=_EXAMPLES,
     )
     add_photo(parser)
     parser.add_argument(
-        "--box",
-        type=_box,
-        required=True,
-        metavar="x,y,w,h",
-        help="left, top, width and height in pixels, with some background around the object",
+        "--auto", action="store_true", help="find the thing that the photo shows by its looks"
     )
+    add_hints(parser)
+    add_each(parser, "MASK_1.png, MASK_2.png and so on")
     add_transfer(parser)
     add_limits(parser)
     parser.add_argument(
@@ -54,17 +70,44 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     -------
     list of str
         Lines to print.
+
+    Raises
+    ------
+    InputError
+        If nothing says where the object is.
     """
     del monitor  # one step of a second or two
+    given = hints_of(options)
+    if not (given or options.auto or options.each):
+        raise InputError(
+            "nothing says where the object is: --auto finds it, --box x,y,width,height or "
+            "--point x,y mark it"
+        )
+    check_mask_path(options.photo, options.output)
     with photo_file(options.photo, options) as file:
-        mask = cut_out(file, options.box, options.output, options.transfer, limits_of(options))
-    return hints(options, f"{options.output}: {int(mask.sum())} pixels; check it before you use it")
+        lines = _each(file, options) if options.each else _one(file, given, options)
+    return hints(options, *lines)
 
 
-def _box(text: str) -> Box:
-    parts = text.split(",")
-    try:
-        x, y, width, height = (int(part) for part in parts)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is not four integers x,y,w,h") from error
-    return x, y, width, height
+def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
+    """Write one mask, and return what to print."""
+    limits, finder = limits_of(options), MaskSearch(given)
+    photo = read_photo(file, None, options.transfer, limits=limits, finder=finder)
+    return [_write(photo, options.output)]
+
+
+def _each(file: Path, options: argparse.Namespace) -> list[str]:
+    photos = read_each(file, None, options.transfer, limits_of(options))
+    output: Path = options.output
+    return [
+        _write(photo, output.with_name(f"{output.stem}_{number}{output.suffix}"))
+        for number, photo in enumerate(photos, 1)
+    ]
+
+
+def _write(photo: Photo, path: Path) -> str:
+    """Write the mask of a photo; return what to print."""
+    write_mask(path, photo.mask if photo.found is None else photo.found.cover)
+    pixels, sureness = int(photo.mask.sum()), photo.original.sureness
+    sure = f"{sureness:.0%} sure" if sureness is not None else _SOURCES[photo.original.mask_from]
+    return f"{path}: {pixels} pixels, {sure}; check it before you use it"

@@ -45,7 +45,7 @@ def _core(name: str, summary: str, extra: str = "") -> CommandEntry:
 CORE = (
     _core("decompose", "everything: layers, shape, light, shading, reflectance, mesh"),
     _core("separate", "diffuse and specular light only"),
-    _core("mask", "segment the object inside a box"),
+    _core("mask", "find the object in a photo"),
     _core("edit", "another light, gloss or colour for a decomposed photo"),
     _core("batch", "isc decompose for many photos, resumable", "batch"),
     _core("arrays", "a result as plain NumPy arrays"),

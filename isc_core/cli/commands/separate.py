@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...io.limits import Limits
+from ...masking.finder import MaskSearch
 from ...photo import Photo, read_linear, read_photo
 from ...progress import Monitor
 from ...result_files.reading_notes_text import reading_note_lines
@@ -15,6 +16,7 @@ from ...result_files.result_folder import require_writable_result, save_separati
 from ...scene.decomposition import Separation
 from ...separation import BEST, IMPROVED, METHODS, separate
 from ...separation.option_text import parse_changes
+from ..interface.mask_options import add_hints, hints_of
 from ..interface.options import (
     add_limits,
     add_mask,
@@ -46,8 +48,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         parser,
         run,
         "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
-        "images of both. A photo without mask, "
-        "transparency and black border is processed as a whole.",
+        "images of both. A photo without mask, transparency and black border in which no single "
+        "thing stands out is processed as a whole.",
         examples=_EXAMPLES,
         more=methods_table(),
     )
@@ -55,6 +57,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main = parser.add_argument_group("main options")
     add_output(main)
     add_mask(main)
+    add_hints(main)
+    main.add_argument(
+        "--whole", action="store_true", help="process the whole photo; look for no object in it"
+    )
     main.add_argument(
         "--method",
         choices=METHODS,
@@ -112,6 +118,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     InputError
         If --prior is given for a method other than `BEST`.
     """
+    given = hints_of(options)
+    if given and options.whole:
+        raise InputError("--whole looks for no object: leave out --box, --point and --not")
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior needs the method {BEST}")
@@ -120,7 +129,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )
     limits = limits_of(options)
     with photo_file(options.photo, options) as file:
-        photo = read_photo(file, options.mask, options.transfer, whole_frame=True, limits=limits)
+        photo = read_photo(
+            file,
+            options.mask,
+            options.transfer,
+            whole_frame=True,
+            limits=limits,
+            finder=None if options.whole else MaskSearch(given, lenient=True),
+        )
     prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits)
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
@@ -128,7 +144,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         variant=options.variant, changes=changes, prior=prior, monitor=monitor.part(0.1, 0.8),
     )  # fmt: skip
     monitor.report("writing", 0.8)
-    save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
+    cover = None if photo.found is None else photo.found.cover
+    title = options.photo.name
+    save_separation(layers, photo.image, options.output, mask=photo.mask, title=title, cover=cover)
     preview = options.output / "preview.png"
     return hints(
         options,
@@ -141,6 +159,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Iterator[str]:
     """Notes on the result."""
+    if photo.original.mask_from == "automatic":
+        yield (
+            f"the mask was found automatically ({photo.original.sureness:.0%} sure), see mask.png "
+            "in the result; --whole processes the whole photo"
+        )
     if photo.original.mask_from == "whole frame":
         yield "no mask: the whole image was processed; set one with --mask"
     if options.method != "none" and not layers.specular[~photo.clipped].any():

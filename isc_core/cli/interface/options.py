@@ -52,7 +52,7 @@ def add_mask(group: Group) -> None:
         type=Path,
         metavar="MASK",
         help="image of the photo's size, the object white on black (default: the photo's alpha "
-        "channel, else the pixels that are not black)",
+        "channel, else the pixels that are not black, else the thing that stands out)",
     )
 
 

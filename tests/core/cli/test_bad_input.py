@@ -164,7 +164,7 @@ def test_a_photo_without_a_mask_names_the_remedy(
     photo = write_image(
         tmp_path / "full.png", np.arange(60 * 60 * 3, dtype=np.uint16).reshape(60, 60, 3) + 9000
     )
-    assert "isc mask" in refused(capfd, "decompose", photo, "-o", tmp_path / "out")
+    assert "--point x,y" in refused(capfd, "decompose", photo, "-o", tmp_path / "out")
 
 
 def test_a_palette_picture_can_be_used(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

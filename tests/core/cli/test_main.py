@@ -458,7 +458,7 @@ def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     photo = write_image(tmp_path / "full.png", ball_codes() // 2 + 9000)
-    assert isc("separate", photo, "--method", "none", "-o", tmp_path / "out") == 0
+    assert isc("separate", photo, "--whole", "--method", "none", "-o", tmp_path / "out") == 0
     assert "note: no mask: the whole image was processed" in capfd.readouterr().out
     assert read_channels(tmp_path / "out" / "separation.exr")["diffuse.G"].min() > 0
 

@@ -10,9 +10,10 @@ from ....editing.edit_folder import Original, Record, Sheet, require_writable_ed
 from ....errors import InputError
 from ....imaging.srgb import linear_to_srgb
 from ....photo import read_photo, read_raster
+from ....photo.found_mask import FOUND
 from ....photo.transfer import PROFILE
 from ....progress import Monitor
-from ....result_files.result_folder import load
+from ....result_files.result_folder import MASK, load
 from ....scene.decomposition import Decomposition
 from ...interface.options import limits_of
 from ...interface.parser import GENERAL, describe, hints
@@ -185,8 +186,11 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     transfer = "auto" if transfer == PROFILE else transfer
     if given.get("mask_from") == "file" and options.mask is None:
         raise InputError("the result was made with a separate mask: give the same one with --mask")
+    mask = options.mask
+    if given.get("mask_from") in FOUND and mask is None:
+        mask = options.result / MASK
     limits = limits_of(options)
-    photo = read_photo(options.photo, options.mask, transfer, limits=limits)
+    photo = read_photo(options.photo, mask, transfer, limits=limits)
     raster = read_raster(options.photo, limits)
     if raster.sha256 != photo.original.sha256:
         raise InputError(f"{options.photo} changed while it was read: run the command again")

@@ -1,0 +1,230 @@
+"""How good are masks that are found automatically? Measured on composites of held-out things.
+
+  python -m benchmarks.decomposition.automatic_mask WORLD --panoramas DIR [--photos DIR]
+  [--weights NPZ] [--count N] [--sheet JPG] [--json FILE]
+
+WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
+one thing show bodies that no fit has seen, the other half the masked photos of real things in
+--photos; both stand before crops of panoramas that no fit has seen. As many photos again show
+nothing, or several things. Refusals are wrong where one thing is shown; acceptances where none or
+several are. Intervals are those of resampled photos.
+
+Limits: bodies and panoramas are soft at this size, and the light on a thing is not that of its
+background. Several photos show the same of the real things.
+"""
+
+import argparse
+import json
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+from scipy import ndimage
+
+from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.masking.finder import why_refused
+from isc_core.masking.search import find_mask
+from isc_core.networks.mask_network import Count, MaskNetwork
+from isc_core.photo.found_mask import FoundMask
+from training.masks.held_out import HeldOut, held_out_composites, held_out_ingredients
+
+_TILE = 140  # pixels of the sheet's pictures
+_SHOWN = 20
+_SEED = 5
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A composite and what was found in it.
+
+    Attributes
+    ----------
+    photo : HeldOut
+    found : FoundMask
+    overlap : float
+        Intersection over union; 0 without a truth.
+    seconds : float
+    """
+
+    photo: HeldOut
+    found: FoundMask
+    overlap: float
+    seconds: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the mask would be used."""
+        return not why_refused(self.found)
+
+
+def judged(photo: HeldOut, network: MaskNetwork | None) -> Judged:
+    """Find the mask of a composite, and compare it with the truth.
+
+    Parameters
+    ----------
+    photo : HeldOut
+    network : MaskNetwork or None
+
+    Returns
+    -------
+    Judged
+    """
+    start = time.perf_counter()
+    found = find_mask(photo.light, network=network)
+    seconds = time.perf_counter() - start
+    truth = photo.cover >= 0.5
+    union = int((found.mask | truth).sum())
+    return Judged(photo, found, float((found.mask & truth).sum()) / max(union, 1), seconds)
+
+
+def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
+    """Format the figures.
+
+    Parameters
+    ----------
+    groups : dict of str to list of Judged
+        "bodies" and "photos" show one thing each, the others none or several.
+
+    Returns
+    -------
+    text : str
+        A Markdown table.
+    figures : dict
+    """
+    single = [name for name in groups if name in ("bodies", "photos")]
+    rows, figures = list[tuple[str, list[Judged]]](), dict[str, object]()
+    rows += [(name, groups[name]) for name in single]
+    rows.append(("all of one thing", [one for name in single for one in groups[name]]))
+    lines = [
+        "| shown | photos | IoU, median | 10th percentile | of those accepted | refused |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name, found in rows:
+        overlap = np.array([one.overlap for one in found])
+        kept = np.array([one.accepted for one in found])
+        pairs = [_with_interval(overlap, q) for q in (0.5, 0.1)]
+        accepted = " / ".join(f"{np.quantile(overlap[kept], q):.3f}" for q in (0.5, 0.1))
+        refused = _share(~kept)
+        lines.append(
+            f"| {name} | {len(found)} | {pairs[0]} | {pairs[1]} | {accepted} | {refused} |"
+        )
+        figures[name] = {
+            "overlap": overlap.round(4).tolist(),
+            "sureness": [round(one.found.sureness, 4) for one in found],
+        }
+    lines += ["", "| shown | photos | accepted |", "|---|---|---|"]
+    others = [name for name in groups if name not in single]
+    whole = [*((name, groups[name]) for name in others)]
+    whole.append(("no single thing", [one for name in others for one in groups[name]]))
+    for name, found in whole:
+        lines.append(f"| {name} | {len(found)} | {_share([one.accepted for one in found])} |")
+        figures[name] = {"sureness": [round(one.found.sureness, 4) for one in found]}
+    seconds = np.median([one.seconds for found in groups.values() for one in found])
+    lines += ["", f"median time of a mask: {seconds:.2f} s"]
+    return "\n".join(lines), figures
+
+
+def _with_interval(values: np.ndarray, quantile: float) -> str:
+    rng = np.random.default_rng(0)
+    again = values[rng.integers(len(values), size=(2000, len(values)))]
+    low, high = np.quantile(np.quantile(again, quantile, axis=1), (0.025, 0.975))
+    return f"{np.quantile(values, quantile):.3f} ({low:.2f}-{high:.2f})"
+
+
+def _share(chosen: np.ndarray | list[bool]) -> str:
+    values = np.asarray(chosen, float)
+    rng = np.random.default_rng(0)
+    means = values[rng.integers(len(values), size=(2000, len(values)))].mean(axis=1)
+    low, high = np.quantile(means, (0.025, 0.975))
+    return f"{values.mean():.1%} ({low:.0%}-{high:.0%})"
+
+
+def sheet(found: list[Judged]) -> Image.Image:
+    """Draw photos, true outlines and found covers side by side, two photos a row.
+
+    Parameters
+    ----------
+    found : list of Judged
+
+    Returns
+    -------
+    PIL.Image.Image
+    """
+    strips = [_strip(one) for one in found]
+    rows = [np.concatenate(strips[k : k + 2], axis=1) for k in range(0, len(strips) - 1, 2)]
+    return Image.fromarray(np.concatenate(rows))
+
+
+def _strip(one: Judged) -> np.ndarray:
+    """Photo with the true outline in green, photo with the found one in red, the found cover; a
+    refused one under a red bar.
+    """
+    codes = np.rint(255 * linear_to_srgb(np.clip(one.photo.light, 0, 1))).astype(np.uint8)
+    tiles = [
+        _outlined(codes, one.photo.cover >= 0.5, (0, 255, 0)),
+        _outlined(codes, one.found.mask, (255, 0, 0)),
+        np.rint(255 * one.found.cover[..., None] * np.ones(3)).astype(np.uint8),
+    ]
+    strip = np.full((_TILE + 8, 3 * _TILE + 12, 3), 255, np.uint8)
+    for k, tile in enumerate(tiles):
+        picture = Image.fromarray(tile)
+        picture.thumbnail((_TILE, _TILE))
+        values = np.asarray(picture)
+        strip[4 : 4 + values.shape[0], k * _TILE : k * _TILE + values.shape[1]] = values
+    strip[:3, : 3 * _TILE] = (60, 160, 60) if one.accepted else (220, 0, 0)
+    return strip
+
+
+def _outlined(codes: np.ndarray, mask: np.ndarray, colour: tuple[int, int, int]) -> np.ndarray:
+    edge = ndimage.binary_dilation(mask, iterations=2) & ~mask
+    return np.where(edge[..., None], np.array(colour, np.uint8), codes)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("world", type=Path, metavar="WORLD", help="folder of isc world build")
+    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    add("--photos", type=Path, metavar="DIR", help="masked photos of real things")
+    add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
+    add("--count", type=int, default=200, help="photos of one thing (default: %(default)s)")
+    add("--sheet", type=Path, metavar="JPG", help="where to draw 20 of them")
+    add("--json", type=Path, help="file to write")
+    given = parser.parse_args()
+    try:
+        network = None if given.weights is None else MaskNetwork.read(given.weights)
+        bodies = held_out_ingredients(given.world, given.panoramas, "B")
+        things = {"bodies": bodies}
+        if given.photos is not None:
+            things["photos"] = held_out_ingredients(given.world, given.panoramas, "B", given.photos)
+    except InputError as error:
+        parser.error(str(error))
+    groups = {
+        name: [
+            judged(photo, network)
+            for photo in held_out_composites(part, Count.ONE, given.count // len(things), _SEED + k)
+        ]
+        for k, (name, part) in enumerate(things.items())
+    }
+    for name, count in (("nothing", Count.NONE), ("several", Count.SEVERAL)):
+        photos = held_out_composites(bodies, count, given.count // 2, _SEED)
+        groups[name] = [judged(photo, network) for photo in photos]
+    text, figures = report(groups)
+    print(text)
+    if given.json:
+        given.json.write_text(json.dumps(figures), encoding="utf-8")
+    if given.sheet:
+        # the first ones of each kind, whatever was found
+        shown = _SHOWN // len(things)
+        drawn = [one for name in things for one in groups[name][:shown]]
+        sheet(drawn).save(given.sheet, quality=45)
+
+
+if __name__ == "__main__":
+    main()

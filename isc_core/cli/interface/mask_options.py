@@ -1,0 +1,121 @@
+"""Options that say where the object is: --box, --point, --not, --each."""
+
+import argparse
+
+from ...errors import InputError
+from ...masking.hints import Hints, Point
+from ...masking.search import separate_parts
+from ...photo.grabcut import Box
+from ...photo.photo import Photo
+
+Group = argparse._ArgumentGroup
+
+
+def add_hints(group: Group | argparse.ArgumentParser) -> None:
+    """Add --box, --point and --not.
+
+    Parameters
+    ----------
+    group : argparse._ArgumentGroup
+        Changed in place.
+    """
+    group.add_argument(
+        "--box",
+        type=_box,
+        metavar="x,y,w,h",
+        help="left, top, width and height in pixels around the object, with some background",
+    )
+    for option, name, place in (
+        ("--point", "points", "the object"),
+        ("--not", "others", "the background"),
+    ):
+        group.add_argument(
+            option,
+            type=_point,
+            action="append",
+            default=[],
+            dest=name,
+            metavar="x,y",
+            help=f"a pixel of {place}, from the top left; can be repeated",
+        )
+
+
+def add_each(group: Group | argparse.ArgumentParser, what: str) -> None:
+    """Add --each.
+
+    Parameters
+    ----------
+    group : argparse._ArgumentGroup
+        Changed in place.
+    what : str
+        Where the results go.
+    """
+    group.add_argument(
+        "--each", action="store_true", help=f"take each of several separate things: {what}"
+    )
+
+
+def hints_of(options: argparse.Namespace) -> Hints:
+    """Return the hints of a command line.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+
+    Returns
+    -------
+    Hints
+
+    Raises
+    ------
+    InputError
+        If there is a mask, or --each, beside them.
+    """
+    hints = Hints(tuple(options.points), tuple(options.others), options.box)
+    if hints and getattr(options, "mask", None) is not None:
+        raise InputError("--mask says where the object is: leave out --box, --point and --not")
+    if hints and getattr(options, "each", False):
+        raise InputError("--each takes all things: leave out --box, --point and --not")
+    return hints
+
+
+def mask_notes(photo: Photo) -> list[str]:
+    """Return notes on the mask of a photo.
+
+    Parameters
+    ----------
+    photo : Photo
+
+    Returns
+    -------
+    list of str
+    """
+    notes = []
+    if photo.original.mask_from == "automatic":
+        notes.append(
+            f"the mask was found automatically ({photo.original.sureness:.0%} sure): check "
+            "mask.png in the result; --box, --point and --not correct it"
+        )
+    parts = len(separate_parts(photo.mask))
+    if parts > 1:
+        notes.append(
+            f"the mask has {parts} separate parts, which are taken for one object: --each "
+            "decomposes each of them"
+        )
+    return notes
+
+
+def _box(text: str) -> Box:
+    try:
+        x, y, width, height = (int(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not four integers x,y,w,h") from error
+    return x, y, width, height
+
+
+def _point(text: str) -> Point:
+    try:
+        x, y = (int(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two integers x,y") from error
+    return x, y

@@ -1,0 +1,66 @@
+"""What a user says of the mask: points on the thing, points on the background, a box around it."""
+
+from dataclasses import dataclass
+
+from ..errors import InputError
+from ..photo.grabcut import Box, check_box
+
+Point = tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Hints:
+    """Corrections of a mask, in pixels of the upright photo from its top left.
+
+    Attributes
+    ----------
+    points : tuple of (x, y)
+        On the thing.
+    others : tuple of (x, y)
+        On the background.
+    box : tuple of int or None
+        (x, y, width, height) around the thing: nothing outside belongs to it.
+    """
+
+    points: tuple[Point, ...] = ()
+    others: tuple[Point, ...] = ()
+    box: Box | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.points or self.others or self.box)
+
+    def check(self, width: int, height: int) -> None:
+        """Compare the hints with a photo's size, and with each other.
+
+        Parameters
+        ----------
+        width, height : int
+            Of the photo.
+
+        Raises
+        ------
+        InputError
+            If a point or the box lies outside of the photo, or they contradict each other.
+        """
+        for name, points in (("--point", self.points), ("--not", self.others)):
+            for x, y in points:
+                if not (0 <= x < width and 0 <= y < height):
+                    raise InputError(
+                        f"{name} {x},{y}: lies outside of the photo of {width} x {height} pixels: "
+                        "count from 0 at the top left"
+                    )
+        for x, y in self.points:
+            if (x, y) in self.others:
+                raise InputError(
+                    f"--point {x},{y} and --not {x},{y} contradict each other: leave one out"
+                )
+        if self.box is None:
+            return
+        check_box(self.box, width, height)
+        left, top, wide, high = self.box
+        for x, y in self.points:
+            if not (left <= x < left + wide and top <= y < top + high):
+                raise InputError(
+                    f"--point {x},{y}: lies outside of --box {left},{top},{wide},{high}: the box "
+                    "holds the whole object"
+                )

@@ -1,0 +1,237 @@
+"""The mask of the thing that a photo shows.
+
+Problem: a photo without mask, alpha channel or plain border shows a thing before something else.
+
+Equation: the network (`networks.mask_network`) looks at the whole photo, then at the surroundings
+of what it found, where the thing is larger. They agree by o, the sum of the smaller over the sum of
+the larger probabilities. The log odds of a right mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o)
+for the log odds l of one thing at both looks and of their agreement; w is fitted
+(`training.masks.mask_calibration`).
+
+Citation: see `networks.mask_network` and `refinement`; a thing reaches the sides of its box: V.
+Lempitsky et al. 2009, doi:10.1109/ICCV.2009.5459262. Where the network's mask does not, the box is
+segmented by colours alone (`photo.grabcut`).
+
+Limits: measured in docs/methods/automatic_mask.md.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+
+from ..imaging.bounding_box import mask_box
+from ..networks.mask_network import Count, MaskNetwork
+from ..photo.found_mask import FoundMask
+from ..photo.grabcut import Box, grabcut
+from ..photo.masks import resized, tidy_mask
+from .frames import Part, PartPrediction, predict_part
+from .hints import Hints
+from .refinement import refined
+
+WORKING = 768  # pixels of the longer side of the photo that is worked on
+_MARGIN = 0.25  # of the thing's longer side, around it at the second look
+_FILLED = 0.6  # of the sides of a box: a smaller mask is not what the box was drawn around
+_NOTHING = 0.5  # probability from which a photo shows no things
+_UNSURE = 1e-3
+_LEAST = 1e-6
+
+
+def find_mask(
+    light: np.ndarray, hints: Hints | None = None, network: MaskNetwork | None = None
+) -> FoundMask:
+    """Find the thing that a photo shows.
+
+    Parameters
+    ----------
+    light : (H, W, 3) float32 ndarray
+        Linear, finite, not negative; 1 is white.
+    hints : Hints, optional
+        Checked against the photo's size.
+    network : MaskNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    FoundMask
+        The mirrored photo's is mirrored.
+    """
+    hints = hints or Hints()
+    small, given = _working(light, hints)
+    whole = predict_part(small, _all_of(small), given, network)
+    found = _at_size(_second_look(small, whole, given, network), light.shape)
+    if hints.box is None or hints.points or _fills(found.mask, hints.box):
+        return found
+    return replace(found, cover=grabcut(light, hints.box).astype(np.float32))
+
+
+def _fills(mask: np.ndarray, box: Box) -> bool:
+    """Whether a mask is about as wide and as high as the box that was drawn around the thing."""
+    if not mask.any():
+        return False
+    width, height = mask_box(mask)[2:]
+    return width >= _FILLED * box[2] and height >= _FILLED * box[3]
+
+
+def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[FoundMask]:
+    """Find each of several separate things that a photo shows.
+
+    Parameters
+    ----------
+    light : (H, W, 3) float32 ndarray
+        As for `find_mask`.
+    network : MaskNetwork, optional
+
+    Returns
+    -------
+    list of FoundMask
+        From left to right; things that do not touch. Empty, if there is none.
+    """
+    small, hints = _working(light, Hints())
+    whole = predict_part(small, _all_of(small), hints, network)
+    if whole.counts[Count.NONE] > _NOTHING:
+        return []
+    found = []
+    for box in _boxes(_second_look(small, whole, hints, network).mask):
+        seen = predict_part(small, _all_of(small), Hints(box=box), network)
+        if (seen.cover > 0.5).any():
+            one = _second_look(small, seen, Hints(box=box), network)
+            found.append(_at_size(one, light.shape))
+    return found
+
+
+def separate_parts(mask: np.ndarray, share: float = 0.1) -> list[np.ndarray]:
+    """Return the parts of a mask that do not touch, but for small ones.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    share : float
+        Of the largest one's pixels that a part has at least.
+
+    Returns
+    -------
+    list of (H, W) bool ndarray
+        From left to right.
+    """
+    labels, _ = ndimage.label(mask, np.ones((3, 3)))
+    areas = np.bincount(labels.ravel())
+    areas[0] = 0
+    chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))
+    parts = [labels == number for number in chosen]
+    return sorted(parts, key=lambda part: mask_box(part)[:2])
+
+
+def _boxes(mask: np.ndarray) -> list[Box]:
+    return [mask_box(part) for part in separate_parts(mask)] if mask.any() else []
+
+
+def _working(light: np.ndarray, hints: Hints) -> tuple[np.ndarray, Hints]:
+    """The photo and the hints at the size that is worked on."""
+    height, width = light.shape[:2]
+    factor = min(1.0, WORKING / max(height, width))
+    size = max(round(width * factor), 1), max(round(height * factor), 1)
+    across, down = size[0] / width, size[1] / height
+
+    def moved(points: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+        return tuple((int((x + 0.5) * across), int((y + 0.5) * down)) for x, y in points)
+
+    box = None
+    if hints.box is not None:
+        left, top, wide, high = hints.box
+        first = int(left * across), int(top * down)
+        last = int(np.ceil((left + wide) * across)), int(np.ceil((top + high) * down))
+        box = (*first, last[0] - first[0], last[1] - first[1])
+    return resized(light, *size), Hints(moved(hints.points), moved(hints.others), box)
+
+
+def _all_of(light: np.ndarray) -> Part:
+    return Part(0, 0, light.shape[1], light.shape[0])
+
+
+def _at_size(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
+    cover = resized(found.cover, shape[1], shape[0])
+    return replace(found, cover=np.clip(cover, 0, 1))
+
+
+def _second_look(
+    light: np.ndarray, first: PartPrediction, hints: Hints, network: MaskNetwork | None
+) -> FoundMask:
+    """Look closer at what the first look found, and refine its outline."""
+    inside = _meant(first.cover, hints)
+    if not inside.any():
+        nothing = evidence_of(float(first.counts[Count.ONE]), 0, 0)
+        return FoundMask(np.zeros_like(first.cover), 0.0, first.counts, nothing)
+    part = _around(mask_box(inside), light.shape)
+    second = predict_part(light, part, hints, network)
+    before = first.cover[part.slices]
+    agreement = float(np.minimum(before, second.cover).sum(dtype=float)) / max(
+        float(np.maximum(before, second.cover).sum(dtype=float)), _LEAST
+    )
+    known = _known(hints, part, second.cover.shape)
+    cover = np.zeros_like(first.cover)
+    cover[part.slices] = refined(light[part.slices], second.cover, known)
+    if hints.box is not None:
+        outside = np.ones(cover.shape, bool)
+        left, top, wide, high = hints.box
+        outside[top : top + high, left : left + wide] = False
+        cover[outside] = 0
+    looks = float(first.counts[Count.ONE]), float(second.counts[Count.ONE])
+    evidence = evidence_of(*looks, agreement)
+    weights = (network or MaskNetwork.shipped()).sureness
+    sureness = 1 / (1 + math.exp(-float((weights * evidence).sum())))
+    return FoundMask(cover, sureness, first.counts, evidence)
+
+
+def evidence_of(first: float, second: float, agreement: float) -> np.ndarray:
+    """Return what sureness is computed from.
+
+    Parameters
+    ----------
+    first, second : float
+        Probability of one thing at the first and at the second look.
+    agreement : float
+        Of both masks, 0 to 1.
+
+    Returns
+    -------
+    (4,) ndarray
+        1, and log odds of the three.
+    """
+    shares = np.clip([first, second, agreement], _UNSURE, 1 - _UNSURE)
+    return np.concatenate([[1.0], np.log(shares / (1 - shares))])
+
+
+def _meant(cover: np.ndarray, hints: Hints) -> np.ndarray:
+    """The pixels of what is meant: the parts that hold points, or the largest ones."""
+    mask = cover > 0.5
+    if not mask.any():
+        return mask
+    parts = separate_parts(tidy_mask(mask))
+    pointed = [part for part in parts if any(part[y, x] for x, y in hints.points)]
+    return np.asarray(np.any(pointed or parts, axis=0))
+
+
+def _around(box: Box, shape: tuple[int, ...]) -> Part:
+    """A box with a margin, inside of the photo."""
+    x, y, width, height = box
+    margin = int(np.ceil(_MARGIN * max(width, height)))
+    left, top = max(x - margin, 0), max(y - margin, 0)
+    right, bottom = min(x + width + margin, shape[1]), min(y + height + margin, shape[0])
+    return Part(left, top, right - left, bottom - top)
+
+
+def _known(hints: Hints, part: Part, shape: tuple[int, ...]) -> np.ndarray:
+    """What the user says of the pixels of a part; see `refined`."""
+    known = np.zeros(shape, np.int8)
+    radius = max(max(shape) // 100, 1)
+    for value, points in ((1, hints.points), (-1, hints.others)):
+        for x, y in points:
+            row, column = y - part.top, x - part.left
+            if 0 <= row < shape[0] and 0 <= column < shape[1]:
+                known[
+                    max(row - radius, 0) : row + radius + 1,
+                    max(column - radius, 0) : column + radius + 1,
+                ] = value
+    return known

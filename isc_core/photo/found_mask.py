@@ -1,0 +1,64 @@
+"""A mask that was found by the looks of a photo, and what finds it."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+FOUND = ("automatic", "hints", "each")  # what `PhotoSource.mask_from` calls them
+
+
+@dataclass(frozen=True)
+class FoundMask:
+    """A mask that was found.
+
+    Attributes
+    ----------
+    cover : (H, W) float32 ndarray
+        Share of each pixel that the thing covers.
+    sureness : float
+        Probability that this is the one thing meant, 0 to 1; not calibrated with hints.
+    counts : (3,) ndarray
+        Probabilities that the photo shows none, one and several things.
+    evidence : (4,) ndarray
+        What the sureness was computed from, see `masking.search.evidence_of`.
+    """
+
+    cover: np.ndarray
+    sureness: float
+    counts: np.ndarray
+    evidence: np.ndarray
+
+    @property
+    def mask(self) -> np.ndarray:
+        """The pixels (H, W) that the thing covers by half or more."""
+        return self.cover >= 0.5
+
+
+class MaskFinder(Protocol):
+    """What finds the mask of a photo by its looks."""
+
+    @property
+    def always(self) -> bool:
+        """Whether to look even where the photo has an alpha channel or a black border."""
+
+    def __call__(self, name: str, light: np.ndarray) -> FoundMask | None:
+        """Find the mask of a photo.
+
+        Parameters
+        ----------
+        name : str
+            Opens the error message.
+        light : (H, W, 3) float32 ndarray
+            Linear, 1 is white.
+
+        Returns
+        -------
+        FoundMask or None
+            None: it is not sure; the whole frame may be used.
+
+        Raises
+        ------
+        InputError
+            If it is not sure.
+        """

@@ -1,0 +1,127 @@
+"""`isc mask` and the masks that other commands find: files, lines, refusals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from isc_core.cli.main import main
+from isc_core.imaging.srgb import linear_to_srgb
+from tests.core.command_line import write_image
+from tests.core.masking.test_search import ONE, TWO, balls, overlap
+
+
+def photo(folder: Path, places: tuple[tuple[float, float, float], ...]) -> tuple[Path, np.ndarray]:
+    """A file of balls before a wall, and the mask of all of them."""
+    light, masks = balls(places)
+    codes = np.rint(255 * linear_to_srgb(light)).astype(np.uint8)
+    truth = np.any(masks, axis=0) if masks else np.zeros(light.shape[:2], bool)
+    return write_image(folder / "photo.png", codes), truth
+
+
+def mask_in(path: Path) -> np.ndarray:
+    return np.asarray(Image.open(path)) > 127
+
+
+def isc(*words: object) -> int:
+    return main([str(word) for word in words])
+
+
+def test_a_mask_is_found_and_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, truth = photo(tmp_path, ONE)
+    assert isc("mask", path, "--auto", "-o", tmp_path / "mask.png") == 0
+    assert overlap(mask_in(tmp_path / "mask.png"), truth) > 0.95
+    assert "% sure; check it" in capsys.readouterr().out
+    codes = np.unique(np.asarray(Image.open(tmp_path / "mask.png")))
+    assert len(codes) > 2, "the rim is soft"
+
+
+def test_each_thing_gets_a_mask(tmp_path: Path) -> None:
+    path, truth = photo(tmp_path, TWO)
+    assert isc("mask", path, "--each", "-o", tmp_path / "mask.png") == 0
+    assert sorted(one.name for one in tmp_path.glob("mask*")) == ["mask_1.png", "mask_2.png"]
+    found = mask_in(tmp_path / "mask_1.png") | mask_in(tmp_path / "mask_2.png")
+    assert overlap(found, truth) > 0.8
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ((), "nothing says where the object is: --auto finds it"),
+        (("--auto",), "--box"),
+        (("--point", "500,3"), "--point 500,3: lies outside of the photo of 200 x 150 pixels"),
+        (("--point", "50,80", "--not", "50,80"), "contradict each other"),
+        (("--point", "3,3", "--box", "20,20,80,90"), "lies outside of --box"),
+        (("--each", "--point", "50,80"), "leave out --box, --point and --not"),
+        (("--point", "50;80"), "'50;80' is not two integers x,y"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], expected: str
+) -> None:
+    path, _ = photo(tmp_path, ())
+    try:
+        code = isc("mask", path, *words, "-o", tmp_path / "mask.png")
+    except SystemExit as error:  # argparse
+        code = int(error.code or 0)
+    printed = capsys.readouterr().err
+    assert code == 2 and expected in printed
+    assert not (tmp_path / "mask.png").exists()
+
+
+def test_nothing_is_decomposed_without_a_thing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, _ = photo(tmp_path, ())
+    assert isc("decompose", path, "-o", tmp_path / "out") == 2
+    printed = capsys.readouterr().err
+    assert "--box" in printed and "--point" in printed and not (tmp_path / "out").exists()
+
+
+QUICK = ("--model", "sirfs", "--max-size", "24", "--separator", "none")
+
+
+@pytest.mark.slow
+def test_decompose_finds_the_mask_and_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, truth = photo(tmp_path, ONE)
+    assert isc("decompose", path, "-o", tmp_path / "out", *QUICK) == 0
+    assert "found automatically" in capsys.readouterr().out
+    assert overlap(mask_in(tmp_path / "out" / "mask.png"), truth) > 0.95
+    given = json.loads((tmp_path / "out" / "decomposition.json").read_text())["input"]
+    assert given["mask_from"] == "automatic" and 0.5 <= given["mask_sureness"] <= 1
+    again = tmp_path / "again"
+    mask = tmp_path / "out" / "mask.png"
+    assert isc("decompose", path, "--mask", mask, "-o", again, *QUICK) == 0
+    assert not (again / "mask.png").exists()
+    edit = ("edit", tmp_path / "out", "gloss", "--gain", "0.5", "--photo", path)
+    assert isc(*edit, "-o", tmp_path / "edit") == 0, "an edit finds the mask in the result"
+
+
+@pytest.mark.slow
+def test_each_thing_is_decomposed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path, truth = photo(tmp_path, TWO)
+    write_image(tmp_path / "mask.png", np.where(truth, 255, 0).astype(np.uint8))
+    words = ("decompose", path, "--mask", tmp_path / "mask.png", *QUICK)
+    assert isc(*words, "-o", tmp_path / "one") == 0
+    assert "the mask has 2 separate parts" in capsys.readouterr().out
+    assert isc(*words, "--each", "-o", tmp_path / "out") == 0
+    boxes = [
+        json.loads((tmp_path / "out" / name / "decomposition.json").read_text())["input"][
+            "crop_box"
+        ]
+        for name in ("1", "2")
+    ]
+    assert boxes[0][0] < boxes[1][0] and boxes[0][2] < truth.shape[1] / 2
+
+
+@pytest.mark.slow
+def test_separate_finds_the_mask_or_takes_the_whole(tmp_path: Path) -> None:
+    path, truth = photo(tmp_path, ONE)
+    assert isc("separate", path, "--method", "none", "-o", tmp_path / "out") == 0
+    assert overlap(mask_in(tmp_path / "out" / "mask.png"), truth) > 0.95
+    whole = ("separate", path, "--method", "none", "--whole", "-o", tmp_path / "whole")
+    assert isc(*whole) == 0 and not (tmp_path / "whole" / "mask.png").exists()

@@ -1,0 +1,119 @@
+"""Composites show what their masks and hints say."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+import torch
+
+from isc_core.networks.mask_network import SIDE as FRAME
+from isc_core.networks.mask_network import Count, channels_of
+from training.masks.composites import Composites, draw_hints, frames
+from training.masks.ingredients import LENGTH, SIDE, Ingredients, cut_out
+from training.masks.mask_module import MaskNetworkModule, network_channels
+
+
+@pytest.fixture(autouse=True)
+def one_thread() -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+def ingredients() -> Ingredients:
+    """White discs and bars, and black backgrounds."""
+    bodies = np.zeros((2, 4, SIDE, SIDE), np.uint8)
+    y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
+    bodies[0, 3] = 255 * (x**2 + y**2 < (LENGTH / 2) ** 2)
+    bodies[1, 3] = 255 * ((abs(x) < LENGTH / 2) & (abs(y) < LENGTH / 6))
+    bodies[:, :3] = 255 * (bodies[:, 3:] > 0)
+    return Ingredients(bodies, np.zeros((3, 3, 160, 160), np.uint8))
+
+
+def drawn(count: Count, hinted: float = 0, size: int = 12, side: int = FRAME) -> Composites:
+    shares = tuple(float(kind == count) for kind in Count)
+    return Composites(ingredients(), size, side, hinted, shares)
+
+
+@pytest.mark.parametrize("count", list(Count))
+def test_the_mask_covers_what_the_count_says(count: Count) -> None:
+    batch = drawn(count)(np.random.default_rng(0))
+    assert (batch.count == int(count)).all() and not batch.hints.any()
+    covered = batch.mask.flatten(1).sum(1)
+    assert (covered == 0).all() if count == Count.NONE else (covered > 20).all()
+    assert (
+        not (batch.mask * (1 - batch.frame)).any() and not (batch.photo * (1 - batch.frame)).any()
+    )
+
+
+def test_bodies_are_brighter_than_a_black_background() -> None:
+    torch.manual_seed(0)
+    batch = drawn(Count.ONE)(np.random.default_rng(1))
+    grey = batch.photo.mean(1, keepdim=True)
+    for photo, mask, frame in zip(grey, batch.mask, batch.frame, strict=True):
+        away = (mask == 0) & (frame > 0)
+        assert photo[mask > 0.9].median() > 3 * photo[away].median() + 1e-3
+
+
+def test_hints_lie_where_they_say() -> None:
+    truth = np.zeros((FRAME, FRAME), bool)
+    truth[20:60, 30:80] = True
+    inside = np.ones_like(truth)
+    rng = np.random.default_rng(0)
+    given = [draw_hints(truth, inside, rng) for _ in range(40)]
+    for points, others, box in given:
+        # discs reach over the outline by their radius
+        assert not points[:15].any() and not others[25:55, 35:75].any()
+        if box.any():
+            assert (box[truth] > 0).mean() > 0.8 and (box > 0).sum() < 2 * truth.sum()
+    assert all(any(one[k].any() for one in given) for k in range(3))
+
+
+def test_hinted_photos_have_one_thing_or_none() -> None:
+    batch = drawn(Count.SEVERAL, hinted=1.0)(np.random.default_rng(3))
+    assert set(batch.count.tolist()) <= {Count.NONE, Count.ONE}
+    covered = batch.mask.flatten(1).sum(1) > 0
+    assert torch.equal(covered, batch.count == Count.ONE)
+
+
+def test_a_cut_out_body_has_its_length_and_its_colours() -> None:
+    light, cover = torch.full((1, 3, 160, 160), 0.5), torch.zeros(1, 1, 160, 160)
+    cover[:, :, 40:80, 20:120] = 1
+    (body,) = cut_out(light, cover)
+    rows, columns = np.nonzero(body[3] > 127)
+    assert np.ptp(columns) + 1 == pytest.approx(LENGTH, abs=1)
+    assert np.ptp(rows) + 1 == pytest.approx(0.4 * LENGTH, abs=1)
+    assert body[:3, body[3] > 250].min() > 250, "the brightest is white"
+
+
+def test_the_channels_are_those_of_the_core() -> None:
+    batch = drawn(Count.ONE, hinted=0.7, size=4)(np.random.default_rng(5))
+    found = network_channels(batch).permute(0, 2, 3, 1).numpy()
+    for k in range(4):
+        parts = (batch.photo[k], batch.frame[k], batch.hints[k])
+        light, frame, hints = (part.permute(1, 2, 0).numpy() for part in parts)
+        wanted = channels_of(light, frame[..., 0] > 0, hints)
+        np.testing.assert_allclose(found[k], wanted, atol=2e-5)
+
+
+def test_frames_are_centred() -> None:
+    frame = frames(np.array([[1.0, 0.75]]), 32)[0, 0]
+    assert frame.sum() == 32 * 24 and torch.equal(frame, frame.flip(0))
+
+
+def test_the_network_learns_bright_bodies() -> None:
+    torch.manual_seed(0)
+    network = MaskNetworkModule((8, 12, 12, 8), (8, 8, 8))
+    compose, rng = drawn(Count.ONE, size=8, side=32), np.random.default_rng(0)
+    optimizer, losses = torch.optim.Adam(network.parameters(), 3e-3), []
+    for _ in range(30):
+        loss, _ = network.loss(compose(rng))
+        optimizer.zero_grad()
+        loss.backward()
+        optimizer.step()
+        losses.append(float(loss.detach()))
+    assert np.mean(losses[-5:]) < 0.8 * np.mean(losses[:5])

@@ -1,0 +1,1 @@
+"""Pictures that the mask network learns from: lit bodies pasted before backgrounds."""

@@ -1,0 +1,120 @@
+"""Composites of what no network has learned from, larger than the network sees them.
+
+Bodies and panoramas are those that every fit leaves out. They are halved: part A chooses
+thresholds, part B judges. Masked photos of real things may stand in place of the bodies.
+
+Limits: bodies are traced at 160 pixels and panoramas have 512 columns: both are soft.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from isc_core.networks.mask_network import Count
+from isc_core.photo import read_photo
+
+from ..networks.scene_batches import read_world
+from ..world.files import Split
+from .backgrounds import background, read_crops
+from .composites import Composites
+from .ingredients import Ingredients, cut_out, lit_bodies
+
+SIDE = 320  # pixels of a composite's longer side
+_PICTURE = 256  # of a body
+_BACKGROUNDS = 150
+_BATCH = 8
+PARTS = ("A", "B")
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """A composite with its truth.
+
+    Attributes
+    ----------
+    light : (H, W, 3) float32 ndarray
+        Linear, 1 is white.
+    cover : (H, W) float32 ndarray
+        Of the thing that is meant; of all, if there are several.
+    count : Count
+    """
+
+    light: np.ndarray
+    cover: np.ndarray
+    count: Count
+
+
+def held_out_ingredients(
+    world: Path, panoramas: Path, part: str, photos: Path | None = None, seed: int = 0
+) -> Ingredients:
+    """Light held-out bodies and draw backgrounds of held-out panoramas.
+
+    Parameters
+    ----------
+    world, panoramas : Path
+    part : {"A", "B"}
+    photos : Path, optional
+        Folder of masked photos to use in place of the bodies.
+    seed : int
+
+    Returns
+    -------
+    Ingredients
+
+    Raises
+    ------
+    InputError
+        If a folder cannot be used.
+    """
+    half, rng = PARTS.index(part), np.random.default_rng([seed, 11, PARTS.index(part)])
+    torch.manual_seed(seed)
+    found = read_world([world], panoramas, (Split.BODY,), seed)
+    kept = [one.radiance for one in read_crops(panoramas, seed) if one.judged][half::2]
+    grounds = [background(kept, found.atlas, rng, SIDE) for _ in range(_BACKGROUNDS)]
+    if photos is not None:
+        pictures = [_picture(path) for path in sorted(photos.glob("*.png"))]
+    else:
+        found.views[Split.BODY][:] = found.views[Split.BODY][half::2]
+        pictures = list(lit_bodies(found, Split.BODY, found.judged, 1, rng, _PICTURE))
+    return Ingredients(np.stack(pictures), np.stack(grounds))
+
+
+def _picture(path: Path) -> np.ndarray:
+    photo = read_photo(path)
+    light = torch.from_numpy(photo.image).permute(2, 0, 1)[None]
+    return next(cut_out(light, torch.from_numpy(photo.mask)[None, None].float(), _PICTURE))
+
+
+def held_out_composites(
+    ingredients: Ingredients, count: Count, number: int, seed: int
+) -> Iterator[HeldOut]:
+    """Compose photos.
+
+    Parameters
+    ----------
+    ingredients : Ingredients
+    count : Count
+        How many things each shows.
+    number : int
+        Of photos.
+    seed : int
+
+    Yields
+    ------
+    HeldOut
+    """
+    shares = tuple(float(kind == count) for kind in Count)
+    compose = Composites(ingredients, _BATCH, SIDE, hinted=0, shares=shares)
+    rng, made = np.random.default_rng([seed, int(count)]), 0
+    torch.manual_seed(seed)
+    while made < number:
+        batch = compose(rng)
+        for k in range(min(_BATCH, number - made)):
+            frame = batch.frame[k, 0].numpy() > 0
+            place = np.ix_(frame.any(1), frame.any(0))
+            light = batch.photo[k].permute(1, 2, 0).numpy()[place]
+            yield HeldOut(light, batch.mask[k, 0].numpy()[place], count)
+            made += 1

@@ -1,0 +1,117 @@
+"""Fit how sure a mask network may be, on composites that it has not seen.
+
+  python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
+
+Equation: logistic regression of "the photo shows one thing, and the mask overlaps it by .5 or
+more" on `isc_core.masking.search.evidence_of`, with a small ridge. Photos are those of part A of
+`training.masks.held_out`; part B judges. A table of thresholds follows.
+
+Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
+regularized likelihood methods", 1999.
+
+Limits: as many photos of one thing as of none and several together.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.errors import InputError
+from isc_core.io.atomic import new_file
+from isc_core.io.npy import read_arrays
+from isc_core.masking.search import find_mask
+from isc_core.networks.mask_network import Count, MaskNetwork
+
+from .held_out import HeldOut, held_out_composites, held_out_ingredients
+
+_RIDGE, _STEPS = 0.1, 50
+_RIGHT = 0.5  # overlap of a mask that counts as right
+_THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+
+
+def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Fit a logistic regression by Newton's method.
+
+    Parameters
+    ----------
+    features : (N, K) ndarray
+    right : (N,) bool ndarray
+
+    Returns
+    -------
+    (K,) ndarray
+    """
+    weights = np.zeros(features.shape[1])
+    for _ in range(_STEPS):
+        share = 1 / (1 + np.exp(-features @ weights))
+        gradient = features.T @ (share - right) + _RIDGE * weights
+        curvature = (features.T * (share * (1 - share))) @ features
+        weights = weights - np.linalg.solve(curvature + _RIDGE * np.eye(len(weights)), gradient)
+    return weights
+
+
+def observed(photos: list[HeldOut], network: MaskNetwork) -> tuple[np.ndarray, np.ndarray]:
+    """Return the evidence of each photo, and whether its mask is right.
+
+    Parameters
+    ----------
+    photos : list of HeldOut
+    network : MaskNetwork
+
+    Returns
+    -------
+    evidence : (N, 4) ndarray
+    right : (N,) bool ndarray
+    """
+    rows, right = [], []
+    for photo in photos:
+        found = find_mask(photo.light, network=network)
+        truth = photo.cover >= 0.5
+        overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
+        rows.append(found.evidence)
+        right.append(photo.count == Count.ONE and overlap >= _RIGHT)
+    return np.array(rows), np.array(right)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("world", type=Path, metavar="WORLD", help="folder of isc world build")
+    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    add("--weights", type=Path, required=True, metavar="NPZ", help="what was fitted")
+    add("--count", type=int, default=160, help="photos (default: %(default)s)")
+    add("--seed", type=int, default=0, help="of the photos (default: %(default)s)")
+    add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
+    given = parser.parse_args()
+    try:
+        arrays = read_arrays(given.weights)
+        ingredients = held_out_ingredients(given.world, given.panoramas, "A", seed=given.seed)
+        network = MaskNetwork.read(given.weights)
+    except InputError as error:
+        parser.error(str(error))
+    numbers = ((Count.ONE, 2), (Count.NONE, 4), (Count.SEVERAL, 4))
+    photos = [
+        photo
+        for kind, part in numbers
+        for photo in held_out_composites(ingredients, kind, given.count // part, given.seed + 1)
+    ]
+    evidence, right = observed(photos, network)
+    weights = logistic_weights(evidence, right)
+    print("weights", np.round(weights, 3), "right", right.mean())
+    sure, one = 1 / (1 + np.exp(-evidence @ weights)), np.array([p.count for p in photos]) == 1
+    for limit in _THRESHOLDS:
+        refused = (sure < limit)[one].mean(), (sure < limit)[right].mean()
+        print(
+            f"{limit:.2f}: refuses {refused[0]:.1%} of single things, {refused[1]:.1%} of right "
+            f"masks; accepts {(sure >= limit)[~one].mean():.1%} without a single thing"
+        )
+    with new_file(given.output) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **{**arrays, "sureness": weights.astype(np.float32)})
+
+
+if __name__ == "__main__":
+    main()

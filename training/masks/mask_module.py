@@ -1,0 +1,233 @@
+"""The trainable mask network and its loss; the counterpart of `isc_core.networks.mask_network`.
+
+Equation: with the log odds o of a pixel, p = 1 / (1 + exp(-o)) and the true cover a,
+
+    mean of -a log p - (1 - a) log(1 - p), counted more near the outline
+    + 1 - sum (2 a p) / sum (a + p)                                   (where there is a thing)
+    + .3 (cross entropy of the number of things)
+
+Citation: overlap as a loss: F. Milletari, N. Navab, S.-A. Ahmadi, "V-Net", 3DV 2016,
+doi:10.1109/3DV.2016.79.
+
+Limits: none of its own.
+"""
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from isc_core.networks.layers import DARK
+from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, Count
+
+from ..networks.blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
+from .composites import Composite
+
+DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
+HIDDEN = 64
+_SHARED = 6  # channels of the scene network's first layer: log light, mask, place
+_OUTLINE = 3.0  # weight of pixels near the outline
+_COUNT, _OVERLAP = 0.3, 1.0
+
+
+class MaskNetworkModule(nn.Module):  # type: ignore[misc]
+    """The trainable mask network.
+
+    Parameters
+    ----------
+    down, up : tuple of int
+        Channels of the levels down, the finest first, and up, the coarsest first.
+    """
+
+    def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
+        super().__init__()
+        fine = (BLOCK**2 * INPUTS, *down[:-1])
+        self.down = nn.ModuleList(
+            [Block(inputs, outputs) for inputs, outputs in zip(fine, down, strict=True)]
+        )
+        below = (down[-1], *up[:-1])
+        self.up = nn.ModuleList(
+            [
+                Block(skip + inputs, outputs)
+                for skip, inputs, outputs in zip(down[-2::-1], below, up, strict=True)
+            ]
+        )
+        self.out = nn.Conv2d(up[-1], BLOCK**2, 3, padding=1)
+        self.hidden = nn.Linear(2 * sum(down[-COARSE:]), HIDDEN)
+        self.count = nn.Linear(HIDDEN, len(Count))
+        nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
+        for module in (self.out, self.count):
+            nn.init.zeros_(module.bias)
+            module.weight.data *= 0.1
+        self.to(memory_format=torch.channels_last)
+
+    def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Predict the mask and the number of things.
+
+        Parameters
+        ----------
+        inputs : (B, INPUTS, side, side) tensor
+            See `network_channels`.
+
+        Returns
+        -------
+        odds : (B, 1, side, side) tensor
+        counts : (B, 3) tensor
+            As `MaskNetwork` returns them.
+        """
+        layer = functional.pixel_unshuffle(inputs, BLOCK).contiguous(
+            memory_format=torch.channels_last
+        )
+        skips, features = [], []
+        device = inputs.device.type
+        with torch.autocast(device, torch.bfloat16, enabled=self.training):
+            for level, block in enumerate(self.down):
+                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
+                skips.append(layer)
+                if level >= len(self.down) - COARSE:
+                    features += [layer.float().mean((2, 3)), layer.float().amax((2, 3))]
+            for block, skip in zip(self.up, skips[-2::-1], strict=True):
+                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
+                layer = block(torch.cat([skip, finer], 1))
+            odds = functional.pixel_shuffle(self.out(layer), BLOCK).float()
+        return odds, self.count(functional.relu(self.hidden(torch.cat(features, 1))))
+
+    def matrices(self) -> list[nn.Parameter]:
+        """Return the weights of the blocks."""
+        return [convolution.matrix for convolution, _ in self._pairs]
+
+    def loss(self, batch: Composite) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Return the loss of a batch and its terms.
+
+        Parameters
+        ----------
+        batch : Composite
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            Not weighted; "iou" is the mean of things' overlap, "right" the share of right counts.
+        """
+        odds, counts = self(network_channels(batch))
+        truth, frame = batch.mask, batch.frame
+        outline = functional.max_pool2d(truth, 5, 1, 2) + functional.max_pool2d(-truth, 5, 1, 2)
+        weight = frame * (1 + _OUTLINE * outline)
+        entropy = functional.binary_cross_entropy_with_logits(odds, truth, reduction="none")
+        entropy = ((entropy * weight).sum((1, 2, 3)) / weight.sum((1, 2, 3))).mean()
+        cover = torch.sigmoid(odds) * frame
+        thing = (truth.sum((1, 2, 3)) > 0).float()
+        both = (2 * cover * truth).sum((1, 2, 3))
+        overlap = both / (cover + truth).sum((1, 2, 3)).clamp(min=1)
+        count = functional.cross_entropy(counts, batch.count)
+        total = entropy + _OVERLAP * ((1 - overlap) * thing).mean() + _COUNT * count
+        with torch.no_grad():
+            found, true = (cover > 0.5).float(), (truth > 0.5).float()
+            iou = (found * true).sum((1, 2, 3)) / (found + true).clamp(max=1).sum((1, 2, 3)).clamp(
+                min=1
+            )
+            right = (counts.argmax(1) == batch.count).float().mean()
+        terms = {
+            "entropy": entropy,
+            "iou": (iou * thing).sum() / thing.sum().clamp(min=1),
+            "count": count,
+            "right": right,
+        }
+        return total, terms
+
+    @property
+    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
+        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the weights in the layout that the core reads."""
+        pairs = [folded(*pair) for pair in self._pairs]
+        pairs.append((self.out.weight, self.out.bias))
+        found = {
+            "normalisation": as_array(torch.cat([norm_state(norm) for _, norm in self._pairs], 1))
+        }
+        for k, (weight, bias) in enumerate(pairs):
+            blocks = as_array(weight).transpose(2, 3, 1, 0)
+            found[f"weight{k:02d}"] = blocks.reshape(9, *blocks.shape[2:]).astype(np.float16)
+            found[f"bias{k:02d}"] = as_array(bias).astype(np.float16)
+        for name, layer in (("hidden", self.hidden), ("count", self.count)):
+            found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
+            found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
+        found["sureness"] = np.array([0, 1, 0, 0], np.float32)
+        return found
+
+    def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:
+        """Continue from weights in the core's layout.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            As `arrays` returns them.
+        """
+        states = arrays["normalisation"]
+        with torch.no_grad():
+            for k, (convolution, norm) in enumerate(self._pairs):
+                part, states = states[:, : norm.num_features], states[:, norm.num_features :]
+                _restore(convolution, norm, arrays[f"weight{k:02d}"], part)
+            last = len(self._pairs)
+            self.out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
+            self.out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
+            for name, layer in (("hidden", self.hidden), ("count", self.count)):
+                layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
+                layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
+
+    def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take what the scene network knows: the levels down whose channels agree.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            Content of the scene network's archive.
+        """
+        states, place = arrays["normalisation"], 0
+        with torch.no_grad():
+            for k, (convolution, norm) in enumerate(self._pairs[: 2 * len(self.down)]):
+                weight = arrays[f"weight{k:02d}"]
+                outputs = weight.shape[2]
+                own = convolution.weight.shape
+                if k == 0:  # blocks of pixels of a channel follow each other
+                    grown = np.zeros((9, own[1], outputs), weight.dtype)
+                    grown[:, : _SHARED * BLOCK**2] = weight
+                    weight = grown
+                if weight.shape[1:] != (own[1], own[0]):
+                    return
+                _restore(convolution, norm, weight, states[:, place : place + outputs])
+                place += outputs
+
+
+def _restore(
+    convolution: Convolution, norm: nn.BatchNorm2d, weight: np.ndarray, state: np.ndarray
+) -> None:
+    """Take a convolution and its normalisation apart again."""
+    rows = torch.from_numpy(state.astype(np.float32))
+    parts = (norm.weight, norm.bias, norm.running_mean, norm.running_var)
+    for part, values in zip(parts, rows, strict=True):
+        part.copy_(values)
+    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+    convolution.weight.copy_(kernel_of(weight) / gain[:, None, None, None])
+
+
+def network_channels(batch: Composite) -> torch.Tensor:
+    """Return the input channels; equal to `isc_core.networks.mask_network.channels_of`.
+
+    Parameters
+    ----------
+    batch : Composite
+
+    Returns
+    -------
+    (B, INPUTS, H, W) tensor
+    """
+    photo, frame = batch.photo, batch.frame
+    rows, columns = photo.shape[2:]
+    right = (torch.arange(columns, device=photo.device) + 0.5) * (2 / columns) - 1
+    up = 1 - (torch.arange(rows, device=photo.device) + 0.5) * (2 / rows)
+    mean = (photo.mean(1, keepdim=True) * frame).sum((2, 3), keepdim=True)
+    mean = (mean / frame.sum((2, 3), keepdim=True).clamp(min=1)).clamp(min=1e-6)
+    light = torch.log(photo / mean + DARK) * frame
+    return torch.cat([light, frame, right * frame, up[:, None] * frame, batch.hints * frame], 1)

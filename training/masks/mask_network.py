@@ -1,0 +1,73 @@
+"""Fit the network of `isc_core.networks.mask_network`.
+
+  python -m training.masks.mask_network FOLDER [--weights NPZ] [--minutes N] -o MASK.npz
+
+FOLDER holds the ingredients that `python -m training.masks.ingredients` writes. Photos are composed
+while the network learns (`training.masks.composites`), and none is used twice. `--weights` starts
+from an archive that an earlier run wrote, `--resume` continues an interrupted one; without either,
+the levels down start as the shipped scene network's. `--side 64` sees photos smaller, which is half
+of the work. Held-out bodies before held-out panoramas are measured every thousand steps.
+
+Equation: see `training.masks.mask_module`.
+
+Citation: see `training.loop`.
+
+Limits: sureness is calibrated afterwards, by `training.masks.mask_calibration`.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from isc_core.errors import InputError
+from isc_core.io.npy import read_arrays
+from isc_core.networks import scene_network
+from isc_core.networks.mask_network import SIDE
+
+from ..loop import Schedule, add_run_arguments, fit, run_options
+from .composites import Composites
+from .ingredients import Ingredients
+from .mask_module import MaskNetworkModule
+
+_SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
+SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("folder", type=Path, metavar="FOLDER", help="ingredients of composites")
+    add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
+    add("--side", type=int, default=SIDE, metavar="PX", help="of photos (default: %(default)s)")
+    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
+    add("--hinted", type=float, default=0.5, help="share with hints (default: %(default)s)")
+    add_run_arguments(parser, steps=20_000, batch=32)
+    arguments = parser.parse_args()
+    options = run_options(arguments)
+    torch.manual_seed(options.seed)
+    try:
+        learned, judged = (Ingredients.read(arguments.folder, k) for k in ("learned", "judged"))
+        weights = None if arguments.weights is None else read_arrays(arguments.weights)
+    except InputError as error:
+        parser.error(str(error))
+    network = MaskNetworkModule()
+    if weights is None:
+        network.start_from_scene(read_arrays(_SCENE))
+    else:
+        network.load_arrays(weights)
+    fit(
+        network,
+        Composites(learned, options.batch, arguments.side, arguments.hinted),
+        replace(SCHEDULE, rate=arguments.rate),
+        options,
+        Composites(judged, options.batch, arguments.side),
+    )
+
+
+if __name__ == "__main__":
+    main()

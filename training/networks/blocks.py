@@ -1,0 +1,143 @@
+"""Parts that the trainable networks share, and the way of their weights to the core's layout.
+
+Citation: S. Ioffe, C. Szegedy, "Batch normalization", 2015, arXiv:1502.03167; initial weights: K.
+He et al. 2015, doi:10.1109/ICCV.2015.123.
+"""
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+
+class Convolution(nn.Module):  # type: ignore[misc]
+    """A 3 x 3 convolution without bias, whose weights are one matrix.
+
+    An optimizer of matrices takes the weights as they are; as a kernel they are a view of the
+    matrix, channels last.
+
+    Parameters
+    ----------
+    inputs, outputs : int
+        Channels.
+    """
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.matrix = nn.Parameter(torch.empty(outputs, 9 * inputs))
+        nn.init.kaiming_normal_(self.matrix, nonlinearity="relu")
+
+    @property
+    def weight(self) -> torch.Tensor:
+        """The kernel (outputs, inputs, 3, 3), a view."""
+        return self.matrix.view(len(self.matrix), 3, 3, -1).permute(0, 3, 1, 2)
+
+    def forward(self, layer: torch.Tensor) -> torch.Tensor:
+        """Convolve.
+
+        Parameters
+        ----------
+        layer : (B, inputs, H, W) tensor
+
+        Returns
+        -------
+        (B, outputs, H, W) tensor
+        """
+        return functional.conv2d(layer, self.weight, padding=1)
+
+
+class Block(nn.Module):  # type: ignore[misc]
+    """Two 3 x 3 convolutions, each followed by batch normalisation and max(0, .).
+
+    Parameters
+    ----------
+    inputs, outputs : int
+        Channels.
+    """
+
+    def __init__(self, inputs: int, outputs: int) -> None:
+        super().__init__()
+        self.c1 = Convolution(inputs, outputs)
+        self.n1 = nn.BatchNorm2d(outputs)
+        self.c2 = Convolution(outputs, outputs)
+        self.n2 = nn.BatchNorm2d(outputs)
+
+    def forward(self, layer: torch.Tensor) -> torch.Tensor:
+        """Apply both convolutions.
+
+        Parameters
+        ----------
+        layer : (B, inputs, H, W) tensor
+
+        Returns
+        -------
+        (B, outputs, H, W) tensor
+        """
+        layer = functional.relu(self.n1(self.c1(layer)))
+        return functional.relu(self.n2(self.c2(layer)))
+
+    @property
+    def pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
+        """The convolutions with their normalisations."""
+        return [(self.c1, self.n1), (self.c2, self.n2)]
+
+
+def folded(one: nn.Conv2d, norm: nn.BatchNorm2d) -> tuple[torch.Tensor, torch.Tensor]:
+    """Return the weight and bias of a convolution that does what it and its normalisation do.
+
+    Parameters
+    ----------
+    one : nn.Module
+        With a `weight`.
+    norm : nn.BatchNorm2d
+
+    Returns
+    -------
+    weight, bias : tensor
+    """
+    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+    return one.weight * gain[:, None, None, None], norm.bias - gain * norm.running_mean
+
+
+def norm_state(norm: nn.BatchNorm2d) -> torch.Tensor:
+    """Return the four rows of numbers of a normalisation.
+
+    Parameters
+    ----------
+    norm : nn.BatchNorm2d
+
+    Returns
+    -------
+    (4, channels) tensor
+        Gain, offset, running mean and variance.
+    """
+    return torch.stack([norm.weight, norm.bias, norm.running_mean, norm.running_var]).detach()
+
+
+def kernel_of(weight: np.ndarray) -> torch.Tensor:
+    """Return weights of the core's layout as a kernel.
+
+    Parameters
+    ----------
+    weight : (9, inputs, outputs) ndarray
+
+    Returns
+    -------
+    (outputs, inputs, 3, 3) tensor
+    """
+    blocks = weight.astype(np.float32).reshape(3, 3, *weight.shape[1:])
+    return torch.from_numpy(blocks.transpose(3, 2, 0, 1).copy())
+
+
+def as_array(values: torch.Tensor) -> np.ndarray:
+    """Return a tensor as an array.
+
+    Parameters
+    ----------
+    values : tensor
+
+    Returns
+    -------
+    ndarray
+    """
+    return np.asarray(values.detach().cpu().numpy())
