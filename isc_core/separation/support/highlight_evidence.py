@@ -19,7 +19,8 @@ The odds to be exceeded are the least of 1, 1.5, 2, 2.5 and 3 with which, on bod
 fitted nor reported on, no matt one loses 1 % of its light and no glossy one gets worse.
 
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. The weights
-are `benchmarks.separation.print_rule`'s on rendered bodies that measure nothing else.
+are those of `benchmarks.separation.print_rule`, within 3 %, on rendered bodies that measure nothing
+else.
 
 Limits: a region that holds both, a highlight and print, is kept or given back as a whole. Faint and
 broad highlights, of which the network is not sure, are given back: most in photos of everyday
