@@ -433,7 +433,8 @@ class TestFit:
             balls, environments, FitOptions(FAST.components, 5, light=light, absolute=FAST.absolute)
         )
         plain = lights.fit_light(lights.mirrored(environments.transpose(2, 0, 1)))
-        assert np.allclose(fitted.lights.natural.covariance, 4 * plain.covariance)
+        natural = fitted.lights.natural
+        assert natural is not None and np.allclose(natural.covariance, 4 * plain.covariance)
 
     def test_held_out_likelihood_has_one_value_an_object(
         self, balls: dict[str, ObjectStatistics]
