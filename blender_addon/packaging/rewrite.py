@@ -25,9 +25,12 @@ LIGHT_MODULES = frozenset(
         "isc_core.io.atomic",
         "isc_core.io.json_files",
         "isc_core.io.npy",
+        "isc_core.io.reading_notes",
+        "isc_core.photo.names",
         "isc_core.progress",
         "isc_core.result_files.diagnostics_json",
         "isc_core.result_files.diagnostics_text",
+        "isc_core.result_files.reading_notes_text",
         "isc_core.scene.diagnostics",
     }
 )

@@ -287,6 +287,16 @@ CHARACTERISTICS = (
         "brdf",
     ),
     CharacteristicEntry(
+        "expected error",
+        "",
+        "degrees; natural logarithm",
+        "image",
+        "expected_error",
+        "two of H, W",
+        "status.expected_error",
+    ),
+    CharacteristicEntry("camera", "f", "pixels", "image", "camera", "a focal length", "camera"),
+    CharacteristicEntry(
         "origin",
         "",
         "",
