@@ -253,6 +253,11 @@ class Settings:
         """Whether SIRFS expects nearly white light, the light's known colour being divided out."""
         return self.illumination == Illumination.PHOTO and self.light_colour != LightColour.FREE
 
+    @property
+    def tempers_saturation(self) -> bool:
+        """Whether SIRFS sees saturated colours as less saturated, for the noise in them."""
+        return self.illumination == Illumination.PHOTO
+
     def check(self) -> None:
         """Validate the settings.
 

@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from isc_core.decomposition.light_colour import under_given_light, under_light
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decomposition.pipeline import decompose
+from isc_core.decomposition.shape import tempered
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.photo import Photo, PhotoSource
@@ -176,3 +178,35 @@ def test_a_cast_given_as_the_light_s_colour_changes_nothing_else(model: str) -> 
     )
     np.testing.assert_allclose(tinted.reflectance, plain.reflectance, atol=1e-5)
     np.testing.assert_allclose(tinted.normal, plain.normal, atol=1e-5)
+
+
+def test_tempered_colours_keep_grey_and_brightness_and_bound_the_ratio_of_channels() -> None:
+    image = np.random.default_rng(0).uniform(0, 1, (5, 6, 3)).astype(np.float32)
+    image[0, 0], image[0, 1] = 0.4, (0.5, 0.2, 0)
+    found = tempered(image)
+    assert found.dtype == np.float32
+    np.testing.assert_allclose(found[0, 0], 0.4, rtol=1e-6)
+    np.testing.assert_allclose(found.max(axis=2), image.max(axis=2), rtol=1e-6)
+    assert (found.min(axis=2) >= 0.23 * found.max(axis=2)).all()
+    np.testing.assert_allclose(tempered(2 * image), 2 * found, rtol=1e-6)
+
+
+@pytest.mark.slow
+def test_noise_in_a_dark_channel_is_no_relief(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A saturated ball whose blue is noise: smoother than with every channel as it is."""
+    photo = photo_of(ALBEDOS[:1] * 0 + np.array([0.5, 0.55, 0.02]), np.ones(3), gloss=0, size=64)
+    rng = np.random.default_rng(0)
+    noise = ndimage.gaussian_filter(rng.normal(0, 0.03, photo.mask.shape), 1.5)
+    image = photo.image.copy()
+    image[..., 2] = np.where(photo.mask, np.maximum(image[..., 2] + noise, 0.002), 0)
+    noisy = replace(photo, image=image)
+
+    def roughness() -> float:
+        normal = decompose(noisy, Settings("sirfs")).normal
+        off = normal - ndimage.gaussian_filter(normal, (2, 2, 0))
+        inner = ndimage.binary_erosion(photo.mask, iterations=6)
+        return float(np.square(off[inner]).sum(axis=1).mean() ** 0.5)
+
+    found = roughness()
+    monkeypatch.setattr(Settings, "tempers_saturation", False)
+    assert found < 0.8 * roughness()
