@@ -6,9 +6,9 @@ one, with true highlights across the paint, what it still finds.
 
 Construction: a traced body of `training.world` is painted, lit by a white-balanced panorama and
 lamps, and photographed: exposure, blur, noise, clipping, JPEG of 8-bit sRGB codes. Patterns are
-drawn anew, none is of the atlas that the scene network has learned from. Bodies of one colour, without
-print, are made alike. The three sets share no
-body, and no panorama that the network has learned from lights `Part.CHOICE` or `Part.REPORT`.
+drawn anew, none is of the atlas that the scene network has learned from. Bodies of one colour,
+without print, are made alike. The three sets share no body, and no panorama that the network has
+learned from lights `Part.CHOICE` or `Part.REPORT`.
 
 Limits: trim is a bright grey band without a reflection of its own. A true diffuse image has the
 noise of its photo.
