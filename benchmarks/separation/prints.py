@@ -177,7 +177,9 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         [np.hstack(tiles[k * _PHOTO_COLUMNS :][:_PHOTO_COLUMNS]) for k in range(rows)]
     )
     codes = np.rint(255 * linear_to_srgb(np.clip(sheet, 0, 1))).astype(np.uint8)
-    Image.fromarray(codes).save(path, quality=70)
+    size = (2 * codes.shape[1] // 3, 2 * codes.shape[0] // 3)
+    small = Image.fromarray(codes).resize(size, Image.Resampling.LANCZOS)
+    small.save(path, quality=50, optimize=True)
 
 
 def _padded(light: np.ndarray) -> np.ndarray:
