@@ -1,13 +1,13 @@
 """Fit the weights by which colour and form decide what was a highlight.
 
-  python -m benchmarks.separation.print_rule WORLD --panoramas DIR [--count N]
+  python -m benchmarks.separation.print_rule WORLD --panoramas DIR [--count N] [--mixed]
 
 WORLD is a folder of `isc world build`. Regions of light that colour and network take off bodies of
 `Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
 whose removal raises it. Logistic regression, each region with the root of its squared light over
 that of its photo as weight, gives `highlight_evidence.WEIGHTS`. On the bodies of `Part.CHOICE` the
 least odds are chosen that keep all matt bodies at 1 % and no glossy body above 1; `prints` reports
-on others.
+on others. With --mixed as many bodies without print are added to both parts.
 """
 
 import argparse
@@ -148,13 +148,16 @@ def main() -> None:
     parser.add_argument("world", type=Path, metavar="WORLD", help="folder of isc world build")
     parser.add_argument("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     parser.add_argument("--count", type=int, default=140, help="photos (default: %(default)s)")
+    parser.add_argument("--mixed", action="store_true", help="with bodies without print")
     given = parser.parse_args()
+    world, panoramas = given.world, given.panoramas
     try:
         fit, choice = (
             [
                 regions_of(scene)
+                for painted in ((True, False) if given.mixed else (True,))
                 for glossy in (False, True)
-                for scene in print_scenes(given.world, given.panoramas, part, count, glossy)
+                for scene in print_scenes(world, panoramas, part, count, glossy, painted=painted)
             ]
             for part, count in ((Part.FIT, given.count), (Part.CHOICE, 60))
         )

@@ -6,8 +6,9 @@ one, with true highlights across the paint, what it still finds.
 
 Construction: a traced body of `training.world` is painted, lit by a white-balanced panorama and
 lamps, and photographed: exposure, blur, noise, clipping, JPEG of 8-bit sRGB codes. Patterns are
-drawn anew, none is of the atlas that the scene network has learned from. The three sets share no
-body, and no panorama that the network has learned from lights `Part.CHOICE` or `Part.REPORT`.
+drawn anew, none is of the atlas that the scene network has learned from. Bodies of one colour,
+without print, are made alike. The three sets share no body, and no panorama that the network has
+learned from lights `Part.CHOICE` or `Part.REPORT`.
 
 Limits: trim is a bright grey band without a reflection of its own. A true diffuse image has the
 noise of its photo.
@@ -95,9 +96,15 @@ class PrintScene:
 
 
 def print_scenes(
-    world: Path, panoramas: Path, part: Part, count: int, glossy: bool, seed: int = 0
+    world: Path,
+    panoramas: Path,
+    part: Part,
+    count: int,
+    glossy: bool,
+    seed: int = 0,
+    painted: bool = True,
 ) -> Iterator[PrintScene]:
-    """Render painted bodies, each from one side, the kinds of paint in turn.
+    """Render bodies, each from one side, the kinds of paint in turn.
 
     Parameters
     ----------
@@ -107,8 +114,10 @@ def print_scenes(
     part : Part
     count : int
     glossy : bool
-        With highlights across the paint; otherwise matt.
+        With highlights, across the paint if painted; otherwise matt.
     seed : int
+    painted : bool
+        Otherwise a body has one colour, strong or a mid-grey.
 
     Yields
     ------
@@ -120,7 +129,7 @@ def print_scenes(
         If the world or the panoramas cannot be used.
     """
     torch.manual_seed(seed)
-    rng = np.random.default_rng([seed, glossy, *map(ord, part)])
+    rng = np.random.default_rng([seed, glossy, *map(ord, part)] + [1] * (not painted))
     found = [one for one in read_panoramas(panoramas, 0) if one.judged != (part == Part.FIT)]
     rooms = [_balanced(one.radiance) for one in found]
     if part != Part.FIT:
@@ -129,11 +138,13 @@ def print_scenes(
     for k in rng.permutation(len(bodies)):
         if made == count:
             return
-        kind = PrintKind(made % len(PrintKind))
+        kind = PrintKind(made % len(PrintKind)) if painted else None
         scene = _scene(bodies[int(k)], kind, rooms, glossy, rng)
         if scene is not None:
             made += 1
-            yield replace(scene, name=f"{made:03d} {kind.name.lower()}")
+            yield replace(
+                scene, name=f"{made:03d} {'plain' if kind is None else kind.name.lower()}"
+            )
 
 
 def _balanced(radiance: np.ndarray) -> np.ndarray:
@@ -157,18 +168,19 @@ def _bodies(world: Path, part: Part) -> list[PreparedView]:
 
 def _scene(
     view: PreparedView,
-    kind: PrintKind,
+    kind: PrintKind | None,
     rooms: list[np.ndarray],
     glossy: bool,
     rng: np.random.Generator,
 ) -> PrintScene | None:
-    """A photo of a body, or None if no highlight crosses the paint."""
+    """A photo of a body, without print for None; None if no highlight crosses its print."""
     for _ in range(_TRIES if glossy else 1):
-        maps = np.stack(_MAPS[kind](rng))
+        maps = np.stack([_EMPTY, _EMPTY] if kind is None else _MAPS[kind](rng))
         atlas = Atlas(maps, np.zeros(len(maps), np.uint8), np.zeros(len(maps), bool))
         bank = bank_of([rooms[int(rng.integers(len(rooms)))]], atlas)
         recipe = _painted(draw_recipe(view.directions, atlas, np.zeros(1, int), rng, _SHARES), rng)
-        recipe = _finished(_coloured(recipe, kind, rng), glossy, rng)
+        recipe = _plain(recipe, rng) if kind is None else _coloured(recipe, kind, rng)
+        recipe = _finished(recipe, glossy, rng)
         pictures = make_pictures(batch_of([view]), stacked([recipe]), bank)
         if not glossy or _highlights_cross(pictures, view, recipe, bank):
             return _photographed(pictures, rng)
@@ -206,6 +218,14 @@ def _coloured(recipe: Recipe, kind: PrintKind, rng: np.random.Generator) -> Reci
     return replace(recipe, base=strong[0], colours=np.stack([white, detail, detail]))
 
 
+def _plain(recipe: Recipe, rng: np.random.Generator) -> Recipe:
+    """One colour: two of three bodies strong, the others a mid-grey."""
+    strong = _hue(rng, rng.uniform(0.55, 1), log_uniform(rng, 0.12, 0.8))
+    grey = _hue(rng, rng.uniform(0, 0.1), rng.uniform(0.15, 0.5))
+    base = strong if rng.random() < 2 / 3 else grey
+    return replace(recipe, base=base, strengths=np.zeros(LAYERS))
+
+
 def _hue(rng: np.random.Generator, saturation: float, value: float) -> np.ndarray:
     hue = rng.uniform(0, 6)
     pure = np.clip(2 - np.abs((hue - np.array([0.0, 2.0, 4.0]) + 3) % 6 - 3), 0, 1)
@@ -221,10 +241,13 @@ def _finished(recipe: Recipe, glossy: bool, rng: np.random.Generator) -> Recipe:
 def _highlights_cross(
     pictures: LitPictures, view: PreparedView, recipe: Recipe, bank: Bank
 ) -> bool:
+    """Whether light of a highlight lies on the print, or on a body without."""
     plain = stacked([replace(recipe, strengths=np.zeros(LAYERS))])
     diffuse, gloss = pictures.layers[0, :6].float().split(3)
     unpainted = make_pictures(batch_of([view]), plain, bank).layers[0, :3].float()
     paint = (diffuse - unpainted).abs().amax(0) > 0.05 * unpainted.amax()
+    if not recipe.strengths.any():
+        paint = torch.ones_like(paint)
     cover = pictures.cover[0].float()
     light = functional.avg_pool2d(gloss.mean(0, keepdim=True), _SPOT, 1, _SPOT // 2)
     light = light / functional.avg_pool2d(cover, _SPOT, 1, _SPOT // 2).clamp(min=0.5)

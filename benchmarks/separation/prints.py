@@ -58,7 +58,8 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         whole = Photo(photo, mask, 1 / 255, scene.clipped, source)
         return decompose(whole, Settings(threads=1)).specular
     if method == "joint":
-        split, residual = supported_layers(photo, separate("isc", photo, mask, scene.clipped), mask)
+        colour = separate("isc", photo, mask, scene.clipped)
+        split, residual = supported_layers(photo, colour, mask, clipped=scene.clipped)
         return split.specular if residual is None else photo - residual.diffuse
     return separate(method, photo, mask, scene.clipped).specular
 
@@ -164,7 +165,7 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         photo = whole.resized_to_object(_SHEET_SIDE)
         image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
         colour = separate("isc", image, mask, photo.clipped)
-        split, residual = supported_layers(image, colour, mask)
+        split, residual = supported_layers(image, colour, mask, clipped=photo.clipped)
         kept = split.specular if residual is None else image - residual.diffuse
         unit = max(float(np.quantile(image[mask], 0.995)), 1e-6)
         box = mask_slices(mask)
@@ -176,7 +177,9 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         [np.hstack(tiles[k * _PHOTO_COLUMNS :][:_PHOTO_COLUMNS]) for k in range(rows)]
     )
     codes = np.rint(255 * linear_to_srgb(np.clip(sheet, 0, 1))).astype(np.uint8)
-    Image.fromarray(codes).save(path, quality=70)
+    size = (2 * codes.shape[1] // 3, 2 * codes.shape[0] // 3)
+    small = Image.fromarray(codes).resize(size, Image.Resampling.LANCZOS)
+    small.save(path, quality=50, optimize=True)
 
 
 def _padded(light: np.ndarray) -> np.ndarray:

@@ -10,7 +10,8 @@ form shows of highlights (`separation.network`): t is the part of log(I / D) tha
 is sure of, and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being nearly white
 (`separation.support.light_tint`). Colour and form decide together, region by region, what of that
 was a highlight and what was print (`separation.support.highlight_evidence`); the rest is given
-back. SIRFS on D_1 gives shape and light. They give a better separation: where the network removed
+back. Under clipped highlights the paint around is continued (`separation.support.clipped_texture`).
+SIRFS on D_1 gives shape and light. They give a better separation: where the network removed
 much of what colour had left (`ResidualHighlights.unreliable`), too little of the albedo is visible;
 it is continued from the surroundings, in the shading at that place,
 
@@ -44,6 +45,7 @@ from ..networks.scene_network import ScenePrediction, predict_scene
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
+from ..separation.support.clipped_texture import continue_under_clipped
 from ..separation.support.highlight_evidence import ODDS, supported
 from ..separation.support.light_tint import limit_tint
 from .layers import separated_first, shaded
@@ -148,7 +150,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     split, layers = separated_first(task)
     with task.clock.stage("separation"):
         layers, residual = supported_layers(
-            working.image, layers, working.mask, task.prediction, options
+            working.image, layers, working.mask, task.prediction, options, working.clipped
         )
     weight = confidence_weight(
         without_unreliable(layers.confidence, residual), task.settings.confidence_weights
@@ -189,6 +191,7 @@ def supported_layers(
     mask: np.ndarray,
     seen: ScenePrediction | None = None,
     options: JointOptions | None = None,
+    clipped: np.ndarray | None = None,
 ) -> tuple[Separation, ResidualHighlights | None]:
     """Add what form shows of highlights to what colour shows, and keep what both support.
 
@@ -204,6 +207,8 @@ def supported_layers(
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
+    clipped : (H, W) ndarray of bool, optional
+        Where highlights hide the paint, it is continued from around.
 
     Returns
     -------
@@ -224,10 +229,20 @@ def supported_layers(
         specular=np.where(chosen, split.specular, 0),
         residual=np.where(chosen, split.residual, 0),
     )
-    if residual is None or not kept.any():
-        return split, None
-    diffuse = np.where(chosen, residual.diffuse, inside)
-    return split, ResidualHighlights(diffuse, residual.unreliable & kept)
+    hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
+    diffuse = np.where(chosen, cleaner, inside)
+    if clipped is not None and hidden.any():
+        whole = continue_under_clipped(diffuse, inside, clipped, mask, seen.shading.log_shading)
+        diffuse = np.where(hidden[..., None], whole, diffuse)
+    if residual is not None and kept.any():
+        return split, ResidualHighlights(diffuse, residual.unreliable & kept)
+    return _with_diffuse(split, diffuse) if hidden.any() else split, None
+
+
+def _with_diffuse(split: Separation, diffuse: np.ndarray) -> Separation:
+    """The layers of the same image with another diffuse layer; what it loses is specular."""
+    specular = np.maximum(split.specular + (split.diffuse - diffuse), 0)
+    return replace(split, diffuse=diffuse, specular=specular.astype(split.specular.dtype))
 
 
 def detect_residual_highlights(
@@ -371,7 +386,9 @@ def _split(
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale and (residual is not None or start.specular.any()):
         seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
-        start, of_maps = supported_layers(photo.image, start, photo.mask, seen, options)
+        start, of_maps = supported_layers(
+            photo.image, start, photo.mask, seen, options, photo.clipped
+        )
         residual = None if residual is None else of_maps
         if residual is not None:
             diffuse = residual.diffuse
@@ -382,7 +399,7 @@ def _split(
         return start
     diffuse = diffuse.astype(dtype)
     specular = np.where(
-        photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0
+        photo.mask[..., None], np.maximum(start.specular + (start.diffuse - diffuse), 0), 0
     ).astype(np.float32)
     confidence = without_unreliable(start.confidence, residual)
     return Separation(diffuse, specular, start.residual, confidence)

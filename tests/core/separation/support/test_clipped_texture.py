@@ -1,0 +1,73 @@
+"""What lies under clipped highlights: stripes go on, plain paint stays smooth."""
+
+import numpy as np
+import pytest
+
+from isc_core.inpainting.pull_push import fill
+from isc_core.separation.support.clipped_texture import continue_under_clipped
+
+SIDE = 96
+
+
+def ball(stripes: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Diffuse image and log shading of a red ball, striped by a contrast, and its mask."""
+    line = np.linspace(-1.1, 1.1, SIDE)
+    x, y = np.meshgrid(line, -line)
+    mask = x**2 + y**2 < 1
+    z = np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
+    shading = 0.2 + 0.8 * np.clip(-0.35 * x + 0.45 * y + 0.82 * z, 0, 1)
+    paint = np.array([0.5, 0.2, 0.15]) * np.exp(stripes * np.sign(np.sin(24 * x)))[..., None]
+    diffuse = np.where(mask[..., None], paint * shading[..., None], 0).astype(np.float32)
+    return diffuse, np.repeat(np.log(shading)[..., None], 3, axis=2), mask
+
+
+def lit(diffuse: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The photo with a clipped highlight, the smooth fill under it, and where it clips."""
+    rows, columns = np.mgrid[:SIDE, :SIDE]
+    clipped = (np.hypot(rows - 40, columns - 42) < 9) & mask
+    photo = np.where(clipped[..., None], np.float32(1), diffuse)
+    smooth = np.where(clipped[..., None], fill(diffuse, mask & ~clipped), diffuse)
+    return photo, smooth, clipped
+
+
+def error(found: np.ndarray, diffuse: np.ndarray) -> float:
+    return float(np.square(found - diffuse).sum())
+
+
+def test_stripes_go_on_under_a_clipped_highlight() -> None:
+    diffuse, log_shading, mask = ball(0.4)
+    photo, smooth, clipped = lit(diffuse, mask)
+    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
+
+
+def test_plain_paint_is_not_worse_than_the_smooth_fill() -> None:
+    diffuse, log_shading, mask = ball(0)
+    photo, smooth, clipped = lit(diffuse, mask)
+    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    assert error(found, diffuse) <= error(smooth, diffuse) * (1 + 1e-5)
+
+
+@pytest.mark.parametrize("stripes", [0.0, 0.4])
+def test_only_clipped_pixels_change_and_stay_within_the_image(stripes: float) -> None:
+    diffuse, log_shading, mask = ball(stripes)
+    photo, smooth, clipped = lit(diffuse, mask)
+    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    np.testing.assert_array_equal(found[~clipped], smooth[~clipped])
+    assert (found >= 0).all() and (found <= photo).all()
+
+
+def test_nothing_known_or_nothing_clipped_leaves_the_layer() -> None:
+    diffuse, log_shading, mask = ball(0)
+    for clipped in (mask, np.zeros_like(mask)):
+        found = continue_under_clipped(diffuse, diffuse, clipped, mask, log_shading)
+        np.testing.assert_array_equal(found, diffuse)
+
+
+def test_the_answer_repeats_bit_for_bit() -> None:
+    diffuse, log_shading, mask = ball(0.4)
+    photo, smooth, clipped = lit(diffuse, mask)
+    one, again = (
+        continue_under_clipped(smooth, photo, clipped, mask, log_shading) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one, again)
