@@ -39,7 +39,7 @@ from .task import DecompositionTask
 # photos and .4 to 1 in others.
 _TYPICAL_LEVEL = 0.75
 _BRIGHT = 95.0  # percentile: most highlights are smaller
-_VEIL = 0.3  # chosen on held-out bodies; docs/methods/light_colour.md
+_VEIL = 0.1  # chosen on held-out bodies; docs/methods/light_colour.md
 _LEAST_WEIGHT = 0.05
 
 
