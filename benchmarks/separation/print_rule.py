@@ -5,9 +5,9 @@
 WORLD is a folder of `isc world build`. Regions of light that colour and network take off bodies of
 `Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
 whose removal raises it. Logistic regression, each region with the root of its squared light over
-that of its photo as weight, gives `highlight_evidence.WEIGHTS`. On the bodies of `Part.CHOICE` the
-least odds are chosen that keep all matt bodies at 1 % and no glossy body above 1; `prints` reports
-on others. With --mixed as many bodies without print are added to both parts.
+that of its photo as weight, gives `highlight_evidence.WEIGHTS`. On the bodies of `Part.CHOICE` it prints
+what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, which the shipped
+weights had, as many bodies without print are added to both parts.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from isc_core.separation.support.highlight_evidence import highlight_evidence
 
 from .print_set import Part, PrintScene, print_scenes
 
-ODDS = (1.0, 1.5, 2.0, 2.5, 3.0)
+ODDS = (1.5, 2.0, 2.5, 3.0, 4.0)
 _RIDGE, _STEPS = 0.01, 50
 
 
@@ -36,7 +36,7 @@ class Regions:
 
     Attributes
     ----------
-    values : (K, 3) ndarray
+    values : (K, 4) ndarray
         Of `highlight_evidence.Evidence`.
     light, squares : (K,) ndarray
         Light taken off over that of the photo; the same of squares.
@@ -94,7 +94,7 @@ def fitted(photos: Sequence[Regions]) -> np.ndarray:
 
     Returns
     -------
-    (4,) ndarray
+    (5,) ndarray
         The constant first.
     """
     values = np.vstack([one.values for one in photos])
@@ -103,8 +103,8 @@ def fitted(photos: Sequence[Regions]) -> np.ndarray:
     share /= share.mean()
     mean, deviation = values.mean(axis=0), values.std(axis=0)
     rows = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
-    penalty = _RIDGE * len(values) * np.array([0.0, 1, 1, 1])
-    weights = np.zeros(4)
+    weights = np.zeros(rows.shape[1])
+    penalty = _RIDGE * len(values) * (np.arange(len(weights)) > 0)
     for _ in range(_STEPS):
         likely = 1 / (1 + np.exp(-rows @ weights))
         bend = (rows * (share * likely * (1 - likely))[:, None]).T @ rows + np.diag(penalty)
@@ -120,7 +120,7 @@ def kept(photos: Sequence[Regions], weights: np.ndarray, odds: float) -> tuple[f
     Parameters
     ----------
     photos : sequence of Regions
-    weights : (4,) ndarray
+    weights : (5,) ndarray
     odds : float
 
     Returns

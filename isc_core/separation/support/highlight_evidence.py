@@ -11,20 +11,18 @@ and diffuse image that the scene network expects, its scale b, and for a map v t
 
 the log odds that taking s off lowers the squared error are
 
-    w_0 + w_1 mean(y) / mean(b) + w_2 step(C) + w_3 step(D),
+    w_0 + w_1 mean(y) / mean(b) + w_2 step(C) + w_3 step(D) + w_4 mean(saturation of D),
 
 with C = max I - min I, which a highlight leaves and white paint lowers; means are weighted by s^2.
-A region keeps its s where the odds exceed `odds`, and otherwise gives all of it back, bit for bit.
-The odds to be exceeded are the least of 1, 1.5, 2, 2.5 and 3 with which, on bodies that are neither
-fitted nor reported on, no matt one loses 1 % of its light and no glossy one gets worse.
+What is left under a highlight on saturated paint is saturated; on grey, colour proves nothing. A
+region keeps its s where the odds exceed `odds`, and otherwise gives all of it back, bit for bit.
 
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. The weights
-are those of `benchmarks.separation.print_rule`, within 3 %, on rendered bodies that measure nothing
-else.
+are those of `benchmarks.separation.print_rule --mixed` on rendered bodies, half of them with print;
+docs/methods/print.md says how the odds were chosen.
 
 Limits: a region that holds both, a highlight and print, is kept or given back as a whole. Faint and
-broad highlights, of which the network is not sure, are given back: most in photos of everyday
-things.
+broad highlights, of which the network is not sure, are given back, and most on grey and white.
 """
 
 from dataclasses import dataclass
@@ -39,8 +37,8 @@ _DARK = 0.02  # of the bright pixels: added before logarithms
 _CORE, _RING = 0.5, 0.02  # of a region's peak; distance of the ring, of the object's diagonal
 _LEAST = 6  # pixels of a region that can be judged
 _MOST_STEP = 5.0  # of each number that is weighed
-WEIGHTS = (-1.807, 1.161, 0.784, -0.405)
-ODDS = 2.5
+WEIGHTS = (-1.725, 0.948, 0.602, -0.337, 2.064)
+ODDS = 3.0
 
 
 @dataclass(frozen=True)
@@ -53,8 +51,8 @@ class Evidence:
         Number of the region at each pixel, from 1 on; 0 outside of all regions.
     numbers : (K,) ndarray of int
         Those of the regions that can be judged.
-    values : (K, 3) ndarray
-        y over b, and the steps of C and D.
+    values : (K, 4) ndarray
+        y over b, the steps of C and D, and the saturation of D.
     """
 
     labels: np.ndarray
@@ -94,7 +92,8 @@ def highlight_evidence(
     maps = np.stack(
         [np.log(np.maximum(one, 0) + dark) for one in (chroma, mean_channel(diffuse))], axis=2
     )
-    form = np.stack([mean_channel(log_ratio), ratio_scale], axis=2).astype(float)
+    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
+    form = np.stack([mean_channel(log_ratio), ratio_scale, saturation], axis=2).astype(float)
     rows, columns = np.nonzero(mask)
     # whole pixels; the ring beyond it is two wide
     reach = max(2, int(_RING * np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
@@ -106,7 +105,7 @@ def highlight_evidence(
             continue
         numbers.append(k)
         found.append(_values(inside, removed[wide], mask[wide], maps[wide], form[wide], reach))
-    return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, 3))
+    return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, 4))
 
 
 def _values(
@@ -124,11 +123,12 @@ def _values(
     ring = ndimage.binary_dilation(near, iterations=2) & ~near & mask & (removed < half)
     ring = ring if ring.sum() >= _LEAST - 1 else mask & ~core
     weight = np.square(removed) * inside
-    y, b = (weight[..., None] * form).sum(axis=(0, 1))
+    y, b, saturation = (weight[..., None] * form).sum(axis=(0, 1))
     steps = (
         np.median(maps[core], axis=0) - np.median(maps[ring], axis=0) if ring.any() else np.zeros(2)
     )
-    values = np.clip([y / max(b, 1e-12), *steps], -_MOST_STEP, _MOST_STEP)
+    saturation /= max(float(weight.sum()), 1e-12)
+    values = np.clip([y / max(b, 1e-12), *steps, saturation], -_MOST_STEP, _MOST_STEP)
     return [float(one) for one in values]
 
 
