@@ -5,9 +5,9 @@
 WORLD is a folder of `isc world build`. Regions of light that colour and network take off bodies of
 `Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
 whose removal raises it. Logistic regression, each region with the root of its squared light over
-that of its photo as weight, gives `highlight_evidence.WEIGHTS`. On the bodies of `Part.CHOICE` it prints
-what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, which the shipped
-weights had, as many bodies without print are added to both parts.
+that of its photo as weight, gives `highlight_evidence.WEIGHTS`. For the bodies of `Part.CHOICE` it
+prints what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, which the
+shipped weights had, as many bodies without print are added to both parts.
 """
 
 import argparse
