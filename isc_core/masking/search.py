@@ -32,7 +32,7 @@ from .refinement import refined
 
 WORKING = 768  # pixels of the longer side of the photo that is worked on
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
-_FILLED = 0.6  # of the sides of a box: a smaller mask is not what the box was drawn around
+_FILLED = 0.75  # of the sides of a box: a smaller mask is not what the box was drawn around
 _NOTHING = 0.5  # probability from which a photo shows no things
 _UNSURE = 1e-3
 _LEAST = 1e-6
