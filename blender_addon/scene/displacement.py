@@ -125,7 +125,7 @@ def add_displacement(
     modifier = obj.modifiers.get(MODIFIER) or obj.modifiers.new(MODIFIER, "DISPLACE")
     modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV
     modifier.direction, modifier.mid_level = "NORMAL" if eye is None else "RGB_TO_XYZ", 0.0
-    texture.use_clamp = eye is None  # vectors have negative parts
+    texture.use_clamp = False  # heights and vectors have negative parts
 
 
 def remove_displacement(key: str, obj: bpy.types.Object) -> None:
