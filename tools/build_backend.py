@@ -57,6 +57,9 @@ LEFT_OUT = (
     "benchmarks/blender",
     "benchmarks/decomposition",
     "benchmarks/records.py",
+    "benchmarks/separation/print_rule.py",
+    "benchmarks/separation/print_set.py",
+    "benchmarks/separation/prints.py",
     "benchmarks/sirfs",
     "blender_addon/packaging",
 )
