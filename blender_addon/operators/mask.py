@@ -4,6 +4,7 @@ image of the photo's size.
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+from collections.abc import Callable
 from math import ceil, floor
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,14 @@ from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from isc_core.errors import InputError
 
-from ..files.image_source import inspect_image
+from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from ..worker.commands import Box
+from ..worker.commands import Box, WorkerEnvironment
 from .messages import busy_message
 from .modal import WorkerOperator
 from .request import find_by_full_name
 from .run_steps import mask_steps
-from .worker_run import WorkerRun, active_run, remove_folder, require_no_active_run
+from .worker_run import RunSteps, WorkerRun, active_run, remove_folder, require_no_active_run
 
 _MASK_OF = "isc_mask_of"
 _MIN_SIDE = 8
@@ -76,18 +77,49 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
         left, top, width, height = (int(number) for number in settings.box)
         if min(width, height) < _MIN_SIDE:
             raise InputError(_small_box_message())
-        photo, scene = inspect_image(settings.image), context.scene.name_full
-        folder = create_run_folder(None, "mask")
+        box = left, top, width, height
+        return mask_run(
+            context,
+            "Cut Out",
+            lambda photo, folder, environment: mask_steps(photo, box, folder, environment),
+        )
 
-        def finish(context: Any, path: Path) -> str:
-            del context
-            load_mask(path, photo.name, scene)
-            remove_folder(folder)
-            return "the mask is ready: check its outline before you decompose the photo"
 
-        environment = worker_environment(read_preferences(context))
-        steps = mask_steps(photo, (left, top, width, height), folder, environment)
-        return WorkerRun("Cut Out", steps, finish, folder)
+def mask_run(
+    context: Any, title: str, steps: Callable[[ImageSource, Path, WorkerEnvironment], RunSteps]
+) -> WorkerRun:
+    """Create a run that makes the mask of the scene's photo.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+    title : str
+        Name of the run in the panel.
+    steps : callable
+        Of the photo, the run's folder and the worker's environment.
+
+    Returns
+    -------
+    WorkerRun
+        The run, not started.
+
+    Raises
+    ------
+    InputError
+        If the photo cannot be used.
+    """
+    photo, scene = inspect_image(context.scene.isc.image), context.scene.name_full
+    folder = create_run_folder(None, "mask")
+
+    def finish(context: Any, path: Path) -> str:
+        del context
+        load_mask(path, photo.name, scene)
+        remove_folder(folder)
+        return "the mask is ready: check its outline before you decompose the photo"
+
+    environment = worker_environment(read_preferences(context))
+    return WorkerRun(title, steps(photo, folder, environment), finish, folder)
 
 
 class ISC_OT_take_mask(bpy.types.Operator):

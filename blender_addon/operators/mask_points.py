@@ -3,7 +3,6 @@
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from math import floor
-from pathlib import Path
 from typing import Any
 
 import bpy
@@ -11,12 +10,10 @@ from bpy.props import BoolProperty
 
 from isc_core.errors import InputError
 
-from ..files.image_source import inspect_image
-from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .mask import can_cut, canvas, load_mask
+from .mask import can_cut, canvas, mask_run
 from .modal import WorkerOperator
 from .run_steps import auto_mask_steps
-from .worker_run import WorkerRun, active_run, remove_folder, require_no_active_run
+from .worker_run import WorkerRun, active_run, require_no_active_run
 
 
 class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
@@ -65,18 +62,13 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         if settings.image is None:
             raise InputError("no photo is selected: open a file, or choose an image of this file")
         points, others = parse_points(settings.points), parse_points(settings.other_points)
-        photo, scene = inspect_image(settings.image), context.scene.name_full
-        folder = create_run_folder(None, "mask")
-
-        def finish(context: Any, path: Path) -> str:
-            del context
-            load_mask(path, photo.name, scene)
-            remove_folder(folder)
-            return "the mask is ready: check its outline before you decompose the photo"
-
-        environment = worker_environment(read_preferences(context))
-        steps = auto_mask_steps(photo, points, others, folder, environment)
-        return WorkerRun("Auto Mask", steps, finish, folder)
+        return mask_run(
+            context,
+            "Auto Mask",
+            lambda photo, folder, environment: auto_mask_steps(
+                photo, points, others, folder, environment
+            ),
+        )
 
 
 class ISC_OT_mark_point(bpy.types.Operator):
