@@ -20,7 +20,7 @@ from torch.nn import functional
 from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, Count
 
-from ..networks.blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
+from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
 from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
@@ -141,18 +141,8 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        pairs = [folded(*pair) for pair in self._pairs]
-        pairs.append((self.out.weight, self.out.bias))
-        found = {
-            "normalisation": as_array(torch.cat([norm_state(norm) for _, norm in self._pairs], 1))
-        }
-        for k, (weight, bias) in enumerate(pairs):
-            blocks = as_array(weight).transpose(2, 3, 1, 0)
-            found[f"weight{k:02d}"] = blocks.reshape(9, *blocks.shape[2:]).astype(np.float16)
-            found[f"bias{k:02d}"] = as_array(bias).astype(np.float16)
-        for name, layer in (("hidden", self.hidden), ("count", self.count)):
-            found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
-            found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
+        dense = {"hidden": self.hidden, "count": self.count}
+        found = stored_arrays(self._pairs, self.out, dense)
         found["sureness"] = np.array([0, 1, 0, 0], np.float32)
         return found
 

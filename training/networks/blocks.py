@@ -4,6 +4,8 @@ Citation: S. Ioffe, C. Szegedy, "Batch normalization", 2015, arXiv:1502.03167; i
 He et al. 2015, doi:10.1109/ICCV.2015.123.
 """
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 import torch
 from torch import nn
@@ -141,3 +143,35 @@ def as_array(values: torch.Tensor) -> np.ndarray:
     ndarray
     """
     return np.asarray(values.detach().cpu().numpy())
+
+
+def stored_arrays(
+    pairs: Sequence[tuple[Convolution, nn.BatchNorm2d]],
+    out: nn.Conv2d,
+    dense: Mapping[str, nn.Linear],
+) -> dict[str, np.ndarray]:
+    """Return the weights of blocks, output and dense layers in the layout that the core reads.
+
+    Parameters
+    ----------
+    pairs : sequence of (Convolution, BatchNorm2d)
+    out : Conv2d
+    dense : mapping of str to Linear
+        By the names of their arrays.
+
+    Returns
+    -------
+    dict of str to ndarray
+        float16; the state of normalisation is kept beside them to continue a fit.
+    """
+    found = {"normalisation": as_array(torch.cat([norm_state(norm) for _, norm in pairs], 1))}
+    for k, (weight, bias) in enumerate(
+        [*(folded(*pair) for pair in pairs), (out.weight, out.bias)]
+    ):
+        kernel = as_array(weight).transpose(2, 3, 1, 0)
+        found[f"weight{k:02d}"] = kernel.reshape(9, *kernel.shape[2:]).astype(np.float16)
+        found[f"bias{k:02d}"] = as_array(bias).astype(np.float16)
+    for name, layer in dense.items():
+        found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
+        found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
+    return found

@@ -46,7 +46,7 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
-from .blocks import Block, Convolution, as_array, folded, kernel_of, norm_state
+from .blocks import Block, Convolution, kernel_of, stored_arrays
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
@@ -150,18 +150,8 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        pairs = [folded(*pair) for pair in self._pairs]
-        pairs.append((self.out.weight, self.out.bias))
-        found = {
-            "normalisation": as_array(torch.cat([norm_state(norm) for _, norm in self._pairs], 1))
-        }
-        for k, (weight, bias) in enumerate(pairs):
-            kernel = as_array(weight).transpose(2, 3, 1, 0)
-            found[f"weight{k:02d}"] = kernel.reshape(9, *kernel.shape[2:]).astype(np.float16)
-            found[f"bias{k:02d}"] = as_array(bias).astype(np.float16)
-        for name, layer in (("hidden", self.hidden), ("light", self.light)):
-            found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
-            found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
+        dense = {"hidden": self.hidden, "light": self.light}
+        found = stored_arrays(self._pairs, self.out, dense)
         found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
         return found
 
