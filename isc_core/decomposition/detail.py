@@ -1,0 +1,182 @@
+"""Relief finer than SIRFS is solved at, from coarse to fine, at the photo's own resolution.
+
+Problem: SIRFS is solved with the object 256 pixels long. Finer relief stays in the reflectance.
+
+Equation: levels of the photo, each half as large as the one before, from the finest that is asked
+for down to about the solver's size. With the height Z of SIRFS, the light's log shading S, and the
+detail network's band b_k of level k (`networks.detail_network`),
+
+    R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k)
+    height = Z + R_0
+
+each in the pixels of its level. The light and what an image of half the solver's size can hold of
+the shape do not change, since each band is without what the next coarser level can hold.
+
+Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
+Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from shading: A. Pentland
+1990, doi:10.1007/BF00054993.
+
+Limits: relief is where the light from SIRFS says; where that light is from the wrong side, dents
+become bumps. One tile of some rows is seen at a time, so memory is bounded by the maps' own.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..imaging.bounding_box import mask_slices
+from ..networks.detail_network import MULTIPLE, DetailNetwork, band, predict_relief, raised
+from ..networks.layers import average_pool
+from ..progress import Monitor
+from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
+
+_SOLVED = 300  # pixels: the coarsest level's object is not longer
+_MARGIN = 16
+_STEP = 0.02  # of slopes, for the derivative of shading
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of a photo.
+
+    Attributes
+    ----------
+    image : (h, w, 3) ndarray
+        Linear diffuse light.
+    mask : (h, w) bool ndarray
+    height : (h, w) ndarray
+        The smooth surface, pixels of the level toward the viewer.
+    """
+
+    image: np.ndarray
+    mask: np.ndarray
+    height: np.ndarray
+
+    def halved(self) -> "Level":
+        """Return the next coarser level; sides are even."""
+        share = average_pool(self.mask[..., None].astype(float))[..., 0]
+        image = average_pool(np.where(self.mask[..., None], self.image, 0))
+        return Level(
+            image / np.maximum(share, 1e-9)[..., None],
+            share >= 0.5,
+            average_pool(self.height[..., None])[..., 0] / 2,
+        )
+
+
+def fine_relief(
+    diffuse: np.ndarray,
+    mask: np.ndarray,
+    height: np.ndarray,
+    light: np.ndarray,
+    finest: int,
+    monitor: Monitor | None = None,
+    network: DetailNetwork | None = None,
+) -> np.ndarray:
+    """Find the relief that a smooth height lacks.
+
+    Parameters
+    ----------
+    diffuse : (H, W, 3) ndarray
+        Linear diffuse light.
+    mask : (H, W) bool ndarray
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention.
+    finest : int
+        Length of the object, pixels, at the finest level that is looked at.
+    monitor : Monitor, optional
+    network : DetailNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Pixels toward the viewer, 0 outside of the mask.
+
+    Raises
+    ------
+    Cancelled
+        If the monitor cancels.
+    """
+    monitor = monitor or Monitor()
+    rows, columns = mask_slices(mask)
+    length = max(rows.stop - rows.start, columns.stop - columns.start)
+    count = max(0, int(np.ceil(np.log2(length / _SOLVED))))
+    levels = [_framed(diffuse, mask, height, MULTIPLE << count)]
+    for _ in range(count):
+        levels.append(levels[-1].halved())
+    relief = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape))
+    for k, level in zip(range(count, -1, -1), levels[::-1], strict=True):
+        monitor.report("fine relief", 1 - (k + 1) / (count + 1))
+        relief = 2 * raised(relief)
+        if length / 2**k <= finest:
+            slope = slopes(level.height)
+            relief += predict_relief(
+                level.image, level.mask, slope, shading_gain(slope, light), network
+            )
+    out = np.zeros(mask.shape)
+    top, left = _MARGIN, _MARGIN
+    out[rows, columns] = relief[
+        top : top + rows.stop - rows.start, left : left + columns.stop - columns.start
+    ]
+    return np.where(mask, out, 0)
+
+
+def slopes(height: np.ndarray) -> np.ndarray:
+    """Return dz/dx and dz/dy, x right and y down.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+
+    Returns
+    -------
+    (H, W, 2) ndarray
+    """
+    down, right = np.gradient(height)
+    return np.stack([right, down], axis=2)
+
+
+def shading_gain(slope: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """Return the derivatives of log shading, averaged over channels, by the slopes.
+
+    Parameters
+    ----------
+    slope : (H, W, 2) ndarray
+        dz/dx, dz/dy, x right and y down.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention.
+
+    Returns
+    -------
+    (H, W, 2) ndarray
+    """
+    coefficients = light_from_reference(light).mean(axis=1)
+
+    def log_shading(right: np.ndarray, down: np.ndarray) -> np.ndarray:
+        normal = np.stack([-down, -right, np.ones_like(right)], axis=-1)
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        return np.einsum("hwk,k->hw", real_sh(normal_from_reference(normal)), coefficients)
+
+    p, q = slope[..., 0], slope[..., 1]
+    return np.stack(
+        [
+            (log_shading(p + _STEP, q) - log_shading(p - _STEP, q)) / (2 * _STEP),
+            (log_shading(p, q + _STEP) - log_shading(p, q - _STEP)) / (2 * _STEP),
+        ],
+        axis=2,
+    )
+
+
+def _framed(diffuse: np.ndarray, mask: np.ndarray, height: np.ndarray, multiple: int) -> Level:
+    """The object's box with a margin, its sides multiples of a number."""
+    box = mask_slices(mask)
+    pads = [
+        (_MARGIN, _MARGIN + (-(one.stop - one.start + 2 * _MARGIN)) % multiple) for one in box
+    ]
+    return Level(
+        np.pad(np.where(mask[..., None], diffuse, 0)[box], [*pads, (0, 0)]),
+        np.pad(mask[box], pads),
+        np.pad(height[box], pads, mode="edge"),
+    )

@@ -1,0 +1,254 @@
+"""Relief finer than a solve resolves, from the photo's fine changes of brightness.
+
+Problem: a fine change of brightness is paint or relief. Relief changes brightness as the light
+says, along the light's direction, and not the colour; paint has edges, and hues of its own.
+
+Equation: for slopes p, q of a smooth surface under known light, relief r changes log shading by
+
+    g . grad r,   g = (d log S / dp, d log S / dq).
+
+Of all slopes that explain a change of log shading d, g d / |g|^2 are the smallest. A convolutional
+network sees them (with |g|^2 + .15^2 below), the photo's logarithm without its low frequencies, p
+and q, and g, and returns the finest band of r: what an image of half the size cannot hold,
+
+    band(r) = r - U P r
+
+with P the mean of 2 x 2 pixels and U linear interpolation. It is fitted to squared errors of the
+slope, so where paint and relief look alike it returns their mean, near 0.
+
+Citation: linear shape from shading: A. Pentland, "Linear shape from shading", IJCV 4, 1990,
+doi:10.1007/BF00054993; O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28. Weights, patches and loss are our own: `python -m
+training.detail.detail_network`.
+
+Limits: measured in docs/methods/detail.md. It knows no cast shadows.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .layers import average_pool, conv_block, convolved, is_chain
+from .loader import Network, Parameters
+
+INPUTS = 11
+LEVELS = 4
+MULTIPLE = 2 ** (LEVELS - 1)  # sides of the network's frame
+DARK = 0.01  # of the mean light
+_COARSE = 8  # pixels: low frequencies are averages of so many
+WEAK = 0.15  # a gain below which slopes are not told
+_STEEPEST = 3.0  # slopes and gains are bounded by it
+HEIGHT_UNIT = 0.5  # pixels of height: a unit of the network's output
+
+
+@dataclass(frozen=True)
+class DetailNetwork(Network):
+    """The detail network. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        Two for each level down, two for each level up from the coarsest, the output.
+    biases : tuple of (outputs,) float32 ndarray
+    """
+
+    title = "detail network"
+    file = "detail_network.npz"
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+
+    def __post_init__(self) -> None:
+        if not self._fits():
+            raise InputError(
+                "these are not the weights of a detail network of this version: "
+                "fit them anew, or use the shipped ones"
+            )
+
+    def _fits(self) -> bool:
+        if len(self.weights) != 4 * LEVELS - 1 or any(w.ndim != 3 for w in self.weights):
+            return False
+        down = 2 * LEVELS
+        wide = [w.shape[-1] for w in self.weights[1:down:2]]
+        shapes, inputs = list[tuple[int, ...]](), INPUTS
+        for width in wide:
+            shapes += [(9, inputs, width), (9, width, width)]
+            inputs = width
+        for skip, up in zip(wide[-2::-1], self.weights[down:-1:2], strict=True):
+            width = up.shape[-1]
+            shapes += [(9, skip + inputs, width), (9, width, width)]
+            inputs = width
+        return is_chain(self.weights, self.biases, [*shapes, (9, inputs, 1)])
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "DetailNetwork":
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        DetailNetwork
+
+        Raises
+        ------
+        InputError
+            If the parameters do not fit.
+        """
+        return cls(parameters.weights, parameters.biases)
+
+    def __call__(self, channels: np.ndarray) -> np.ndarray:
+        """Predict relief.
+
+        Parameters
+        ----------
+        channels : (H, W, INPUTS) ndarray
+            See `channels_of`; sides are multiples of `MULTIPLE`.
+
+        Returns
+        -------
+        (H, W) float32 ndarray
+            Heights, pixels toward the viewer, before `band`.
+        """
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        layer, skips = channels, []
+        for level in range(LEVELS):
+            layer = conv_block(average_pool(layer) if level else layer, steps)
+            skips.append(layer)
+        for skip in skips[-2::-1]:
+            layer = conv_block(
+                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
+            )
+        return np.asarray(HEIGHT_UNIT * convolved(layer, *next(steps))[..., 0])
+
+
+def predict_relief(
+    image: np.ndarray,
+    mask: np.ndarray,
+    slope: np.ndarray,
+    gain: np.ndarray,
+    network: DetailNetwork | None = None,
+) -> np.ndarray:
+    """Predict the finest band of the relief in a photo.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear diffuse light; sides are multiples of `MULTIPLE`.
+    mask : (H, W) bool ndarray
+        The object.
+    slope : (H, W, 2) ndarray
+        Of the smooth surface: dz/dx, dz/dy, x right, y down, z toward the viewer.
+    gain : (H, W, 2) ndarray
+        Derivatives of log shading by these slopes.
+    network : DetailNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Pixels toward the viewer; 0 outside of the mask, and without what half the size can hold.
+    """
+    network = network or DetailNetwork.shipped()
+    relief = network(channels_of(image, mask, slope, gain))
+    return np.where(mask, band(np.where(mask, relief, 0)), 0)
+
+
+def band(height: np.ndarray) -> np.ndarray:
+    """Return what an image of half the size cannot hold of a height map.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        H and W even.
+
+    Returns
+    -------
+    (H, W) ndarray
+    """
+    return height - raised(average_pool(height[..., None])[..., 0])
+
+
+def raised(values: np.ndarray) -> np.ndarray:
+    """Interpolate a map linearly to twice the size.
+
+    Parameters
+    ----------
+    values : (H, W) ndarray
+
+    Returns
+    -------
+    (2 H, 2 W) ndarray
+    """
+    return _raised_rows(_raised_rows(values).T).T
+
+
+def _raised_rows(values: np.ndarray) -> np.ndarray:
+    padded = np.concatenate([values[:1], values, values[-1:]])
+    out = np.empty((2 * len(values), *values.shape[1:]), values.dtype)
+    near = 0.75 * values
+    out[0::2] = near + 0.25 * padded[:-2]
+    out[1::2] = near + 0.25 * padded[2:]
+    return out
+
+
+def channels_of(
+    image: np.ndarray, mask: np.ndarray, slope: np.ndarray, gain: np.ndarray
+) -> np.ndarray:
+    """Return the channels of the first layer.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear; sides are multiples of `MULTIPLE`.
+    mask : (H, W) bool ndarray
+    slope, gain : (H, W, 2) ndarray
+        See `predict_relief`.
+
+    Returns
+    -------
+    (H, W, INPUTS) float32 ndarray
+        Log light without low frequencies: mean of the channels, red and blue less green; low
+        frequencies of the mean; mask; the normal's x and y; gains; the smallest slopes that explain
+        the mean. All are 0 outside of the mask.
+    """
+    inside = mask.astype(np.float32)
+    light = np.where(mask[..., None], image, 0).astype(np.float32)
+    mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
+    log_light = np.log(light / np.float32(mean) + np.float32(DARK))
+    parts = [log_light.mean(axis=2), *(log_light[..., c] - log_light[..., 1] for c in (0, 2))]
+    share = _blocks(inside)
+    cover = _spread(share)
+    low = [_spread(_blocks(part * inside)) / np.maximum(cover, 1e-6) for part in parts]
+    p, q = slope[..., 0], slope[..., 1]
+    length = np.sqrt(1 + p * p + q * q)
+    bound = np.clip(gain, -_STEEPEST, _STEEPEST)
+    change = (parts[0] - low[0]) / ((bound * bound).sum(axis=2) + WEAK**2)
+    least = np.clip(bound * change[..., None], -_STEEPEST, _STEEPEST)
+    channels = [
+        *(part - smooth for part, smooth in zip(parts, low, strict=True)),
+        low[0],
+        np.ones_like(inside),
+        -p / length,
+        -q / length,
+        bound[..., 0],
+        bound[..., 1],
+        least[..., 0],
+        least[..., 1],
+    ]
+    return (np.stack(channels, axis=2) * inside[..., None]).astype(np.float32)
+
+
+def _blocks(values: np.ndarray) -> np.ndarray:
+    rows, columns = values.shape
+    return values.reshape(rows // _COARSE, _COARSE, columns // _COARSE, _COARSE).mean(axis=(1, 3))
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    for _ in range(LEVELS - 1):
+        values = raised(values)
+    return values

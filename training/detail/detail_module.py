@@ -1,0 +1,177 @@
+"""The trainable detail network and its loss; the counterpart of `isc_core.networks.detail_network`.
+
+Equation: with the relief's band r, its estimate s, and means over a patch,
+
+    mean |grad s - grad r|^2 / (mean |grad r|^2 + e^2)
+
+so that faint and strong relief count alike, and false relief of paint as that of slope e.
+
+Citation: see `isc_core.networks.detail_network`.
+
+Limits: none of its own.
+"""
+
+import numpy as np
+import torch
+from torch import nn
+from torch.nn import functional
+
+from isc_core.networks.detail_network import DARK, HEIGHT_UNIT, INPUTS, LEVELS, WEAK
+
+from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
+from ..world.tensor_batch import TensorBatch
+
+DOWN, UP = (16, 32, 48, 64), (48, 32, 16)
+_COARSE, _STEEPEST = 8, 3.0
+_SLOPE = 0.05  # e
+
+
+class DetailNetworkModule(nn.Module):  # type: ignore[misc]
+    """The trainable detail network.
+
+    Parameters
+    ----------
+    down, up : tuple of int
+        Channels of the levels down, the finest first, and up, the coarsest first.
+    """
+
+    def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
+        super().__init__()
+        fine = (INPUTS, *down[:-1])
+        self.down = nn.ModuleList([Block(i, o) for i, o in zip(fine, down, strict=True)])
+        below = (down[-1], *up[:-1])
+        self.up = nn.ModuleList(
+            [Block(skip + i, o) for skip, i, o in zip(down[-2::-1], below, up, strict=True)]
+        )
+        self.out = nn.Conv2d(up[-1], 1, 3, padding=1)
+        nn.init.zeros_(self.out.bias)
+        self.out.weight.data *= 0.1
+        self.to(memory_format=torch.channels_last)
+
+    def forward(self, inputs: torch.Tensor) -> torch.Tensor:
+        """Predict relief.
+
+        Parameters
+        ----------
+        inputs : (B, INPUTS, H, W) tensor
+            See `network_channels`.
+
+        Returns
+        -------
+        (B, 1, H, W) tensor
+            Heights, before `band_of`.
+        """
+        layer, skips = inputs.contiguous(memory_format=torch.channels_last), []
+        with torch.autocast(inputs.device.type, torch.bfloat16, enabled=self.training):
+            for level, block in enumerate(self.down):
+                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
+                skips.append(layer)
+            for block, skip in zip(self.up, skips[-2::-1], strict=True):
+                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
+                layer = block(torch.cat([skip, finer], 1))
+            return HEIGHT_UNIT * self.out(layer).float()
+
+    def matrices(self) -> list[nn.Parameter]:
+        """Return the weights of the blocks."""
+        return [convolution.matrix for convolution, _ in self._pairs]
+
+    def loss(self, batch: TensorBatch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Return the loss of a batch and its terms.
+
+        Parameters
+        ----------
+        batch : Patch
+
+        Returns
+        -------
+        loss : () tensor
+        terms : dict of str to tensor
+            "left": squared error over relief's energy, of the patches that have relief; "false":
+            mean slope of what is not there, of those without.
+        """
+        mask = batch.mask  # type: ignore[attr-defined]
+        relief = band_of(self(network_channels(batch)) * mask) * mask
+        truth = batch.height * mask  # type: ignore[attr-defined]
+        (error, known), (true, _) = (_energy(part, mask) for part in (relief - truth, truth))
+        error, energy = (part.sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1) for part in (error, true))
+        loss = (error / (energy + _SLOPE**2)).mean()
+        with torch.no_grad():
+            has = energy > 1e-6
+            terms = {
+                "left": error[has].sum() / energy[has].sum().clamp(min=1e-9),
+                "each": (error[has] / energy[has]).clamp(max=2).mean(),
+                "false": error[~has].mean().sqrt(),
+            }
+        return loss, terms
+
+    @property
+    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
+        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the weights in the layout that the core reads."""
+        return stored_arrays(self._pairs, self.out, {})
+
+
+def _energy(height: torch.Tensor, mask: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Squared slopes (B, 1, H-1, W-1) by forward differences, and where they are known."""
+    known = mask[:, :, 1:, 1:] * mask[:, :, :-1, 1:] * mask[:, :, 1:, :-1]
+    right = height[:, :, :-1, 1:] - height[:, :, :-1, :-1]
+    down = height[:, :, 1:, :-1] - height[:, :, :-1, :-1]
+    known = known * mask[:, :, :-1, :-1]
+    return (right.square() + down.square()) * known, known
+
+
+def band_of(height: torch.Tensor) -> torch.Tensor:
+    """Return the finest band; equal to `isc_core.networks.detail_network.band`.
+
+    Parameters
+    ----------
+    height : (B, 1, H, W) tensor
+
+    Returns
+    -------
+    (B, 1, H, W) tensor
+    """
+    coarse = functional.avg_pool2d(height, 2)
+    return height - functional.interpolate(
+        coarse, scale_factor=2, mode="bilinear", align_corners=False
+    )
+
+
+def network_channels(batch: TensorBatch) -> torch.Tensor:
+    """Return the input channels; equal to `isc_core.networks.detail_network.channels_of`.
+
+    Parameters
+    ----------
+    batch : Patch
+
+    Returns
+    -------
+    (B, INPUTS, H, W) tensor
+    """
+    photo, mask = batch.photo, batch.mask  # type: ignore[attr-defined]
+    slope, gain = batch.slope, batch.gain  # type: ignore[attr-defined]
+    light = photo * mask
+    mean = light.sum((1, 2, 3), keepdim=True) / (3 * mask.sum((1, 2, 3), keepdim=True)).clamp(min=1)
+    log_light = torch.log(light / mean.clamp(min=1e-9) + DARK)
+    parts = torch.cat(
+        [log_light.mean(1, keepdim=True), log_light[:, ::2] - log_light[:, 1:2]], 1
+    )
+    cover = _low(mask)
+    low = _low(parts * mask) / cover.clamp(min=1e-6)
+    length = torch.sqrt(1 + slope.square().sum(1, keepdim=True))
+    bound = gain.clamp(-_STEEPEST, _STEEPEST)
+    change = (parts - low)[:, :1] / (bound.square().sum(1, keepdim=True) + WEAK**2)
+    least = (bound * change).clamp(-_STEEPEST, _STEEPEST)
+    ones = torch.ones_like(mask)
+    return torch.cat([parts - low, low[:, :1], ones, -slope / length, bound, least], 1) * mask
+
+
+def _low(values: torch.Tensor) -> torch.Tensor:
+    values = functional.avg_pool2d(values, _COARSE)
+    for _ in range(LEVELS - 1):
+        values = functional.interpolate(
+            values, scale_factor=2, mode="bilinear", align_corners=False
+        )
+    return values
