@@ -56,6 +56,7 @@ LEFT_OUT = (
     "benchmarks/batch",
     "benchmarks/blender",
     "benchmarks/decomposition",
+    "benchmarks/detail",
     "benchmarks/records.py",
     "benchmarks/separation/print_rule.py",
     "benchmarks/separation/print_set.py",

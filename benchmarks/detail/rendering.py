@@ -1,0 +1,236 @@
+"""Photos of bodies with relief of one paint, and of smooth bodies with print; exact normals.
+
+Every pixel is the mean of four points; its true normals are the normalised means of theirs. The
+light is that of `lighting`, the camera that of `training.world.camera`: a slight blur, noise, 8-bit
+sRGB, in two of three photos JPEG.
+
+Limits: an orthographic camera; no sharpening and no tone curve of a camera's own.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from zlib import crc32
+
+import numpy as np
+import torch
+from scipy import ndimage
+from scipy.spatial.transform import Rotation
+
+from synth.scene.meshes import Mesh
+from synth.scene.tracing import Hits, Tracer
+from training.world.camera import CameraDraw, encoded_srgb, exposed, photographed
+from training.world.random_draws import log_uniform
+from training.world.views import camera_rays
+
+from .bodies import SHAPES, Wrap, displaced_normals, draw_wrap, facing, smooth_body
+from .lighting import Gloss, Lamp, ReachingLight, Room, outgoing_light, reaching_light
+from .print_maps import PrintKind, draw_colour, draw_print
+from .relief_maps import ReliefKind, ReliefMap, draw_relief
+
+SIDE, LENGTH = 1024, 860  # pixels: of a photo, and of the object in it
+_COARSE = 8  # photo pixels a pixel of the grid on which light is traced
+_OFFSETS = (-0.25, 0.25)  # of the points of a pixel
+_PRINT_SIDE = 0.75  # of a print map, relative to the photo
+
+
+class SetKind(StrEnum):
+    """What a body shows."""
+
+    RELIEF = "relief"
+    PRINT = "print"
+
+
+@dataclass(frozen=True)
+class DetailScene:
+    """A photo with its truth.
+
+    Attributes
+    ----------
+    name : str
+    codes : (H, W, 3) uint8 ndarray
+        The photo, sRGB.
+    mask : (H, W) ndarray of bool
+    normal : (H, W, 3) float32 ndarray
+        Unit, camera frame; 0 outside the mask.
+    smooth : (H, W, 3) float32 ndarray
+        Those of the body without relief.
+    facts : dict
+        What was drawn.
+    """
+
+    name: str
+    codes: np.ndarray
+    mask: np.ndarray
+    normal: np.ndarray
+    smooth: np.ndarray
+    facts: dict[str, object]
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """All that is drawn for one photo."""
+
+    mesh: Mesh
+    family: str
+    room: Room
+    gloss: Gloss
+    relief: ReliefMap | None
+    paint: np.ndarray  # (3,) or a map (side, side, 3)
+    facts: dict[str, object]
+
+
+def render(
+    kind: SetKind, seed: int, number: int, rooms: Sequence[np.ndarray], side: int = SIDE
+) -> DetailScene:
+    """Render one photo of a set.
+
+    Parameters
+    ----------
+    kind : SetKind
+    seed : int
+        Of the set.
+    number : int
+        Of the photo, from 0; decides the family, the pattern and whether there are lamps.
+    rooms : sequence of (rows, 2 rows, 3) ndarray
+        Surroundings to draw from.
+    side : int, optional
+        Of the photo, pixels, a multiple of 16; the object has the same share of it at any size.
+
+    Returns
+    -------
+    DetailScene
+    """
+    rng = np.random.default_rng([seed, number, crc32(kind.encode())])
+    plan = _planned(kind, number, rooms, rng, side)
+    tracer, pixel = Tracer(plan.mesh), 2 / side
+    centre = _traced(tracer, side, 0, 0)
+    wrap = draw_wrap(plan.family, centre.position[centre.valid], rng, pixel)
+    light = _light(plan, tracer, side, rng)
+    fields = light.enlarged(side)
+    total, count = np.zeros((side * side, 9), np.float32), np.zeros(side * side, int)
+    for down in _OFFSETS:
+        for right in _OFFSETS:
+            hits = _traced(tracer, side, down, right)
+            at = np.flatnonzero(hits.valid)
+            total[at] += _shaded(plan, wrap, light, fields[:, at], hits, side)
+            count[at] += 1
+    mask = (count == len(_OFFSETS) ** 2).reshape(side, side)
+    picture = (total / np.maximum(count, 1)[:, None]).reshape(side, side, 9)
+    picture *= mask[..., None]
+    codes, camera = _photo(picture[..., :3], mask, rng)
+    normal, smooth = (_unit(picture[..., part]) for part in (slice(3, 6), slice(6, 9)))
+    facts = plan.facts | {"camera": vars(camera), "wrapped": bool(np.isfinite(wrap.axis_depth))}
+    return DetailScene(f"{kind}_{number:02d}", codes, mask, normal, smooth, facts)
+
+
+def _planned(
+    kind: SetKind, number: int, rooms: Sequence[np.ndarray], rng: np.random.Generator, side: int
+) -> _Plan:
+    family = SHAPES[number % len(SHAPES)]
+    mesh = smooth_body(family, rng, 2 * LENGTH / SIDE)
+    chosen = int(rng.integers(len(rooms)))
+    room = _room(rooms[chosen], number % 3 == 0, rng)
+    glossy = rng.random() < 1 / 3
+    gloss = Gloss(rng.uniform(0.03, 0.05), rng.uniform(0.3, 0.5)) if glossy else Gloss(0, 1)
+    facts: dict[str, object] = {
+        "family": family,
+        "room": chosen,
+        "lamps": len(room.lamps),
+        "gloss": [gloss.front, gloss.alpha],
+    }
+    if kind == SetKind.RELIEF:
+        pattern = list(ReliefKind)[number % len(ReliefKind)]
+        degrees, shares = rng.uniform(5, 16), rng.uniform(0.4, 1, 3)
+        slopes = np.tan(np.radians(degrees)) * shares / np.linalg.norm(shares)
+        relief = draw_relief(pattern, tuple(slopes.tolist()), rng, side)
+        facts |= {"pattern": pattern, "slopes": slopes.tolist()}
+        return _Plan(mesh, family, room, gloss, relief, draw_colour(rng), facts)
+    # families and paints have equal periods: later rounds combine them differently
+    paint = list(PrintKind)[(number + number // len(PrintKind)) % len(PrintKind)]
+    colours = draw_print(paint, rng, round(_PRINT_SIDE * side))
+    return _Plan(mesh, family, room, gloss, None, colours, facts | {"pattern": paint})
+
+
+def _room(radiance: np.ndarray, lamps: bool, rng: np.random.Generator) -> Room:
+    """Surroundings of grey mean 1, as a camera's white balance shows them, turned, and lamps."""
+    balanced = radiance / radiance.mean(axis=(0, 1))
+    angles = (rng.uniform(0, 360), rng.normal(0, 8), rng.normal(0, 4))
+    turn = Rotation.from_euler("yxz", angles, degrees=True).as_matrix()
+    made = []
+    for _ in range(int(rng.integers(1, 3)) if lamps else 0):
+        aside, up = rng.uniform(-70, 70), rng.uniform(-5, 65)
+        toward = Rotation.from_euler("yx", (aside, -up), degrees=True).apply((0.0, 0, 1))
+        colour = np.array([1, 1, 1]) + rng.normal(0, 0.05) * np.array([1, 0, -1])
+        power = np.pi * log_uniform(rng, 0.4, 1.5) * colour
+        made.append(Lamp(toward, power, rng.uniform(0.03, 0.2)))
+    return Room(balanced, turn, tuple(made))
+
+
+def _traced(tracer: Tracer, side: int, down: float, right: float) -> Hits:
+    origins, rays = camera_rays(side, np.inf)
+    return tracer.hits(origins + np.array([right, -down, 0]) * (2 / side), rays)
+
+
+def _light(plan: _Plan, tracer: Tracer, side: int, rng: np.random.Generator) -> ReachingLight:
+    coarse = side // _COARSE
+    hits = _traced(tracer, coarse, 0, 0)
+    mask = hits.valid.reshape(coarse, coarse)
+    position, normal = hits.position[hits.valid], facing(hits.normal[hits.valid])
+    return reaching_light(plan.room, tracer, position, normal, mask, rng)
+
+
+def _shaded(
+    plan: _Plan, wrap: Wrap, light: ReachingLight, fields: np.ndarray, hits: Hits, side: int
+) -> np.ndarray:
+    """Light, normals and smooth normals (N, 9) of the hit points."""
+    position, smooth = hits.position[hits.valid], facing(hits.normal[hits.valid])
+    uv, gradient = wrap.at(position)
+    normal, albedo = smooth, plan.paint
+    if plan.relief is not None:
+        slope = np.stack([_sampled(one, uv, side / 2) for one in plan.relief.slope], axis=1)
+        normal = displaced_normals(smooth, gradient, slope)
+    if plan.paint.ndim == 3:
+        middle = plan.paint.shape[0] / 2
+        planes = [_sampled(plan.paint[..., c], uv, middle, order=1) for c in range(3)]
+        albedo = np.clip(np.stack(planes, axis=1), 0.005, 0.95)
+    seen = outgoing_light(light, fields, normal, albedo, plan.gloss, plan.room)
+    return np.concatenate([seen, normal, smooth], axis=1).astype(np.float32)
+
+
+def _sampled(values: np.ndarray, uv: np.ndarray, middle: float, order: int = 3) -> np.ndarray:
+    """Values (N,) of a map that repeats; coordinate 0 is its middle."""
+    places = [uv[:, 1] + middle, uv[:, 0] + middle]
+    return np.asarray(ndimage.map_coordinates(values, places, order=order, mode="grid-wrap"))
+
+
+def _photo(
+    light: np.ndarray, mask: np.ndarray, rng: np.random.Generator
+) -> tuple[np.ndarray, CameraDraw]:
+    """sRGB codes of a photo, on a grey ground."""
+    noise = log_uniform(rng, 0.002, 0.012)
+    camera = CameraDraw(
+        exposure=rng.uniform(0.6, 1.0),
+        blur=rng.uniform(0.3, 0.7),
+        noise=noise,
+        floor=0.2 * noise,
+        sharpness=0.0,
+        contrast=0.0,
+        quality=float(rng.random() < 2 / 3) * rng.uniform(88, 97),
+        subsampled=float(rng.random() < 0.5),
+        clips=1.0,
+    )
+    torch.manual_seed(int(rng.integers(2**31)))
+    ground = light[mask].mean(axis=0) * rng.uniform(0.1, 1.2)
+    filled = np.where(mask[..., None], light, ground)
+    layers = torch.from_numpy(filled).float().permute(2, 0, 1)[None]
+    cover = torch.from_numpy(mask).float()[None, None]
+    values = {name: torch.tensor([value]) for name, value in vars(camera).items()}
+    seen = photographed(layers * exposed(layers, cover, values["exposure"]), cover, values)
+    tones = encoded_srgb(seen[0].permute(1, 2, 0).clamp(0, 1)).numpy()
+    return np.rint(255 * tones).astype(np.uint8), camera
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=2, keepdims=True)
+    return np.asarray(vectors / np.where(length > 0, length, 1), np.float32)

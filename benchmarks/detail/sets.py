@@ -1,0 +1,180 @@
+"""Write the measured sets: photos of bodies with relief, and of smooth bodies with print.
+
+  python -m benchmarks.detail.sets FOLDER --panoramas DIR --part choice|report [--count N]
+
+FOLDER gets `relief_NN` and `print_NN`, each with `photo.png` (the mask in alpha) and `truth.npz`.
+What is there already is kept. Half of the panoramas kept from learning light the bodies of one
+part, half those of the other: methods are chosen on `choice`, figures reported on `report`.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from isc_core.errors import InputError
+from isc_core.io.atomic import new_folder
+from training.world.environments import read_panoramas
+
+from .rendering import DetailScene, SetKind, render
+
+COUNT = 30
+PHOTO, TRUTH, FACTS = "photo.png", "truth.npz", "facts.json"
+_FILES = (TRUTH, PHOTO, FACTS)
+_UNIT = 32767  # components of normals are stored in 16 bits
+
+
+class Part(StrEnum):
+    """What a set is for."""
+
+    CHOICE = "choice"
+    REPORT = "report"
+
+
+@dataclass(frozen=True)
+class Truth:
+    """What is known of a photo.
+
+    Attributes
+    ----------
+    normal : (H, W, 3) float32 ndarray
+        Unit, camera frame (x right, y up, z toward the viewer); 0 outside the mask.
+    smooth : (H, W, 3) float32 ndarray
+        Those of the body without relief.
+    mask : (H, W) ndarray of bool
+    """
+
+    normal: np.ndarray
+    smooth: np.ndarray
+    mask: np.ndarray
+
+
+def bodies_in(folder: Path, kind: SetKind) -> list[Path]:
+    """List the bodies of a set.
+
+    Parameters
+    ----------
+    folder : Path
+    kind : SetKind
+
+    Returns
+    -------
+    list of Path
+        Folders, in order.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    found = sorted(path.parent for path in folder.glob(f"{kind}_*/{TRUTH}"))
+    if not found:
+        raise InputError(f"{folder} has no {kind}_*/{TRUTH}: write it with benchmarks.detail.sets")
+    return found
+
+
+def read_truth(body: Path) -> Truth:
+    """Read the truth of a body.
+
+    Parameters
+    ----------
+    body : Path
+        Its folder.
+
+    Returns
+    -------
+    Truth
+    """
+    with np.load(body / TRUTH, allow_pickle=False) as stored:
+        mask = stored["mask"]
+        pictures = []
+        for name in ("normal", "smooth"):
+            picture = np.zeros((*mask.shape, 3), np.float32)
+            values = stored[name].astype(np.float32)
+            picture[mask] = values / np.linalg.norm(values, axis=1, keepdims=True)
+            pictures.append(picture)
+    return Truth(*pictures, mask)
+
+
+def write_scene(folder: Path, scene: DetailScene) -> None:
+    """Write a body.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the set.
+    scene : DetailScene
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    normals = {
+        name: np.rint(_UNIT * picture[scene.mask]).astype(np.int16)
+        for name, picture in (("normal", scene.normal), ("smooth", scene.smooth))
+    }
+    with new_folder(folder / scene.name, _FILES) as partial:
+        np.savez_compressed(partial / TRUTH, mask=scene.mask, **normals)
+        alpha = np.where(scene.mask, 255, 0).astype(np.uint8)
+        Image.fromarray(np.dstack([scene.codes, alpha])).save(partial / PHOTO)
+        (partial / FACTS).write_text(json.dumps(scene.facts, indent=1), encoding="utf-8")
+
+
+def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> Iterator[str]:
+    """Write the bodies of a set that are not there yet.
+
+    Parameters
+    ----------
+    folder : Path
+    panoramas : Path
+    part : Part
+    count : int, optional
+        Bodies with relief, and as many with print.
+
+    Yields
+    ------
+    str
+        The name of each body written.
+
+    Raises
+    ------
+    InputError
+        If the panoramas cannot be used or the folder cannot be written.
+    """
+    kept = [one.radiance for one in read_panoramas(panoramas, 0) if one.judged]
+    rooms = kept[part == Part.REPORT :: 2]
+    seed = list(Part).index(part)
+    for number in range(count):
+        for kind in SetKind:
+            if (folder / f"{kind}_{number:02d}" / TRUTH).exists():
+                continue
+            scene = render(kind, seed, number, rooms)
+            write_scene(folder, scene)
+            yield scene.name
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path, metavar="FOLDER")
+    parser.add_argument("--panoramas", type=Path, required=True, metavar="DIR")
+    parser.add_argument("--part", type=Part, required=True, choices=list(Part))
+    parser.add_argument("--count", type=int, default=COUNT, help="default: %(default)s")
+    given = parser.parse_args()
+    try:
+        for name in write_set(given.folder, given.panoramas, given.part, given.count):
+            print(name, flush=True)
+    except InputError as error:
+        parser.error(str(error))
+
+
+if __name__ == "__main__":
+    main()
