@@ -12,8 +12,7 @@ front. A displacement h(u, v) along the normal n turns the normal to
 
 which is exact but for the product of h and the curvature, some thousandths here.
 
-Citation: J. F. Blinn (1978), "Simulation of wrinkled surfaces", doi:10.1145/965139.507101;
-C. Loop (1987), "Smooth subdivision surfaces based on triangles" (thesis, University of Utah).
+Citation: J. F. Blinn (1978), "Simulation of wrinkled surfaces", doi:10.1145/965139.507101.
 
 Limits: relief does not move the surface: there are no cast shadows, no parallax and no outline of
 relief. Normals that would turn away from the viewer end at a cosine of `LEAST_COSINE`.
@@ -22,14 +21,13 @@ relief. Normals that would turn away from the viewer end at a cosine of `LEAST_C
 from dataclasses import dataclass
 
 import numpy as np
-import trimesh
 
-from synth.scene.meshes import Mesh, vertex_normals
+from synth.scene.meshes import Mesh
 from synth.shapes import make_shape
 
-SHAPES = ("superquadric", "blobby", "displaced", "lathe", "extruded", "height_field")
+SHAPES = ("superquadric", "blobby", "displaced", "lathe", "extruded")
 LEAST_COSINE = 0.05
-_FLAT = ("extruded", "height_field")  # families that relief is laid on from the front
+_FLAT = ("extruded",)  # families on which relief and paint are laid from the front
 _LEAST_RADIUS = 0.3  # of a coordinate cylinder, half sides of the picture
 
 
@@ -84,7 +82,7 @@ class Wrap:
 
 
 def smooth_body(family: str, rng: np.random.Generator, length: float) -> Mesh:
-    """Make a body whose normals are smooth at the photo's size.
+    """Make a body. Its normals, interpolated between vertices, are smooth at the photo's size.
 
     Parameters
     ----------
@@ -97,14 +95,10 @@ def smooth_body(family: str, rng: np.random.Generator, length: float) -> Mesh:
     Returns
     -------
     Mesh
-        Centred, without texture coordinates.
+        Centred.
     """
     made = make_shape(family, rng).fitted()
-    joined = trimesh.Trimesh(made.vertices, made.faces, process=True, merge_norm=True)
-    finer = joined.subdivide_loop(1)
-    vertices = np.asarray(finer.vertices) * (length / 2)
-    faces = np.asarray(finer.faces)
-    return Mesh(vertices, vertex_normals(vertices, faces), np.zeros((len(vertices), 2)), faces)
+    return Mesh(made.vertices * (length / 2), made.normals, made.uv, made.faces)
 
 
 def draw_wrap(family: str, position: np.ndarray, rng: np.random.Generator, pixel: float) -> Wrap:

@@ -35,6 +35,7 @@ from training.world.environments import smoothed_levels
 _DIRECTIONS = 192
 _OUTSHINES = 0.1  # of all light: such a direction is a lamp
 _RAYS = 8  # to each lamp
+_AT_ONCE = 32  # directions that are traced together
 _FOURTH = np.sqrt(1 / np.pi) * np.array(
     [
         0.75 * np.sqrt(35),
@@ -157,6 +158,7 @@ def harmonics(normal: np.ndarray) -> np.ndarray:
     -------
     (N, 18) ndarray
     """
+    normal = np.asarray(normal)
     x, y, z = normal.T
     x2, y2, z2 = x * x, y * y, z * z
     fourth = [
@@ -202,15 +204,14 @@ def reaching_light(
     toward = sphere_directions(_DIRECTIONS)
     around, lamps = _divided(room, toward)
     lifted = position + LIFT * normal
-    visible = np.stack([_passes(tracer, lifted, one) for one in toward], axis=1)
+    visible = _passing(tracer, lifted, toward)
     weight = (around[:, None] * harmonics(toward)[:, :, None]).reshape(_DIRECTIONS, -1)
     facing = np.clip(normal @ toward.T, 0, None)
     covered = 1 - (visible * facing).sum(1) / facing.sum(1)
     columns = [visible @ weight, covered[:, None]]
     for lamp in lamps:
-        rays = _rays(lamp, rng)
-        seen = np.mean([_passes(tracer, lifted, one) for one in rays], axis=0)
-        columns.append(seen[:, None])
+        seen = _passing(tracer, lifted, _rays(lamp, rng))
+        columns.append(seen.mean(axis=1, keepdims=True))
     values = np.concatenate(columns, axis=1)
     picture = np.zeros((values.shape[1], *mask.shape))
     picture[:, mask] = values.T
@@ -245,7 +246,7 @@ def outgoing_light(
     (N, 3) ndarray
     """
     covered, seen = fields[54], fields[55:]
-    basis = (harmonics(normal) * _COSINE).astype(np.float32)
+    basis = np.asarray(harmonics(normal) * _COSINE, np.float32)
     parts = fields[:54].reshape(18, 3, -1)
     irradiance = np.stack([(basis.T * parts[:, c]).sum(0) for c in range(3)], axis=1)
     irradiance = np.maximum(irradiance, 0.02 * light.mean)
@@ -325,5 +326,11 @@ def _rays(lamp: Lamp, rng: np.random.Generator) -> np.ndarray:
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
-def _passes(tracer: Tracer, origins: np.ndarray, direction: np.ndarray) -> np.ndarray:
-    return ~tracer.blocked(origins, np.broadcast_to(direction, origins.shape), np.inf)
+def _passing(tracer: Tracer, origins: np.ndarray, toward: np.ndarray) -> np.ndarray:
+    """Whether each direction passes the body from each point (points, directions)."""
+    found = []
+    for some in np.array_split(toward, -(-len(toward) // _AT_ONCE)):
+        rays = np.repeat(some, len(origins), axis=0)
+        blocked = tracer.blocked(np.tile(origins, (len(some), 1)), rays, np.inf)
+        found.append(~blocked.reshape(len(some), len(origins)).T)
+    return np.concatenate(found, axis=1)

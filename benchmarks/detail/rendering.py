@@ -26,7 +26,7 @@ from training.world.views import camera_rays
 from .bodies import SHAPES, Wrap, displaced_normals, draw_wrap, facing, smooth_body
 from .lighting import Gloss, Lamp, ReachingLight, Room, outgoing_light, reaching_light
 from .print_maps import PrintKind, draw_colour, draw_print
-from .relief_maps import ReliefKind, ReliefMap, draw_relief
+from .relief_maps import ReliefKind, draw_relief
 
 SIDE, LENGTH = 1024, 860  # pixels: of a photo, and of the object in it
 _COARSE = 8  # photo pixels a pixel of the grid on which light is traced
@@ -75,7 +75,7 @@ class _Plan:
     family: str
     room: Room
     gloss: Gloss
-    relief: ReliefMap | None
+    slope: np.ndarray | None  # spline coefficients (2, side, side) of the relief's slopes
     paint: np.ndarray  # (3,) or a map (side, side, 3)
     facts: dict[str, object]
 
@@ -145,9 +145,9 @@ def _planned(
         slopes = np.tan(np.radians(degrees)) * shares / np.linalg.norm(shares)
         relief = draw_relief(pattern, tuple(slopes.tolist()), rng, side)
         facts |= {"pattern": pattern, "slopes": slopes.tolist()}
-        return _Plan(mesh, family, room, gloss, relief, draw_colour(rng), facts)
-    # families and paints have equal periods: later rounds combine them differently
-    paint = list(PrintKind)[(number + number // len(PrintKind)) % len(PrintKind)]
+        slope = np.stack([ndimage.spline_filter(one, mode="grid-wrap") for one in relief.slope])
+        return _Plan(mesh, family, room, gloss, slope, draw_colour(rng), facts)
+    paint = list(PrintKind)[number % len(PrintKind)]
     colours = draw_print(paint, rng, round(_PRINT_SIDE * side))
     return _Plan(mesh, family, room, gloss, None, colours, facts | {"pattern": paint})
 
@@ -187,8 +187,8 @@ def _shaded(
     position, smooth = hits.position[hits.valid], facing(hits.normal[hits.valid])
     uv, gradient = wrap.at(position)
     normal, albedo = smooth, plan.paint
-    if plan.relief is not None:
-        slope = np.stack([_sampled(one, uv, side / 2) for one in plan.relief.slope], axis=1)
+    if plan.slope is not None:
+        slope = np.stack([_sampled(one, uv, side / 2, order=3) for one in plan.slope], axis=1)
         normal = displaced_normals(smooth, gradient, slope)
     if plan.paint.ndim == 3:
         middle = plan.paint.shape[0] / 2
@@ -198,10 +198,11 @@ def _shaded(
     return np.concatenate([seen, normal, smooth], axis=1).astype(np.float32)
 
 
-def _sampled(values: np.ndarray, uv: np.ndarray, middle: float, order: int = 3) -> np.ndarray:
-    """Values (N,) of a map that repeats; coordinate 0 is its middle."""
+def _sampled(values: np.ndarray, uv: np.ndarray, middle: float, order: int) -> np.ndarray:
+    """Values (N,) of a map that repeats, given by spline coefficients; 0 is its middle."""
     places = [uv[:, 1] + middle, uv[:, 0] + middle]
-    return np.asarray(ndimage.map_coordinates(values, places, order=order, mode="grid-wrap"))
+    found = ndimage.map_coordinates(values, places, order=order, mode="grid-wrap", prefilter=False)
+    return np.asarray(found)
 
 
 def _photo(

@@ -115,12 +115,10 @@ def write_scene(folder: Path, scene: DetailScene) -> None:
     InputError
         If it cannot be written.
     """
-    normals = {
-        name: np.rint(_UNIT * picture[scene.mask]).astype(np.int16)
-        for name, picture in (("normal", scene.normal), ("smooth", scene.smooth))
-    }
+    normals = {"normal": scene.normal, "smooth": scene.smooth}
+    coded = {name: np.rint(_UNIT * p[scene.mask]).astype(np.int16) for name, p in normals.items()}
     with new_folder(folder / scene.name, _FILES) as partial:
-        np.savez_compressed(partial / TRUTH, mask=scene.mask, **normals)
+        np.savez(partial / TRUTH, mask=scene.mask, **coded)
         alpha = np.where(scene.mask, 255, 0).astype(np.uint8)
         Image.fromarray(np.dstack([scene.codes, alpha])).save(partial / PHOTO)
         (partial / FACTS).write_text(json.dumps(scene.facts, indent=1), encoding="utf-8")
