@@ -165,15 +165,15 @@ def base_angle(estimated: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> fl
     return float(np.degrees(np.median(np.arccos(np.clip(cosine, -1, 1)))))
 
 
-def at_size(normal: np.ndarray, inside: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def at_size(normal: np.ndarray, inside: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """Bring normals of a smaller or larger grid to a photo's.
 
     Parameters
     ----------
     normal : (h, w, 3) ndarray
     inside : (h, w) ndarray of bool
-    shape : (int, int)
-        Of the photo.
+    shape : tuple of int
+        (H, W) of the photo.
 
     Returns
     -------

@@ -144,7 +144,8 @@ def measured(
                 estimated = estimator(body, truth)
                 seconds = time.perf_counter() - start
                 found = judge(estimated, truth.normal, truth.mask, truth.smooth)
-                row = {"key": key, "body": body.name, "seconds": seconds, **asdict(found)}
+                figures = {name: np.asarray(one).tolist() for name, one in asdict(found).items()}
+                row = {"key": key, "body": body.name, "seconds": seconds, **figures}
                 append_row(rows, row)
                 earlier[body.name] = row
             yield earlier[body.name]
@@ -203,8 +204,8 @@ def _settings(assignments: Sequence[str]) -> Settings:
         name, separator, value = assignment.partition("=")
         if not separator or name not in types:
             raise InputError(f"--set {assignment}: give NAME=VALUE, NAME one of {', '.join(types)}")
-        number = value in ("1", "true", "yes") if types[name] is bool else types[name](value)
-        found = replace(found, **{name: number})
+        changed: Any = value in ("1", "true", "yes") if types[name] is bool else types[name](value)
+        found = replace(found, **{name: changed})
     return found
 
 

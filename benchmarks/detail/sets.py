@@ -98,7 +98,7 @@ def read_truth(body: Path) -> Truth:
             values = stored[name].astype(np.float32)
             picture[mask] = values / np.linalg.norm(values, axis=1, keepdims=True)
             pictures.append(picture)
-    return Truth(*pictures, mask)
+    return Truth(pictures[0], pictures[1], mask)
 
 
 def write_scene(folder: Path, scene: DetailScene) -> None:
