@@ -19,6 +19,7 @@ _TYPES: dict[str, type] = {
     "camera": str,
     "max_size": int,
     "full_size": bool,
+    "detail": int,
     "shading_only": bool,
     "seed": int,
     "transfer": str,

@@ -17,22 +17,24 @@ Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from sha
 1990, doi:10.1007/BF00054993.
 
 Limits: relief is where the light from SIRFS says; where that light is from the wrong side, dents
-become bumps. One tile of some rows is seen at a time, so memory is bounded by the maps' own.
+become bumps. The network sees one tile at a time, so memory is bounded by the maps' own.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..imaging.bounding_box import mask_slices
-from ..networks.detail_network import MULTIPLE, DetailNetwork, band, predict_relief, raised
+from ..networks.detail_network import MULTIPLE, DetailNetwork, predict_relief, raised
 from ..networks.layers import average_pool
 from ..progress import Monitor
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
+from .task import DecompositionTask, SceneEstimate
 
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _MARGIN = 16
 _STEP = 0.02  # of slopes, for the derivative of shading
+_TILE, _HALO = 768, 64  # pixels, multiples of the network's `MULTIPLE`
 
 
 @dataclass(frozen=True)
@@ -52,15 +54,55 @@ class Level:
     mask: np.ndarray
     height: np.ndarray
 
+    @property
+    def mean(self) -> float:
+        """Mean light of the object."""
+        return max(float(self.image[self.mask].mean(dtype=float)), 1e-9)
+
     def halved(self) -> "Level":
         """Return the next coarser level; sides are even."""
-        share = average_pool(self.mask[..., None].astype(float))[..., 0]
+        share = average_pool(self.mask[..., None].astype(np.float32))[..., 0]
         image = average_pool(np.where(self.mask[..., None], self.image, 0))
         return Level(
             image / np.maximum(share, 1e-9)[..., None],
             share >= 0.5,
             average_pool(self.height[..., None])[..., 0] / 2,
         )
+
+
+def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneEstimate:
+    """Add the relief that the photo of the maps shows to an estimate's height.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings. Where the shape is known or was measured, it stays as it is.
+    estimate : SceneEstimate
+        What a model recovered.
+
+    Returns
+    -------
+    SceneEstimate
+
+    Raises
+    ------
+    Cancelled
+        If the monitor cancels.
+    """
+    known = task.known
+    if not task.settings.detail or known.height is not None or known.depth is not None:
+        return estimate
+    with task.clock.stage("fine relief"):
+        relief = fine_relief(
+            estimate.split.diffuse,
+            task.maps.mask,
+            estimate.height,
+            estimate.light,
+            task.settings.detail,
+            task.monitor.part(0.96, 0.98),
+            task.options.detail_network,
+        )
+    return replace(estimate, height=estimate.height + relief)
 
 
 def fine_relief(
@@ -106,21 +148,46 @@ def fine_relief(
     levels = [_framed(diffuse, mask, height, MULTIPLE << count)]
     for _ in range(count):
         levels.append(levels[-1].halved())
-    relief = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape))
+    relief = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
     for k, level in zip(range(count, -1, -1), levels[::-1], strict=True):
         monitor.report("fine relief", 1 - (k + 1) / (count + 1))
         relief = 2 * raised(relief)
         if length / 2**k <= finest:
-            slope = slopes(level.height)
-            relief += predict_relief(
-                level.image, level.mask, slope, shading_gain(slope, light), network
-            )
-    out = np.zeros(mask.shape)
-    top, left = _MARGIN, _MARGIN
-    out[rows, columns] = relief[
-        top : top + rows.stop - rows.start, left : left + columns.stop - columns.start
-    ]
+            relief += _band(level, light, network)
+    rows_inside = slice(_MARGIN, _MARGIN + rows.stop - rows.start)
+    columns_inside = slice(_MARGIN, _MARGIN + columns.stop - columns.start)
+    out = np.zeros(mask.shape, np.float32)
+    out[rows, columns] = relief[rows_inside, columns_inside]
     return np.where(mask, out, 0)
+
+
+def _band(level: Level, light: np.ndarray, network: DetailNetwork | None) -> np.ndarray:
+    """The band (h, w) of a level, tile by tile; tiles overlap by what the network looks at."""
+    height, width = level.mask.shape
+    band = np.zeros((height, width), np.float32)
+    for top in range(0, height, _TILE):
+        for left in range(0, width, _TILE):
+            inner = slice(top, min(top + _TILE, height)), slice(left, min(left + _TILE, width))
+            if not level.mask[inner].any():
+                continue
+            outer = tuple(
+                slice(max(one.start - _HALO, 0), min(one.stop + _HALO, size))
+                for one, size in zip(inner, (height, width), strict=True)
+            )
+            slope = slopes(level.height[outer])
+            found = predict_relief(
+                level.image[outer] / level.mean,
+                level.mask[outer],
+                slope,
+                shading_gain(slope, light),
+                network,
+            )
+            own = tuple(
+                slice(one.start - wide.start, one.stop - wide.start)
+                for one, wide in zip(inner, outer, strict=True)
+            )
+            band[inner] = found[own]
+    return band
 
 
 def slopes(height: np.ndarray) -> np.ndarray:
@@ -176,7 +243,7 @@ def _framed(diffuse: np.ndarray, mask: np.ndarray, height: np.ndarray, multiple:
         (_MARGIN, _MARGIN + (-(one.stop - one.start + 2 * _MARGIN)) % multiple) for one in box
     ]
     return Level(
-        np.pad(np.where(mask[..., None], diffuse, 0)[box], [*pads, (0, 0)]),
+        np.pad(np.where(mask[box][..., None], diffuse[box], 0).astype(np.float32), [*pads, (0, 0)]),
         np.pad(mask[box], pads),
-        np.pad(height[box], pads, mode="edge"),
+        np.pad(height[box], pads, mode="edge").astype(np.float32),
     )

@@ -13,6 +13,7 @@ from dataclasses import replace
 from functools import partial
 
 from .assumption_checks import with_warnings
+from .detail import with_fine_relief
 from .light_colour import under_given_light, under_light
 from .predictions import with_predictions
 from .settings import SIRFS_MODELS, Settings
@@ -55,6 +56,7 @@ def _solved(
     """Predict, solve and check."""
     task = with_predictions(task)
     estimate = replace(under_light(task, solver), prediction=task.prediction)
+    estimate = with_fine_relief(task, estimate)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, task.prediction)

@@ -43,6 +43,8 @@ __all__ = [
 
 # Memory of the solver at its peak, measured for objects of 200 to 900 pixels.
 _SOLVER_BYTES, _BYTES_A_PIXEL = 250_000_000, 400
+WORKING_SIZE = 512  # long side of the object, pixels
+_THINNEST = 12  # pixels
 _PACKAGES = ("numpy", "scipy", "numba")
 
 
@@ -75,7 +77,7 @@ def decompose(
     Returns
     -------
     Decomposition
-        Maps at the working scale, see `Settings.max_size` and `Settings.full_size`.
+        Maps of the size that the settings say, see `Settings.max_size`.
 
     Raises
     ------
@@ -95,8 +97,8 @@ def decompose(
     known_shape = inputs.height is not None or inputs.depth is not None
     photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
-        working = photo.resized_to_object(settings.max_size)
-        maps = photo if settings.full_size else working
+        maps = photo.resized_to_object(0 if settings.full_size else settings.max_size)
+        working = maps if known_shape else _working(photo, maps)
         constraints = _at_scale(inputs, photo, working)
         if not share_in_blocks(maps.mask):
             raise InputError(
@@ -112,7 +114,7 @@ def decompose(
         estimate = solve(
             DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
         )
-    monitor.report("maps", 0.96)
+    monitor.report("maps", 0.98)
     provenance = Provenance(
         _settings_json(settings),
         settings.seed,
@@ -126,6 +128,15 @@ def decompose(
         if estimate.prediction is None or inputs.height is not None:
             return result
         return with_expected_error(result, estimate.prediction, working)
+
+
+def _working(photo: Photo, maps: Photo) -> Photo:
+    """The photo at the scale at which shape and light are recovered, whatever the maps' is."""
+    longest, thinnest = max(photo.box[2:]), min(photo.box[2:])
+    if thinnest * WORKING_SIZE < _THINNEST * longest:
+        return maps
+    working = photo.resized_to_object(WORKING_SIZE)
+    return maps if working.scale == maps.scale else working
 
 
 def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | None) -> None:

@@ -126,6 +126,7 @@ _RENAMED: dict[str, dict[str, str]] = {
 }
 
 
+MOST_DETAIL = 4096
 _MOST_COLOUR = 100.0  # strongest over weakest channel of a light: candles have less than 10
 
 
@@ -173,10 +174,13 @@ class Settings:
     illumination : Illumination or str
         The kind of photo.
     max_size : int
-        Long side of the object, pixels, at which the maps are made; 0 for the photo's. SIRFS is
-        solved at a size of its own, `recover.SOLVE_SIZE`.
+        Long side of the object, pixels, at which the maps are made; 0 for the photo's. The overall
+        shape and the light do not depend on it, see `recover.SOLVE_SIZE`.
     full_size : bool
-        The maps are brought to the photo's resolution.
+        The maps have the photo's resolution, as with a `max_size` of 0.
+    detail : int
+        For `SIRFS_MODELS`: long side of the object, pixels, at which the finest relief is looked
+        for, see `decomposition.detail`; 0 for the overall shape alone.
     engine : str
         "auto", "numba" or "numpy", see `SolverOptions`.
     threads : int
@@ -201,8 +205,9 @@ class Settings:
     model: str = "joint"
     separator: str = BEST
     illumination: str = Illumination.PHOTO
-    max_size: int = 512
+    max_size: int = 1024
     full_size: bool = False
+    detail: int = 1024
     engine: str = "auto"
     threads: int = 0
     seed: int = 0
@@ -295,6 +300,11 @@ class Settings:
             raise InputError(
                 f'unknown camera "{self.camera}": choose {", ".join(CameraChoice)}, or a focal '
                 f"length of {SHORTEST_35MM:g} to {LONGEST_35MM:g} (mm, 35-mm equivalent)"
+            )
+        if not 0 <= self.detail <= MOST_DETAIL:
+            raise InputError(
+                f"--detail {self.detail}: give the long side of the object in pixels, at most "
+                f"{MOST_DETAIL}, or 0 for the overall shape alone"
             )
         if self.max_size < 0 or self.threads < 0:
             raise InputError(

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..networks.detail_network import DetailNetwork
 from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
@@ -80,6 +81,8 @@ class SolveOptions:
         even where it is not used.
     scene_network : SceneNetwork or None
         What looks at the photo; None for the shipped network.
+    detail_network : DetailNetwork or None
+        What tells fine relief from paint; None for the shipped network.
     prediction_weights : PredictionWeights or None
         How far predicted normals, shading and light coefficients are trusted; None: as usual in
         the illumination.
@@ -95,6 +98,7 @@ class SolveOptions:
     fit_lobe: bool = True
     check_assumptions: bool = True
     scene_network: SceneNetwork | None = None
+    detail_network: DetailNetwork | None = None
     prediction_weights: PredictionWeights | None = None
     light_colour_weight: LightColourWeight = BALANCED_LIGHT
 

@@ -98,6 +98,7 @@ class RunnerOptions:
             self.separator,
             illumination,
             full_size=users,
+            detail=Settings.detail if users else 0,
             engine=self.engine,
             threads=self.threads,
             confidence_weights=self.confidence_weights,

@@ -29,16 +29,23 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .layers import average_pool, conv_block, convolved, is_chain
+from .layers import (
+    average_pool,
+    conv_block,
+    convolved,
+    depth_to_space,
+    is_chain,
+    space_to_depth,
+)
 from .loader import Network, Parameters
 
 INPUTS = 11
-LEVELS = 4
-MULTIPLE = 2 ** (LEVELS - 1)  # sides of the network's frame
+LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
+MULTIPLE = BLOCK * 2 ** (LEVELS - 1)  # sides of the network's frame
 DARK = 0.01  # of the mean light
-_COARSE = 8  # pixels: low frequencies are averages of so many
+COARSE = 8  # pixels: low frequencies are averages of so many
 WEAK = 0.15  # a gain below which slopes are not told
-_STEEPEST = 3.0  # slopes and gains are bounded by it
+STEEPEST = 3.0  # slopes and gains are bounded by it
 HEIGHT_UNIT = 0.5  # pixels of height: a unit of the network's output
 
 
@@ -71,7 +78,7 @@ class DetailNetwork(Network):
             return False
         down = 2 * LEVELS
         wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), INPUTS
+        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * INPUTS
         for width in wide:
             shapes += [(9, inputs, width), (9, width, width)]
             inputs = width
@@ -79,7 +86,7 @@ class DetailNetwork(Network):
             width = up.shape[-1]
             shapes += [(9, skip + inputs, width), (9, width, width)]
             inputs = width
-        return is_chain(self.weights, self.biases, [*shapes, (9, inputs, 1)])
+        return is_chain(self.weights, self.biases, [*shapes, (9, inputs, BLOCK**2)])
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "DetailNetwork":
@@ -115,7 +122,7 @@ class DetailNetwork(Network):
             Heights, pixels toward the viewer, before `band`.
         """
         steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, skips = channels, []
+        layer, skips = space_to_depth(channels, BLOCK), []
         for level in range(LEVELS):
             layer = conv_block(average_pool(layer) if level else layer, steps)
             skips.append(layer)
@@ -123,7 +130,7 @@ class DetailNetwork(Network):
             layer = conv_block(
                 np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
             )
-        return np.asarray(HEIGHT_UNIT * convolved(layer, *next(steps))[..., 0])
+        return HEIGHT_UNIT * depth_to_space(convolved(layer, *next(steps)), BLOCK)[..., 0]
 
 
 def predict_relief(
@@ -138,7 +145,7 @@ def predict_relief(
     Parameters
     ----------
     image : (H, W, 3) ndarray
-        Linear diffuse light; sides are multiples of `MULTIPLE`.
+        Linear diffuse light over the object's mean; sides are multiples of `MULTIPLE`.
     mask : (H, W) bool ndarray
         The object.
     slope : (H, W, 2) ndarray
@@ -204,7 +211,7 @@ def channels_of(
     Parameters
     ----------
     image : (H, W, 3) ndarray
-        Linear; sides are multiples of `MULTIPLE`.
+        Linear, over the object's mean; sides are multiples of `MULTIPLE`.
     mask : (H, W) bool ndarray
     slope, gain : (H, W, 2) ndarray
         See `predict_relief`.
@@ -218,17 +225,16 @@ def channels_of(
     """
     inside = mask.astype(np.float32)
     light = np.where(mask[..., None], image, 0).astype(np.float32)
-    mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
-    log_light = np.log(light / np.float32(mean) + np.float32(DARK))
+    log_light = np.log(light + np.float32(DARK))
     parts = [log_light.mean(axis=2), *(log_light[..., c] - log_light[..., 1] for c in (0, 2))]
     share = _blocks(inside)
     cover = _spread(share)
     low = [_spread(_blocks(part * inside)) / np.maximum(cover, 1e-6) for part in parts]
     p, q = slope[..., 0], slope[..., 1]
     length = np.sqrt(1 + p * p + q * q)
-    bound = np.clip(gain, -_STEEPEST, _STEEPEST)
+    bound = np.clip(gain, -STEEPEST, STEEPEST)
     change = (parts[0] - low[0]) / ((bound * bound).sum(axis=2) + WEAK**2)
-    least = np.clip(bound * change[..., None], -_STEEPEST, _STEEPEST)
+    least = np.clip(bound * change[..., None], -STEEPEST, STEEPEST)
     channels = [
         *(part - smooth for part, smooth in zip(parts, low, strict=True)),
         low[0],
@@ -245,10 +251,10 @@ def channels_of(
 
 def _blocks(values: np.ndarray) -> np.ndarray:
     rows, columns = values.shape
-    return values.reshape(rows // _COARSE, _COARSE, columns // _COARSE, _COARSE).mean(axis=(1, 3))
+    return values.reshape(rows // COARSE, COARSE, columns // COARSE, COARSE).mean(axis=(1, 3))
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
-    for _ in range(LEVELS - 1):
+    for _ in range(COARSE.bit_length() - 1):
         values = raised(values)
     return values

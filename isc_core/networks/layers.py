@@ -18,6 +18,7 @@ import numpy as np
 
 DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
+_BLOCK_BYTES = 16_000_000  # of neighbourhoods at a time
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
@@ -170,7 +171,7 @@ def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
 
 
 def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """Convolve with a 3 x 3 kernel and zero padding, as one matrix product of all neighbourhoods.
+    """Convolve with a 3 x 3 kernel and zero padding, as matrix products of neighbourhoods.
 
     Both factors are rounded to whole multiples of a power of two, small enough for doubles to hold
     every sum of their products exactly: the order of summation, which libraries choose by the
@@ -187,22 +188,28 @@ def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.nda
     (H, W, D) float32 ndarray
     """
     rows, columns, channels = layer.shape
-    (integers, layer_step), (kernel, kernel_step) = _as_integers(layer), _as_integers(weight)
-    padded = np.pad(integers, ((1, 1), (1, 1), (0, 0)))
-    neighbourhoods = np.stack(
-        [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2
-    )
-    sums = neighbourhoods.reshape(-1, 9 * channels) @ kernel.reshape(-1, weight.shape[2])
-    return (sums * (layer_step * kernel_step) + bias).astype(np.float32).reshape(rows, columns, -1)
+    layer_step, kernel_step = _step_of(layer), _step_of(weight)
+    kernel = np.rint(weight.astype(np.float64) / kernel_step).reshape(-1, weight.shape[2])
+    padded = np.pad(layer, ((1, 1), (1, 1), (0, 0)))
+    out = np.empty((rows, columns, weight.shape[2]), np.float32)
+    height = max(1, _BLOCK_BYTES // (72 * channels * columns))
+    for top in range(0, rows, height):
+        count = min(height, rows - top)
+        block = np.rint(padded[top : top + count + 2] / layer_step)
+        neighbourhoods = np.stack(
+            [block[i : i + count, j : j + columns] for i in range(3) for j in range(3)], axis=2
+        )
+        sums = neighbourhoods.reshape(-1, 9 * channels) @ kernel
+        out[top : top + count] = (sums * (layer_step * kernel_step) + bias).reshape(
+            count, columns, -1
+        )
+    return out
 
 
-def _as_integers(values: np.ndarray) -> tuple[np.ndarray, float]:
-    """`values` as integer multiples (float64), at most 2^20, of a step; and the step, a power of
-    two.
-    """
+def _step_of(values: np.ndarray) -> float:
+    """A power of two of which the values are at most 2^20 multiples."""
     most = float(np.abs(values).max())
-    step = 2.0 ** (np.ceil(np.log2(most)) - _BITS) if most > 0 else 1.0
-    return np.rint(values.astype(np.float64) / step), step
+    return float(2.0 ** (np.ceil(np.log2(most)) - _BITS)) if most > 0 else 1.0
 
 
 def softmax(score: np.ndarray) -> np.ndarray:

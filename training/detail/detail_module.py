@@ -16,13 +16,20 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.networks.detail_network import DARK, HEIGHT_UNIT, INPUTS, LEVELS, WEAK
+from isc_core.networks.detail_network import (
+    BLOCK,
+    COARSE,
+    DARK,
+    HEIGHT_UNIT,
+    INPUTS,
+    STEEPEST,
+    WEAK,
+)
 
 from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
 from ..world.tensor_batch import TensorBatch
 
-DOWN, UP = (16, 32, 48, 64), (48, 32, 16)
-_COARSE, _STEEPEST = 8, 3.0
+DOWN, UP = (32, 48, 64), (48, 32)
 _SLOPE = 0.05  # e
 
 
@@ -37,13 +44,13 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
 
     def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
         super().__init__()
-        fine = (INPUTS, *down[:-1])
+        fine = (BLOCK**2 * INPUTS, *down[:-1])
         self.down = nn.ModuleList([Block(i, o) for i, o in zip(fine, down, strict=True)])
         below = (down[-1], *up[:-1])
         self.up = nn.ModuleList(
             [Block(skip + i, o) for skip, i, o in zip(down[-2::-1], below, up, strict=True)]
         )
-        self.out = nn.Conv2d(up[-1], 1, 3, padding=1)
+        self.out = nn.Conv2d(up[-1], BLOCK**2, 3, padding=1)
         nn.init.zeros_(self.out.bias)
         self.out.weight.data *= 0.1
         self.to(memory_format=torch.channels_last)
@@ -61,7 +68,8 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
         (B, 1, H, W) tensor
             Heights, before `band_of`.
         """
-        layer, skips = inputs.contiguous(memory_format=torch.channels_last), []
+        layer, skips = functional.pixel_unshuffle(inputs, BLOCK), []
+        layer = layer.contiguous(memory_format=torch.channels_last)
         with torch.autocast(inputs.device.type, torch.bfloat16, enabled=self.training):
             for level, block in enumerate(self.down):
                 layer = block(functional.avg_pool2d(layer, 2) if level else layer)
@@ -69,7 +77,7 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
             for block, skip in zip(self.up, skips[-2::-1], strict=True):
                 finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
                 layer = block(torch.cat([skip, finer], 1))
-            return HEIGHT_UNIT * self.out(layer).float()
+            return HEIGHT_UNIT * functional.pixel_shuffle(self.out(layer), BLOCK).float()
 
     def matrices(self) -> list[nn.Parameter]:
         """Return the weights of the blocks."""
@@ -97,10 +105,13 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
         loss = (error / (energy + _SLOPE**2)).mean()
         with torch.no_grad():
             has = energy > 1e-6
+            count = has.float().sum().clamp(min=1)
+            ratio = torch.where(has, error / energy.clamp(min=1e-9), 0)
+            false = torch.where(has, 0, error).sum() / (~has).float().sum().clamp(min=1)
             terms = {
-                "left": error[has].sum() / energy[has].sum().clamp(min=1e-9),
-                "each": (error[has] / energy[has]).clamp(max=2).mean(),
-                "false": error[~has].mean().sqrt(),
+                "left": (error * has).sum() / (energy * has).sum().clamp(min=1e-9),
+                "each": ratio.clamp(max=2).sum() / count,
+                "false": false.sqrt(),
             }
         return loss, terms
 
@@ -152,25 +163,23 @@ def network_channels(batch: TensorBatch) -> torch.Tensor:
     """
     photo, mask = batch.photo, batch.mask  # type: ignore[attr-defined]
     slope, gain = batch.slope, batch.gain  # type: ignore[attr-defined]
-    light = photo * mask
-    mean = light.sum((1, 2, 3), keepdim=True) / (3 * mask.sum((1, 2, 3), keepdim=True)).clamp(min=1)
-    log_light = torch.log(light / mean.clamp(min=1e-9) + DARK)
+    log_light = torch.log(photo * mask + DARK)
     parts = torch.cat(
         [log_light.mean(1, keepdim=True), log_light[:, ::2] - log_light[:, 1:2]], 1
     )
     cover = _low(mask)
     low = _low(parts * mask) / cover.clamp(min=1e-6)
     length = torch.sqrt(1 + slope.square().sum(1, keepdim=True))
-    bound = gain.clamp(-_STEEPEST, _STEEPEST)
+    bound = gain.clamp(-STEEPEST, STEEPEST)
     change = (parts - low)[:, :1] / (bound.square().sum(1, keepdim=True) + WEAK**2)
-    least = (bound * change).clamp(-_STEEPEST, _STEEPEST)
+    least = (bound * change).clamp(-STEEPEST, STEEPEST)
     ones = torch.ones_like(mask)
     return torch.cat([parts - low, low[:, :1], ones, -slope / length, bound, least], 1) * mask
 
 
 def _low(values: torch.Tensor) -> torch.Tensor:
-    values = functional.avg_pool2d(values, _COARSE)
-    for _ in range(LEVELS - 1):
+    values = functional.avg_pool2d(values, COARSE)
+    for _ in range(COARSE.bit_length() - 1):
         values = functional.interpolate(
             values, scale_factor=2, mode="bilinear", align_corners=False
         )

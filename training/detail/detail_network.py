@@ -44,7 +44,7 @@ def main() -> None:
     side, count = arguments.side, arguments.reliefs
     fit(
         DetailNetworkModule(),
-        Patches(options.seed, options.batch, side, count, uses=2),
+        Patches(options.seed, options.batch, side, count, uses=4),
         replace(SCHEDULE, rate=arguments.rate),
         options,
         Patches(options.seed + _HELD_OUT, options.batch, side, max(count // 5, 1)),

@@ -44,7 +44,7 @@ class Patch(TensorBatch):
     Attributes
     ----------
     photo : (B, 3, H, W) tensor
-        Linear.
+        Linear, over the mean of an object that is brighter or darker than the patch.
     mask : (B, 1, H, W) tensor
     slope : (B, 2, H, W) tensor
         What is known of the smooth surface: dz/dx, dz/dy, x right, y down.
@@ -122,7 +122,7 @@ class Patches:
 
     def _fresh(self, rng: np.random.Generator) -> Patch:
         kind = rng.random(self._batch)
-        has_relief, has_print = kind < 0.6, (kind > 0.4) & (kind < 0.9)
+        has_relief, has_print = kind < 0.65, (kind > 0.5) & (kind < 0.93)
         fine = FINE * self._side
         base, base_slope = _bodies(rng, self._batch, fine)
         which = rng.integers(0, len(self._reliefs), self._batch)
@@ -186,6 +186,9 @@ def _patch(
     height = functional.avg_pool2d(relief, FINE) / FINE
     known_slope = slope + _smooth_noise(rng, slope, 0.25)
     known = _bent(rng, _gain(light, slope))
+    mean = photo.sum((1, 2, 3)) / (3 * mask.sum((1, 2, 3))).clamp(min=1)
+    level = torch.from_numpy(np.exp(rng.normal(0, 0.5, len(photo)))).float()
+    photo = photo * (level / mean.clamp(min=1e-6))[:, None, None, None]
     return Patch(photo, mask, known_slope, known, band_of(height))
 
 
@@ -267,7 +270,7 @@ def _gain(light: _Light, slope: torch.Tensor, step: float = 0.02) -> torch.Tenso
 def _bent(rng: np.random.Generator, gain: torch.Tensor) -> torch.Tensor:
     """`gain` as well as an estimated light knows it: turned, too strong or weak, biased."""
     count = len(gain)
-    spread = rng.choice([0.1, 0.35, 0.6], count)
+    spread = rng.choice([0.1, 0.25, 0.5], count)
     angle = torch.from_numpy(rng.normal(0, spread)).float()[:, None, None]
     size = torch.from_numpy(np.exp(rng.normal(0, 0.4, count))).float()[:, None, None]
     c, s = size * torch.cos(angle), size * torch.sin(angle)

@@ -8,6 +8,7 @@ from pathlib import Path
 from ...batch.names import safe_name
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError, Rejected
+from ...imaging.bounding_box import mask_box
 from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
@@ -204,6 +205,7 @@ def _decompose_photo(
         options,
         *reading_note_lines(photo.original.notes),
         *note_lines(result.provenance.diagnostics),
+        *_detail_notes(settings, max(mask_box(result.mask)[2:])),
         *((f"note: {CROPPED}",) if photo.original.cropped and settings.camera == "auto" else ()),
         *(show(preview) if options.open else ()),
         f"see {preview}",
@@ -293,6 +295,14 @@ def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:
         depth_sigma=options.depth_sigma,
         depth_weight=options.depth_weight,
     )
+
+
+def _detail_notes(settings: Settings, length: int) -> tuple[str, ...]:
+    """What to say where finer relief was asked for than maps with an object so long can hold."""
+    if settings.detail <= max(length, Settings.detail):
+        return ()
+    remedy = "the photo has no more" if settings.max_size == 0 else "use --max-size 0 for more"
+    return (f"note: the object is {length} pixels long in the maps, not {settings.detail}: {remedy}",)
 
 
 def _pixels(photo: Photo, settings: Settings) -> int:

@@ -133,7 +133,8 @@ def limits_of(options: argparse.Namespace) -> Limits:
 
 
 def add_main_settings(group: Group) -> None:
-    """Add the settings that users change most: --model, --max-size, --full-size, --arrays.
+    """Add the settings that users change most: --model, --max-size, --full-size, --detail,
+    --arrays.
 
     Parameters
     ----------
@@ -155,7 +156,15 @@ def add_main_settings(group: Group) -> None:
         help="long side of the object in the maps, in pixels (default %(default)s; 0: the photo's)",
     )
     group.add_argument(
-        "--full-size", action="store_true", help="upsample the result to the photo's resolution"
+        "--full-size", action="store_true", help="maps of the photo's size, as --max-size 0"
+    )
+    group.add_argument(
+        "--detail",
+        type=count,
+        default=defaults.detail,
+        metavar="N",
+        help="long side of the object at which the finest relief is looked for, in pixels "
+        "(default %(default)s; 0: the overall shape alone)",
     )
     group.add_argument(
         "--arrays",
