@@ -34,7 +34,7 @@ from .reliefs import draw_reliefs
 FINE = 2  # fine pixels a pixel, each way
 _LAMPS = 3
 _POOL = 512
-_NOISE = 0.4  # of the camera's, which is drawn for photos as small as a network's
+_NOISE = 0.2  # of the camera's, which is drawn for photos as small as a network's
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,11 @@ class Patches:
 
     def _fresh(self, rng: np.random.Generator) -> Patch:
         kind = rng.random(self._batch)
-        has_relief, has_print = kind < 0.65, (kind > 0.5) & (kind < 0.93)
+        has_relief, has_print = kind < 0.7, (kind > 0.52) & (kind < 0.95)
         fine = FINE * self._side
         base, base_slope = _bodies(rng, self._batch, fine)
         which = rng.integers(0, len(self._reliefs), self._batch)
-        amount = [log_uniform(rng, 0.05, 1.0) * bool(one) for one in has_relief]
+        amount = [log_uniform(rng, 0.08, 1.0) * bool(one) for one in has_relief]
         relief = _unit(self._cut(rng, self._reliefs[which], fine)) * _column(amount)
         light, normal = _light(rng, self._batch), _normals(_slopes(base + relief))
         albedo = self._paint(rng, has_print, relief, fine)
