@@ -7,9 +7,9 @@ for down to about the solver's size. With the height Z of SIRFS, the light's log
 detail network's band b_k of level k (`networks.detail_network`),
 
     R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k)
-    height = Z + R_0
+    height = Z + a R_0
 
-each in the pixels of its level. The light and what an image of half the solver's size can hold of
+each in the pixels of its level; a is what the whole object says of relief (`relief_evidence`). The light and what an image of half the solver's size can hold of
 the shape do not change, since each band is without what the next coarser level can hold.
 
 Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
@@ -29,9 +29,11 @@ from ..networks.detail_network import MULTIPLE, DetailNetwork, predict_relief, r
 from ..networks.layers import average_pool
 from ..progress import Monitor
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
+from .relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from .task import DecompositionTask, SceneEstimate
 
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
+_TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
 _STEP = 0.02  # of slopes, for the derivative of shading
 _TILE, _HALO = 768, 64  # pixels, multiples of the network's `MULTIPLE`
@@ -43,31 +45,24 @@ class Level:
 
     Attributes
     ----------
-    image : (h, w, 3) ndarray
+    image : (h, w, 3) float32 ndarray
         Linear diffuse light.
     mask : (h, w) bool ndarray
-    height : (h, w) ndarray
-        The smooth surface, pixels of the level toward the viewer.
     """
 
     image: np.ndarray
     mask: np.ndarray
-    height: np.ndarray
 
     @property
-    def mean(self) -> float:
-        """Mean light of the object."""
-        return max(float(self.image[self.mask].mean(dtype=float)), 1e-9)
+    def relative(self) -> np.ndarray:
+        """The image over the object's mean light."""
+        return self.image / np.float32(max(float(self.image[self.mask].mean(dtype=float)), 1e-9))
 
     def halved(self) -> "Level":
         """Return the next coarser level; sides are even."""
-        share = average_pool(self.mask[..., None].astype(np.float32))[..., 0]
+        share = average_pool(self.mask[..., None].astype(np.float32))
         image = average_pool(np.where(self.mask[..., None], self.image, 0))
-        return Level(
-            image / np.maximum(share, 1e-9)[..., None],
-            share >= 0.5,
-            average_pool(self.height[..., None])[..., 0] / 2,
-        )
+        return Level(image / np.maximum(share, 1e-9), share[..., 0] >= 0.5)
 
 
 def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneEstimate:
@@ -113,6 +108,7 @@ def fine_relief(
     finest: int,
     monitor: Monitor | None = None,
     network: DetailNetwork | None = None,
+    rule: ReliefRule | None = None,
 ) -> np.ndarray:
     """Find the relief that a smooth height lacks.
 
@@ -130,10 +126,12 @@ def fine_relief(
     monitor : Monitor, optional
     network : DetailNetwork, optional
         By default the shipped one.
+    rule : ReliefRule, optional
+        By default the shipped one.
 
     Returns
     -------
-    (H, W) ndarray
+    (H, W) float32 ndarray
         Pixels toward the viewer, 0 outside of the mask.
 
     Raises
@@ -142,28 +140,83 @@ def fine_relief(
         If the monitor cancels.
     """
     monitor = monitor or Monitor()
-    rows, columns = mask_slices(mask)
-    length = max(rows.stop - rows.start, columns.stop - columns.start)
-    count = max(0, int(np.ceil(np.log2(length / _SOLVED))))
-    levels = [_framed(diffuse, mask, height, MULTIPLE << count)]
-    for _ in range(count):
+    frame = _Frame.around(mask)
+    levels = [Level(frame.cut(np.where(mask[..., None], diffuse, 0)), frame.cut(mask))]
+    for _ in range(frame.halvings):
         levels.append(levels[-1].halved())
+    slope = slopes(frame.coarsest(height))
+    gain = shading_gain(slope, light).astype(np.float32)
+    slope, evidence = slope.astype(np.float32), list[Evidence | None]()
     relief = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
-    for k, level in zip(range(count, -1, -1), levels[::-1], strict=True):
-        monitor.report("fine relief", 1 - (k + 1) / (count + 1))
-        relief = 2 * raised(relief)
-        if length / 2**k <= finest:
-            relief += _band(level, light, network)
-    rows_inside = slice(_MARGIN, _MARGIN + rows.stop - rows.start)
-    columns_inside = slice(_MARGIN, _MARGIN + columns.stop - columns.start)
-    out = np.zeros(mask.shape, np.float32)
-    out[rows, columns] = relief[rows_inside, columns_inside]
-    return np.where(mask, out, 0)
+    for k, level in zip(range(frame.halvings, -1, -1), levels[::-1], strict=True):
+        monitor.report("fine relief", 1 - (k + 1) / (frame.halvings + 1))
+        if k < frame.halvings:
+            slope, gain = (_raised_pair(v) for v in (slope, gain))
+        relief, length = 2 * raised(relief), frame.length / 2**k
+        if length <= finest:
+            relief += _band(level, slope, gain, network)
+        if length <= _TELLING:
+            evidence.append(evidence_of(level.relative, level.mask, gain))
+    relief *= np.float32((rule or RULE).factor(mean_evidence(evidence)))
+    return np.where(mask, frame.put(relief, mask.shape), np.float32(0))
 
 
-def _band(level: Level, light: np.ndarray, network: DetailNetwork | None) -> np.ndarray:
+def _raised_pair(values: np.ndarray) -> np.ndarray:
+    return np.stack([raised(values[..., 0]), raised(values[..., 1])], axis=2)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """The object's box with a margin, of a size that can be halved.
+
+    `box` are the rows and columns of the mask, `length` the longer side of the box in pixels, and
+    `halvings` the number of levels less one.
+    """
+
+    box: tuple[slice, slice]
+    length: int
+    halvings: int
+
+    @classmethod
+    def around(cls, mask: np.ndarray) -> "_Frame":
+        box = mask_slices(mask)
+        length = max(one.stop - one.start for one in box)
+        return cls(box, length, max(0, int(np.ceil(np.log2(length / _SOLVED)))))
+
+    def cut(self, values: np.ndarray) -> np.ndarray:
+        """The frame of an image or a mask; its margin is 0."""
+        pads = [*self._pads, (0, 0)][: values.ndim]
+        kind = bool if values.dtype == bool else np.float32
+        return np.pad(values[self.box].astype(kind), pads)
+
+    def coarsest(self, height: np.ndarray) -> np.ndarray:
+        """A height at the coarsest level, in its pixels; the margin continues the border."""
+        coarse = np.pad(height[self.box], self._pads, mode="edge")
+        for _ in range(self.halvings):
+            coarse = average_pool(coarse[..., None])[..., 0] / 2
+        return coarse
+
+    def put(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """The content of the box in an image that is 0 elsewhere."""
+        out = np.zeros(shape, values.dtype)
+        sizes = (one.stop - one.start for one in self.box)
+        out[self.box] = values[tuple(slice(_MARGIN, _MARGIN + size) for size in sizes)]
+        return out
+
+    @property
+    def _pads(self) -> list[tuple[int, int]]:
+        multiple = MULTIPLE << self.halvings
+        return [
+            (_MARGIN, _MARGIN + (-(one.stop - one.start + 2 * _MARGIN)) % multiple)
+            for one in self.box
+        ]
+
+
+def _band(
+    level: Level, slope: np.ndarray, gain: np.ndarray, network: DetailNetwork | None
+) -> np.ndarray:
     """The band (h, w) of a level, tile by tile; tiles overlap by what the network looks at."""
-    height, width = level.mask.shape
+    image, (height, width) = level.relative, level.mask.shape
     band = np.zeros((height, width), np.float32)
     for top in range(0, height, _TILE):
         for left in range(0, width, _TILE):
@@ -174,13 +227,8 @@ def _band(level: Level, light: np.ndarray, network: DetailNetwork | None) -> np.
                 slice(max(one.start - _HALO, 0), min(one.stop + _HALO, size))
                 for one, size in zip(inner, (height, width), strict=True)
             )
-            slope = slopes(level.height[outer])
             found = predict_relief(
-                level.image[outer] / level.mean,
-                level.mask[outer],
-                slope,
-                shading_gain(slope, light),
-                network,
+                image[outer], level.mask[outer], slope[outer], gain[outer], network
             )
             own = tuple(
                 slice(one.start - wide.start, one.stop - wide.start)
@@ -233,17 +281,4 @@ def shading_gain(slope: np.ndarray, light: np.ndarray) -> np.ndarray:
             (log_shading(p, q + _STEP) - log_shading(p, q - _STEP)) / (2 * _STEP),
         ],
         axis=2,
-    )
-
-
-def _framed(diffuse: np.ndarray, mask: np.ndarray, height: np.ndarray, multiple: int) -> Level:
-    """The object's box with a margin, its sides multiples of a number."""
-    box = mask_slices(mask)
-    pads = [
-        (_MARGIN, _MARGIN + (-(one.stop - one.start + 2 * _MARGIN)) % multiple) for one in box
-    ]
-    return Level(
-        np.pad(np.where(mask[box][..., None], diffuse[box], 0).astype(np.float32), [*pads, (0, 0)]),
-        np.pad(mask[box], pads),
-        np.pad(height[box], pads, mode="edge").astype(np.float32),
     )

@@ -26,7 +26,7 @@ from isc_core.networks.detail_network import (
     WEAK,
 )
 
-from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
+from ..networks.blocks import Block, Convolution, stored_arrays
 from ..world.tensor_batch import TensorBatch
 
 DOWN, UP = (32, 48, 64), (48, 32)
@@ -101,7 +101,9 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
         relief = band_of(self(network_channels(batch)) * mask) * mask
         truth = batch.height * mask  # type: ignore[attr-defined]
         (error, known), (true, _) = (_energy(part, mask) for part in (relief - truth, truth))
-        error, energy = (part.sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1) for part in (error, true))
+        error, energy = (
+            part.sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1) for part in (error, true)
+        )
         loss = (error / (energy + _SLOPE**2)).mean()
         with torch.no_grad():
             has = energy > 1e-6
@@ -164,9 +166,7 @@ def network_channels(batch: TensorBatch) -> torch.Tensor:
     photo, mask = batch.photo, batch.mask  # type: ignore[attr-defined]
     slope, gain = batch.slope, batch.gain  # type: ignore[attr-defined]
     log_light = torch.log(photo * mask + DARK)
-    parts = torch.cat(
-        [log_light.mean(1, keepdim=True), log_light[:, ::2] - log_light[:, 1:2]], 1
-    )
+    parts = torch.cat([log_light.mean(1, keepdim=True), log_light[:, ::2] - log_light[:, 1:2]], 1)
     cover = _low(mask)
     low = _low(parts * mask) / cover.clamp(min=1e-6)
     length = torch.sqrt(1 + slope.square().sum(1, keepdim=True))

@@ -220,7 +220,9 @@ def _bodies(rng: np.random.Generator, count: int, side: int) -> tuple[torch.Tens
         slope, angle = sine / math.sqrt(1 - sine**2), rng.uniform(0, 2 * math.pi)
         bend = rng.normal(0, log_uniform(rng, 0.0005, 0.008), 3) / FINE
         parts.append([slope * math.cos(angle), slope * math.sin(angle), *bend])
-    p, q, a, b, c = (torch.tensor(v, dtype=torch.float32)[:, None, None] for v in zip(*parts, strict=True))
+    p, q, a, b, c = (
+        torch.tensor(v, dtype=torch.float32)[:, None, None] for v in zip(*parts, strict=True)
+    )
     height = p * x + q * y + (a * x * x + b * y * y) / 2 + c * x * y
     slope = torch.stack([p + a * x + c * y, q + b * y + c * x], 1)
     return height[:, None], slope
@@ -245,7 +247,9 @@ def _light(rng: np.random.Generator, count: int) -> _Light:
     direction /= np.linalg.norm(direction, axis=-1, keepdims=True)
     strength = np.exp(rng.normal(0, 1, (count, _LAMPS, 1)) + rng.normal(0, 0.1, (count, _LAMPS, 3)))
     strength *= (np.arange(_LAMPS) < rng.integers(1, _LAMPS + 1, (count, 1)))[..., None]
-    ambient = np.exp(rng.uniform(np.log(0.05), np.log(1.5), (count, 1)) + rng.normal(0, 0.1, (count, 3)))
+    ambient = np.exp(
+        rng.uniform(np.log(0.05), np.log(1.5), (count, 1)) + rng.normal(0, 0.1, (count, 3))
+    )
     bias = rng.standard_normal((count, 3))
     bias *= rng.uniform(0, 1, (count, 1)) / np.linalg.norm(bias, axis=1, keepdims=True)
     return _Light(*(torch.from_numpy(v).float() for v in (direction, strength, ambient, bias)))
@@ -262,9 +266,7 @@ def _gain(light: _Light, slope: torch.Tensor, step: float = 0.02) -> torch.Tenso
             for sign in (1, -1)
         )
         found.append((ahead - behind) / (2 * step))
-    return functional.interpolate(
-        torch.stack(found, 1), size, mode="bilinear", align_corners=False
-    )
+    return functional.interpolate(torch.stack(found, 1), size, mode="bilinear", align_corners=False)
 
 
 def _bent(rng: np.random.Generator, gain: torch.Tensor) -> torch.Tensor:
@@ -304,7 +306,10 @@ def _masks(rng: np.random.Generator, count: int, fine: int) -> torch.Tensor:
     rows = []
     for _ in range(count):
         angle, bend = rng.uniform(0, 2 * math.pi), rng.normal(0, 0.4)
-        along, across = x * math.cos(angle) + y * math.sin(angle), y * math.cos(angle) - x * math.sin(angle)
+        along, across = (
+            x * math.cos(angle) + y * math.sin(angle),
+            y * math.cos(angle) - x * math.sin(angle),
+        )
         offset = rng.uniform(-0.3, 1) if rng.random() < 0.3 else 3.0
         rows.append(along + bend * across.square() < offset)
     return torch.stack(rows)[:, None].float()

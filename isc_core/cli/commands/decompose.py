@@ -302,7 +302,9 @@ def _detail_notes(settings: Settings, length: int) -> tuple[str, ...]:
     if settings.detail <= max(length, Settings.detail):
         return ()
     remedy = "the photo has no more" if settings.max_size == 0 else "use --max-size 0 for more"
-    return (f"note: the object is {length} pixels long in the maps, not {settings.detail}: {remedy}",)
+    return (
+        f"note: the object is {length} pixels long in the maps, not {settings.detail}: {remedy}",
+    )
 
 
 def _pixels(photo: Photo, settings: Settings) -> int:

@@ -10,9 +10,9 @@ from isc_core.decomposition import detail
 from isc_core.decomposition.detail import fine_relief, shading_gain, slopes
 from isc_core.decomposition.layers import shaded
 from isc_core.decomposition.settings import Settings
-from isc_core.errors import InputError
+from isc_core.errors import Cancelled, InputError
 from isc_core.networks.layers import average_pool
-from isc_core.progress import Cancelled, Monitor
+from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.known_inputs import KnownInputs
 
