@@ -9,8 +9,8 @@ detail network's band b_k of level k (`networks.detail_network`),
     R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k)
     height = Z + a R_0
 
-each in the pixels of its level; a is what the whole object says of relief (`relief_evidence`). The light and what an image of half the solver's size can hold of
-the shape do not change, since each band is without what the next coarser level can hold.
+each in the pixels of its level; a is what the whole object says of relief (`relief_evidence`). The
+light and the overall shape do not change: each band is without what the next coarser level holds.
 
 Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
 Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from shading: A. Pentland
@@ -145,13 +145,13 @@ def fine_relief(
     for _ in range(frame.halvings):
         levels.append(levels[-1].halved())
     slope = slopes(frame.coarsest(height))
-    gain = shading_gain(slope, light).astype(np.float32)
-    slope, evidence = slope.astype(np.float32), list[Evidence | None]()
-    relief = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
+    gain = shading_gain(slope, light)
+    evidence = list[Evidence | None]()
+    relief: np.ndarray = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
     for k, level in zip(range(frame.halvings, -1, -1), levels[::-1], strict=True):
         monitor.report("fine relief", 1 - (k + 1) / (frame.halvings + 1))
         if k < frame.halvings:
-            slope, gain = (_raised_pair(v) for v in (slope, gain))
+            slope, gain = _raised_pair(slope), _raised_pair(gain)
         relief, length = 2 * raised(relief), frame.length / 2**k
         if length <= finest:
             relief += _band(level, slope, gain, network)
@@ -162,6 +162,7 @@ def fine_relief(
 
 
 def _raised_pair(values: np.ndarray) -> np.ndarray:
+    values = values.astype(np.float32)
     return np.stack([raised(values[..., 0]), raised(values[..., 1])], axis=2)
 
 
