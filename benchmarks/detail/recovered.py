@@ -18,7 +18,7 @@ median angle of the overall shape. Intervals are of 2,000 sets of resampled bodi
 import argparse
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +36,7 @@ from ..records import append_row, read_rows
 from .measure import OCTAVES, at_size, judge
 from .rendering import SetKind
 from .sets import PHOTO, Truth, bodies_in, read_truth
+from .settings import settings_of
 
 _RESAMPLED = 2000
 Estimator = Callable[[Path, Truth], np.ndarray]
@@ -196,19 +197,6 @@ def _line(
     return f"| {title} | {len(rows)} | {' | '.join(cells)} | {base:.2f} | {seconds:.1f} |"
 
 
-def _settings(assignments: Sequence[str]) -> Settings:
-    """Settings with some values changed, each of the type of its default."""
-    found = Settings(max_size=0, threads=1)
-    types = {one.name: type(getattr(found, one.name)) for one in fields(found)}
-    for assignment in assignments:
-        name, separator, value = assignment.partition("=")
-        if not separator or name not in types:
-            raise InputError(f"--set {assignment}: give NAME=VALUE, NAME one of {', '.join(types)}")
-        changed: Any = value in ("1", "true", "yes") if types[name] is bool else types[name](value)
-        found = replace(found, **{name: changed})
-    return found
-
-
 def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(
@@ -225,7 +213,7 @@ def main() -> None:
     given = parser.parse_args()
     kinds = list(SetKind) if given.kind is None else [given.kind]
     try:
-        settings = _settings(given.set)
+        settings = settings_of(given.set, Settings(max_size=0, threads=1))
         if given.normals is not None:
             estimator, key = stored_normals(given.normals), str(given.normals.resolve())
         elif given.solve_size is not None:
@@ -237,7 +225,7 @@ def main() -> None:
         for row in measured(given.folder, given.rows, estimator, kinds, given.count, key):
             print(row["body"], *(f"{value:.3f}" for value in row["explained"]), flush=True)
             rows.append(row)
-    except (InputError, ValueError) as error:
+    except InputError as error:
         parser.error(str(error))
     print(table(rows))
 
