@@ -223,7 +223,8 @@ def main() -> None:
             estimator, key = pipeline_normals(settings), str(settings)
         rows = []
         for row in measured(given.folder, given.rows, estimator, kinds, given.count, key):
-            print(row["body"], *(f"{value:.3f}" for value in row["explained"]), flush=True)
+            shown = "explained" if row["body"].startswith(SetKind.RELIEF) else "error"
+            print(row["body"], shown, *(f"{value:.3g}" for value in row[shown]), flush=True)
             rows.append(row)
     except InputError as error:
         parser.error(str(error))
