@@ -664,7 +664,7 @@ def normals_rows(first, last, geometry, expected, strength, gradient, sums):
     strength : (H, W) ndarray
         See `precision.strength_of`.
     gradient : (2, H, W) ndarray
-        Output: gradients with respect to n1 and n2.
+        Gradients with respect to n1 and n2, which grow by those of this term.
     sums : (H,) ndarray
         Output: the term of each row.
     """
@@ -680,12 +680,13 @@ def normals_rows(first, last, geometry, expected, strength, gradient, sums):
         )
         g1, g2 = gradient[0, i], gradient[1, i]
         for j in range(len(s)):
-            g1[j] = s[j] * (n1[j] - m1[j])
+            g1[j] += s[j] * (n1[j] - m1[j])
         for j in range(len(s)):
-            g2[j] = s[j] * (n2[j] - m2[j])
+            g2[j] += s[j] * (n2[j] - m2[j])
         total = t(0)
         for j in range(len(s)):
-            total += g1[j] * (n1[j] - m1[j]) + g2[j] * (n2[j] - m2[j])
+            away1, away2 = n1[j] - m1[j], n2[j] - m2[j]
+            total += s[j] * (away1 * away1 + away2 * away2)
         sums[i] = half * total
 
 

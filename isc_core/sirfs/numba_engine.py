@@ -70,7 +70,7 @@ def _spans(valid: np.ndarray) -> np.ndarray:
 
 
 class _NormalsTerm:
-    """A term of expected normals, and its gradient.
+    """A term of expected normals.
 
     Parameters
     ----------
@@ -85,12 +85,11 @@ class _NormalsTerm:
     ) -> None:
         self._expected = np.ascontiguousarray([field.down, field.right], dtype)
         self._strength = strength_of(field.precision, valid, weight).astype(dtype)
-        self.gradient = np.zeros((2, *valid.shape), dtype)
         self._sums = np.zeros(len(valid))
 
-    def rows(self, geometry: np.ndarray, first: int, last: int) -> None:
+    def rows(self, geometry: np.ndarray, gradient: np.ndarray, first: int, last: int) -> None:
         kernels.normals_rows(
-            first, last, geometry, self._expected, self._strength, self.gradient, self._sums
+            first, last, geometry, self._expected, self._strength, gradient, self._sums
         )
 
     def cost(self) -> float:
@@ -185,9 +184,11 @@ class NumbaEngine:
     def _set_up_inputs(self) -> None:
         p, t = self.problem, self.dtype
         height, channels = p.valid.shape[0], p.log_image.shape[2]
+        weight = p.reflectance_weight
+        self._pixels = float(weight.sum())
         self._photo = kernels.Photo(
             np.ascontiguousarray(p.log_image.transpose(0, 2, 1), t),
-            p.reflectance_weight.astype(t),
+            weight.astype(t),
             p.valid.astype(t),
             _spans(p.valid),
         )
@@ -235,6 +236,7 @@ class NumbaEngine:
                 np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
             )
         self._palette_terms: dict[str, float] = {}
+        self._contour = 0.0
         p, w = self.problem, self.problem.weights
         fields = {
             "silhouette": (p.silhouette, w.silhouette),
@@ -266,20 +268,18 @@ class NumbaEngine:
         p = self.problem
         self._pad(height)
         folded = _fold_light(np.asarray(light, float)).astype(self.dtype)
-        self._each_block(partial(self._forward, folded))
+        self._each_share(partial(self._forward, folded))
         if not (np.isfinite(self._surface.slant).all() and np.isfinite(folded).all()):
             # a step too far: kernels that look up tables must not see NaN or infinity
             return Evaluation(
                 Terms(slant=float("inf")), np.zeros(height.shape, self.dtype), np.zeros(light.shape)
             )
-        pairs: list[Callable[[], None]] = [self._palette_task]
-        pairs += [partial(self._pair_block, k) for k in range(len(self._blocks))]
-        self._workers.run(pairs)
+        tasks: list[Callable[[], None]] = [self._palette_task, self._contour_task]
+        tasks += [partial(self._pair_block, k) for k in range(len(self._blocks))]
+        self._workers.run(tasks)
         self._add_spills()
-        normals = self._normals_terms()
-        pulls = self._pulls if self._shading is None else self._with_shading(self._shading, folded)
-        contour = self._contour_term()
-        self._each_block(partial(self._backward, folded, pulls))
+        offsets = None if self._shading is None else self._shading.offsets()
+        self._each_share(partial(self._backward, folded, offsets))
         self._workers.run(
             [
                 partial(kernels.adjoint_rows, a, b, self._backward_out.derivatives, self._wide)
@@ -289,8 +289,9 @@ class NumbaEngine:
         gradient = fold_border(self._wide)
         light_gradient = _unfold_light_gradient(self._backward_out.light.sum(axis=0))
         cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
-        terms = self._palette_terms | {"contour": contour, "light": cost} | self._pair_terms()
-        terms |= normals
+        terms = self._palette_terms | {"contour": self._contour, "light": cost}
+        terms |= self._pair_terms()
+        terms |= {name: term.cost() for name, term in self._normals.items()}
         if self._shading is not None:
             terms["predicted_shading"] = self._shading.cost()
         if p.observation is not None:
@@ -304,7 +305,7 @@ class NumbaEngine:
         z[0], z[-1] = z[1], z[-2]
         z[:, 0], z[:, -1] = z[:, 1], z[:, -2]
 
-    def _each_block(self, task: Callable[[int, int], None]) -> None:
+    def _each_share(self, task: Callable[[int, int], None]) -> None:
         self._workers.run(
             [partial(task, a, b) for a, b in self._shares(self.problem.valid.shape[0])]
         )
@@ -315,6 +316,7 @@ class NumbaEngine:
         return [(rows * k // n, rows * (k + 1) // n) for k in range(n)]
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
+        """All that a row needs of its neighbours' heights alone."""
         kernels.forward_rows(
             first,
             last,
@@ -325,14 +327,12 @@ class NumbaEngine:
             self._surface,
             self._reflectance,
         )
-
-    def _normals_terms(self) -> dict[str, float]:
-        """The terms of expected normals; their gradient becomes `_in_plane`."""
-        self._in_plane[:] = 0
+        geometry = self._surface.geometry
+        self._in_plane[:, first:last] = 0
         for term in self._normals.values():
-            self._each_block(partial(term.rows, self._surface.geometry))
-            self._in_plane += term.gradient
-        return {name: term.cost() for name, term in self._normals.items()}
+            term.rows(geometry, self._in_plane, first, last)
+        if self._shading is not None:
+            self._shading.residuals(geometry, light, first, last)
 
     def _pair_block(self, k: int) -> None:
         first, last = self._blocks[k]
@@ -378,7 +378,7 @@ class NumbaEngine:
         counts = np.zeros(tuple(bounds[:, 1] - bounds[:, 0]))
         kernels.locate_color(palette, photo.spans, grid, bounds, cells)
         kernels.splat_color(photo, cells, counts)
-        pixels = float(p.reflectance_weight.sum())
+        pixels = self._pixels
         blurred = np.empty_like(counts)
         taps = reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3)
         kernels.blur_color(counts, taps, blurred)
@@ -412,22 +412,15 @@ class NumbaEngine:
         self._palette_terms = {"parsimony": parsimony, "absolute": absolute}
         self._pulls.palette[:] = (gradient @ np.linalg.inv(self._whiten.palette)).transpose(0, 2, 1)
 
-    def _with_shading(self, term: _ShadingTerm, light: np.ndarray) -> kernels.Pulls:
-        """The pulls with that of the expected shading, for the folded `light`."""
-        self._each_block(partial(term.residuals, self._surface.geometry, light))
-        self._each_block(partial(term.pulls, term.offsets(), self._pulls.palette))
-        return self._pulls._replace(palette=term.joined)
-
-    def _contour_term(self) -> float:
+    def _contour_task(self) -> None:
         p, w = self.problem, self.problem.weights
         at = (p.contour.rows, p.contour.columns)
         n1, n2 = self._surface.geometry[:, 5], self._surface.geometry[:, 6]
-        cost, c1, c2 = surface.contour_cost(
+        self._contour, c1, c2 = surface.contour_cost(
             n1, n2, p.contour, w.contour, w.contour_power, p.valid.size
         )
         self._in_plane[(0, *at)] += c1
         self._in_plane[(1, *at)] += c2
-        return cost
 
     def _scales(self) -> tuple[float, float, float, float]:
         p, w = self.problem, self.problem.weights
@@ -453,7 +446,13 @@ class NumbaEngine:
             )
         return terms
 
-    def _backward(self, light: np.ndarray, pulls: kernels.Pulls, first: int, last: int) -> None:
+    def _backward(
+        self, light: np.ndarray, offsets: np.ndarray | None, first: int, last: int
+    ) -> None:
+        pulls = self._pulls
+        if self._shading is not None and offsets is not None:
+            self._shading.pulls(offsets, pulls.palette, first, last)
+            pulls = pulls._replace(palette=self._shading.joined)
         kernels.backward_rows(
             first,
             last,
