@@ -41,12 +41,16 @@ class TexturedMesh:
         Unit vectors.
     uv : (V, 2) float64 ndarray
         Texture coordinates in [0, 1]; v starts at the bottom of the texture.
+    tangents : (V, 3) float64 ndarray or None
+        Unit vectors in which the normal map's first axis points; its second one is normal x
+        tangent. None where the map is flat.
     """
 
     vertices: np.ndarray
     faces: np.ndarray
     vertex_normals: np.ndarray
     uv: np.ndarray
+    tangents: np.ndarray | None = None
 
 
 def encode_glb(
@@ -75,6 +79,8 @@ def encode_glb(
         "POSITION": mesh.vertices.astype("<f4"),
         "NORMAL": mesh.vertex_normals.astype("<f4"),
     }
+    if mesh.tangents is not None:  # the fourth number is the sign of the bitangent
+        arrays["TANGENT"] = np.pad(mesh.tangents, [(0, 0), (0, 1)], constant_values=1).astype("<f4")
     indices = mesh.faces.astype("<u4").reshape(-1)
     blocks = [indices.tobytes(), *(values.tobytes() for values in arrays.values()), *pictures]
     targets = [_INDICES, *[_VERTICES] * len(arrays), *[None] * len(pictures)]

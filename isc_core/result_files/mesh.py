@@ -3,13 +3,18 @@
 Problem: a height map over a mask, with its normals and reflectance, is to become an object in any
 viewer, under the recovered light, that looks like the photo.
 
-Geometry: one vertex per pixel centre (or every `stride`-th), one cell of two triangles where all
-pixels of the cell lie inside the mask. World axes are those of glTF: +X right, +Y up, +Z toward the
-viewer, metres; the origin is the middle of the bounding box. Before a camera, vertices are on the
-rays of their pixels (see `shading.perspective`), and a pixel has its size at their mean distance.
-Vertex normals are the recovered ones, averaged over a vertex's cell; the tangent-space normal map
-(green up) holds the difference between them and the recovered normal of each pixel. At stride 1 the
-map is flat.
+Geometry: vertices at pixel centres, one cell of two triangles where all pixels of the cell lie
+inside the mask. If that exceeds the number of triangles asked for, large triangles replace small
+ones where the surface is smooth (see `adaptive_triangles`); the silhouette keeps its pixels. Where
+the silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World
+axes are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the middle of
+the bounding box. Before a camera, vertices are on the rays of their pixels (see
+`shading.perspective`), and a pixel has its size at their mean distance.
+
+Normals: those of vertices are the recovered ones; in a mesh of fewer triangles, their mean over the
+triangles of a vertex, weighted by its barycentric coordinate. The tangent-space normal map (green
+up) holds the recovered normal of each pixel relative to the interpolated one. It is flat for a mesh
+with a vertex at each pixel. The tangent is the direction in which the texture's column grows.
 
 Rim: the true slope of a smooth object is infinite at its silhouette, so the outermost heights of a
 reconstruction are the least certain and may spike. From the inside out, a height in the last `rim`
@@ -32,12 +37,13 @@ Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
 Limits: one sheet without a back; steps of one cell along the silhouette; reflectances above 1/k are
-clipped (at most 0.5 % of the pixels).
+clipped (at most 0.5 % of the pixels). Programs that compute tangents by themselves interpolate them
+along the triangles: their normals differ by the square of what the surface turns within one.
 """
 
 import io
 from dataclasses import dataclass, field
-from math import ceil, log, pi, sqrt
+from math import log, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -50,6 +56,7 @@ from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
+from .adaptive_triangles import Triangulation, adaptive_triangles, covered_pixels
 from .glb import TexturedMesh, encode_glb
 
 _SPECULAR = "KHR_materials_specular"
@@ -67,8 +74,8 @@ class MeshOptions:
         Longest side of the mask's bounding box, in metres.
     metres_per_pixel : float or None
         Replaces `longest_side`.
-    max_faces : int
-        The grid takes every n-th pixel to stay below; the default keeps 512 x 512 pixels.
+    triangles : int
+        The most that the mesh may have; 0 for a vertex at each pixel.
     rim : int
         Rings of border pixels whose height is limited; 0 for none.
     bleed : int
@@ -79,7 +86,7 @@ class MeshOptions:
 
     longest_side: float = 0.1
     metres_per_pixel: float | None = None
-    max_faces: int = 525_000
+    triangles: int = 100_000
     rim: int = 3
     bleed: int = 16
     roughness: float = 0.5
@@ -102,7 +109,7 @@ class MeshResult:
         (column, row, height), in pixels, of the world's origin; before a camera the height counts
         from the mean distance.
     stride : int
-        Pixels from vertex to vertex.
+        Least number of pixels from vertex to vertex.
     vertex_pixel : (V, 2) ndarray
         Row and column of each vertex.
     base_color : (H, W, 3) ndarray
@@ -246,13 +253,17 @@ def build_mesh(
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
-    stride, cells = _grid_cells(mask, options.max_faces)
     limited = limit_rim(height, mask, options.rim)
-    rows, columns = (np.arange(0, n, stride) for n in mask.shape)
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    smooth = _vertex_normals(normal, mask, stride, view)
-    used, faces = _triangles(cells, (len(rows), len(columns)))
-    row, column = (axis.reshape(-1)[used] for axis in np.meshgrid(rows, columns, indexing="ij"))
+    stride, grid, fewer = _triangulated(limited, normal, mask, view, options.triangles)
+    vertex_pixel = grid.vertices * stride
+    row, column = vertex_pixel.T
+    if fewer:
+        smooth = _mean_normals(grid, stride, normal, view)
+        detail, tangents = _detail_normals(grid, stride, normal, smooth, view)
+    else:
+        smooth = _facing(normal[row, column].astype(np.float32), _at(view, row, column))
+        detail, tangents = _flat(mask.shape), None
     if camera is None:
         pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
     else:
@@ -262,13 +273,13 @@ def build_mesh(
     size = options.metres_per_pixel or options.longest_side / max(
         np.ptp(np.argwhere(mask), axis=0) + 1
     )
-    detail = _detail_normals(normal, mask, smooth, cells, stride, view)
     color, k = base_color(reflectance, mask, options.bleed)
     mesh = TexturedMesh(
         (pixels - middle) * size,
-        faces,
-        smooth.reshape(-1, 3)[used].astype(np.float64),
+        grid.faces,
+        smooth.astype(np.float64),
         np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
+        tangents,
     )
     origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
     if camera is not None:
@@ -279,7 +290,7 @@ def build_mesh(
         float(size),
         origin,
         stride,
-        np.stack([row, column], -1),
+        vertex_pixel,
         color,
         detail,
         options,
@@ -385,16 +396,19 @@ def _check_inputs(
     if not (
         options.longest_side > 0
         and (options.metres_per_pixel is None or options.metres_per_pixel > 0)
-        and options.max_faces >= 2
     ):
-        raise InputError(
-            "the mesh's longest side, metres per pixel and number of faces must be positive"
-        )
+        raise InputError("the mesh's longest side and metres per pixel must be positive")
+    if options.triangles < 0:
+        raise InputError("the mesh's number of triangles cannot be negative: 0 keeps every pixel")
 
 
-def _grid_cells(mask: np.ndarray, max_faces: int) -> tuple[int, np.ndarray]:
-    """The smallest stride within `max_faces`, and which cells, (rows - 1, columns - 1) bool,
-    lie wholly inside the mask.
+def _triangulated(
+    height: np.ndarray, normal: np.ndarray, mask: np.ndarray, view: np.ndarray, budget: int
+) -> tuple[int, Triangulation, bool]:
+    """The stride of the grid, its triangles, and whether they are fewer than two a cell.
+
+    They are at most `budget` (0: as many as there are), unless the object is too thin for the cells
+    of a larger stride.
     """
     cells = _cells_inside(mask, 1)
     if not cells.any():
@@ -402,12 +416,19 @@ def _grid_cells(mask: np.ndarray, max_faces: int) -> tuple[int, np.ndarray]:
             "the mask has no block of 2 x 2 pixels to build a mesh from: mark a larger region or "
             "use a larger photo"
         )
-    stride = max(1, ceil(sqrt(2 * int(cells.sum()) / max_faces)))
-    while stride > 1 and not (cells := _cells_inside(mask, stride)).any():
-        stride -= (
-            1  # an object thinner than these cells: exceed max_faces rather than build no mesh
-        )
-    return stride, cells if stride > 1 else _cells_inside(mask, 1)
+    if not budget or 2 * np.count_nonzero(cells) <= budget:
+        return 1, _full_grid(cells), False
+    cosine, stride = (normal * view).sum(axis=-1), 1
+    while True:
+        thinned = height[::stride, ::stride] / stride, cells, cosine[::stride, ::stride]
+        if (found := adaptive_triangles(*thinned, budget)) is not None:
+            return stride, found, True
+        coarser = _cells_inside(mask, 2 * stride)
+        if not coarser.any():
+            found = adaptive_triangles(*thinned, 0)
+            assert found is not None
+            return stride, found, True
+        stride, cells = 2 * stride, coarser
 
 
 def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
@@ -418,31 +439,75 @@ def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
     return inside[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
 
 
-def _triangles(cells: np.ndarray, grid: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """The grid's vertices in use, (V,) flat indices, and the faces, (F, 3), counter-clockwise for
-    the viewer.
-
-    Each cell is split from its top left to its bottom right.
-    """
+def _full_grid(cells: np.ndarray) -> Triangulation:
+    """Two triangles for each cell, split from its top left to its bottom right."""
+    width = cells.shape[1] + 1
     row, column = np.nonzero(cells)
-    top_left = row * grid[1] + column
-    top_right, bottom_left, bottom_right = top_left + 1, top_left + grid[1], top_left + grid[1] + 1
+    top_left = row * width + column
+    top_right, bottom_left, bottom_right = top_left + 1, top_left + width, top_left + width + 1
     lower = np.stack([top_left, bottom_left, bottom_right], -1)
     upper = np.stack([top_left, bottom_right, top_right], -1)
     used, faces = np.unique(np.stack([lower, upper], 1).reshape(-1), return_inverse=True)
-    return used, faces.reshape(-1, 3)
+    return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
 
 
-def _vertex_normals(
-    normal: np.ndarray, mask: np.ndarray, stride: int, view: np.ndarray
+def _mean_normals(
+    grid: Triangulation, stride: int, normal: np.ndarray, view: np.ndarray
 ) -> np.ndarray:
-    """Unit normals, (rows, columns, 3) float32, at the grid's vertices: the mean over one cell's
-    size around each.
+    """Unit normals (V, 3) of the vertices: means of the pixels of their triangles."""
+    sums = np.zeros((len(grid.vertices), 3))
+    for patch in covered_pixels(grid, stride):
+        seen = normal[patch.pixels[..., 0], patch.pixels[..., 1]]
+        part = np.einsum("pk,tpc->tkc", patch.weights, seen).reshape(-1, 3)
+        for axis in range(3):
+            sums[:, axis] += np.bincount(patch.faces.reshape(-1), part[:, axis], len(sums))
+    return _facing(sums.astype(np.float32), _at(view, *(grid.vertices * stride).T))
+
+
+def _detail_normals(
+    grid: Triangulation,
+    stride: int,
+    normal: np.ndarray,
+    smooth: np.ndarray,
+    view: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The normals (H, W, 3) of the tangent-space map, each pixel's relative to the interpolated
+    normal of the vertices; and the tangents (V, 3) of these.
     """
-    sums = np.where(mask[..., None], normal, 0).astype(np.float32)
-    if stride > 1:
-        sums = ndimage.uniform_filter(sums, (stride, stride, 1), mode="constant")
-    return _facing(sums[::stride, ::stride], view if view.ndim == 1 else view[::stride, ::stride])
+    detail = _flat(normal.shape[:2]).copy()
+    for patch in covered_pixels(grid, stride):
+        row, column = patch.pixels[..., 0], patch.pixels[..., 1]
+        base = np.einsum("pk,tkc->tpc", patch.weights.astype(np.float32), smooth[patch.faces])
+        toward = _at(view, row, column)
+        detail[row, column] = _local(normal[row, column], _facing(base, toward), toward)
+    return detail, _tangents(smooth, _at(view, *(grid.vertices * stride).T))
+
+
+def _at(view: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """The directions of pixels, or the one of all."""
+    return view if view.ndim == 1 else view[row, column]
+
+
+def _flat(shape: tuple[int, ...]) -> np.ndarray:
+    return np.broadcast_to(np.array([0, 0, 1], np.float32), (*shape, 3))
+
+
+def _tangents(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """The unit direction (..., 3) on a surface in which the texture's column grows."""
+    if view.ndim == 1:
+        tangent = np.stack([normal[..., 2], np.zeros_like(normal[..., 0]), -normal[..., 0]], -1)
+    else:  # on the surface, and in the plane of the pixel's row through the camera
+        tangent = np.cross(normal, np.cross((1.0, 0.0, 0.0), view)).astype(normal.dtype)
+    return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))
+
+
+def _local(normal: np.ndarray, base: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """Normals (..., 3) in the frame of tangent, bitangent (in which the texture's row falls) and
+    base.
+    """
+    tangent = _tangents(base, view)
+    frame = tangent, np.cross(base, tangent), base
+    return np.stack([np.einsum("...c,...c->...", normal, axis) for axis in frame], -1)
 
 
 def _facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
@@ -459,40 +524,6 @@ def _facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
         facing = (vectors * view).sum(axis=-1, keepdims=True)
         vectors += np.maximum(_LEAST_FACING - facing, 0) * view
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
-
-
-def _detail_normals(
-    normal: np.ndarray,
-    mask: np.ndarray,
-    smooth: np.ndarray,
-    cells: np.ndarray,
-    stride: int,
-    view: np.ndarray,
-) -> np.ndarray:
-    """The normals of the tangent-space map, (H, W, 3): each pixel's normal relative to the
-    interpolated vertex normal.
-
-    The tangent is the direction in which the texture's column grows on the surface, the bitangent
-    that in which its row falls.
-    """
-    flat = np.broadcast_to(np.array([0, 0, 1], np.float32), mask.shape + (3,))
-    if stride == 1:
-        return flat
-    covered = np.kron(cells, np.ones((stride, stride), bool))
-    covered = np.pad(
-        covered, [(0, max(0, n - m)) for n, m in zip(mask.shape, covered.shape, strict=True)]
-    )[: mask.shape[0], : mask.shape[1]]
-    base = _facing(_interpolated(smooth, mask.shape, stride), view)
-    if view.ndim == 1:
-        tangent = np.stack([base[..., 2], np.zeros_like(base[..., 0]), -base[..., 0]], -1)
-    else:  # on the surface, and in the plane of the pixel's row through the camera
-        tangent = np.cross(base, np.cross((1.0, 0.0, 0.0), view)).astype(base.dtype)
-    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
-    bitangent = np.cross(base, tangent)
-    local = np.stack(
-        [np.einsum("hwc,hwc->hw", normal, axis) for axis in (tangent, bitangent, base)], -1
-    )
-    return np.where((covered & mask)[..., None], local, flat)
 
 
 def _color_codes(linear: np.ndarray) -> np.ndarray:
@@ -514,30 +545,6 @@ def _png(pixels: np.ndarray) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, format="png")
     return stream.getvalue()
-
-
-def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.ndarray:
-    """The vertices' values, (rows, columns, C), at every pixel of (H, W): linear on the two
-    triangles of each cell.
-    """
-    (row, down), (column, right) = (np.divmod(np.arange(n), stride) for n in shape)
-    next_row, next_column = (
-        np.minimum(row + 1, grid.shape[0] - 1),
-        np.minimum(column + 1, grid.shape[1] - 1),
-    )
-    down, right = (down / stride)[:, None, None], (right / stride)[None, :, None]
-    corner, opposite = grid[np.ix_(row, column)], grid[np.ix_(next_row, next_column)]
-    upper = (
-        corner
-        + right * (grid[np.ix_(row, next_column)] - corner)
-        + down * (opposite - grid[np.ix_(row, next_column)])
-    )
-    lower = (
-        corner
-        + down * (grid[np.ix_(next_row, column)] - corner)
-        + right * (opposite - grid[np.ix_(next_row, column)])
-    )
-    return np.where(right >= down, upper, lower).astype(np.float32)
 
 
 def _roughness(options: MeshOptions, gloss: SpecularFit) -> float:

@@ -93,7 +93,7 @@ def _coarse_mesh(
         )
         for planes in (small["height"][None], np.moveaxis(small["normal"], -1, 0))
     )
-    options = MeshOptions(metres_per_pixel=float(_STEP), max_faces=2 * inside.size, bleed=0)
+    options = MeshOptions(metres_per_pixel=float(_STEP), triangles=0, bleed=0)
     height = height[..., 0] * (frame.zoom / _STEP)
     if camera is not None:
         x, y = frame.place(*camera.principal_point)

@@ -129,7 +129,7 @@ def test_the_front_of_the_closed_body_keeps_its_normals(blender: Any, bump_folde
 @pytest.mark.parametrize("faces", [525_000, 900])
 def test_the_displaced_grid_is_the_height_mesh(blender: Any, tmp_path: Path, faces: int) -> None:
     """Also where the mesh takes every n-th pixel only."""
-    result = read_result(write_result(tmp_path / "bump", mesh=MeshOptions(max_faces=faces)))
+    result = read_result(write_result(tmp_path / "bump", mesh=MeshOptions(triangles=faces)))
     exact = got(build(result).object.data.vertices, "co", 3)
     built = build(result, displacement=True)
     assert np.ptp(got(built.object.data.vertices, "co", 3)[:, 1]) == 0

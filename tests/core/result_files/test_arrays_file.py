@@ -126,13 +126,13 @@ def test_the_sun_explains_the_shading(arrays: Arrays) -> None:
 
 @pytest.mark.slow
 def test_detail_stays_where_vertices_are_few() -> None:
-    """With every second pixel a vertex, vertex normal and normal map together are the recovered
-    normals, without rounding to codes.
+    """Vertex normal and normal map together are the recovered normals, without rounding to
+    codes.
     """
     d = ball()
-    mesh = built(d, max_faces=3000)
+    mesh = built(d, triangles=3000)
     arrays = arrays_of(d, mesh)
-    assert mesh.stride == 2
+    assert len(mesh.mesh.faces) <= 3000
     row, column = arrays["vertex_pixel"].T
     base = arrays["vertex_normals"].astype(float)
     tangent = np.stack([base[:, 2], 0 * base[:, 0], -base[:, 0]], -1)
@@ -140,7 +140,7 @@ def test_detail_stays_where_vertices_are_few() -> None:
     local = 2 * arrays["normal_map"][row, column] - 1
     normal = local[:, :1] * tangent + local[:, 1:2] * np.cross(base, tangent) + local[:, 2:] * base
     changed = np.abs(local - [0, 0, 1]).max(-1) > 1e-6
-    assert changed.mean() > 0.9
+    assert changed.mean() > 0.5  # the others are surrounded by vertices
     np.testing.assert_allclose(normal[changed], d.normal[row, column][changed], atol=1e-5)
 
 

@@ -83,8 +83,8 @@ def test_a_damaged_record_is_refused(tmp_path: Path, record: Any) -> None:
 @pytest.mark.parametrize("faces", [525_000, 400])
 def test_vertices_lie_on_the_rays_of_their_pixels(faces: int) -> None:
     d = bump_before_camera()
-    built = mesh_of(d, MeshOptions(max_faces=faces))
-    assert (built.stride == 1) == (faces > 400)
+    built = mesh_of(d, MeshOptions(triangles=faces))
+    assert len(built.mesh.faces) <= faces
     np.testing.assert_allclose(seen_at(built, CAMERA), built.vertex_pixel, atol=1e-9)
 
 
@@ -125,8 +125,8 @@ def test_faces_and_normals_face_the_camera() -> None:
 def test_the_normal_map_restores_the_recovered_normals() -> None:
     """Tangent frames are those of renderers: the direction in which u grows on the surface."""
     d = bump_before_camera()
-    built = mesh_of(d, MeshOptions(max_faces=400))
-    assert built.stride > 1
+    built = mesh_of(d, MeshOptions(triangles=400))
+    assert len(built.mesh.faces) <= 400
     row, column = built.vertex_pixel.T
     base = built.mesh.vertex_normals
     view = view_directions(CAMERA, (d.mask.shape[0], d.mask.shape[1]))[row, column]
