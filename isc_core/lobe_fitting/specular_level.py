@@ -56,6 +56,8 @@ class SpecularSource(StrEnum):
         There are no highlights.
     NOT_FITTED
         Unknown.
+    GIVEN
+        The user.
     """
 
     FITTED = "fitted"
@@ -63,6 +65,7 @@ class SpecularSource(StrEnum):
     UPPER_BOUND = "upper bound"
     NO_HIGHLIGHTS = "no highlights"
     NOT_FITTED = "not fitted"
+    GIVEN = "given"
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ white surface, over pi, is exp(SH(n; mesh_illumination)).
 
 Citation: NumPy's file format, NEP 1, https://numpy.org/neps/nep-0001-npy-format.html.
 
-Limits: `sky` is as accurate as `shading.environment_map` states; the mesh has the default options.
+Limits: `sky` is as accurate as `shading.environment_map` states.
 """
 
 from pathlib import Path
@@ -48,7 +48,8 @@ import numpy as np
 
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from .mesh import MeshOptions, MeshResult, build_mesh
+from .mesh import MeshResult, build_mesh
+from .mesh_options import MeshOptions
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}

@@ -58,39 +58,11 @@ from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
 from .adaptive_triangles import Triangulation, adaptive_triangles, covered_pixels
 from .glb import TexturedMesh, encode_glb
+from .mesh_options import MeshOptions
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
 _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
-
-
-@dataclass(frozen=True)
-class MeshOptions:
-    """How the mesh is built.
-
-    Attributes
-    ----------
-    longest_side : float
-        Longest side of the mask's bounding box, in metres.
-    metres_per_pixel : float or None
-        Replaces `longest_side`.
-    triangles : int
-        The most that the mesh may have; 0 for a vertex at each pixel.
-    rim : int
-        Rings of border pixels whose height is limited; 0 for none.
-    bleed : int
-        Pixels by which the texture continues beyond the mask.
-    roughness, metallic : float
-        Default glTF factors in [0, 1]; a fitted gloss has its own roughness.
-    """
-
-    longest_side: float = 0.1
-    metres_per_pixel: float | None = None
-    triangles: int = 100_000
-    rim: int = 3
-    bleed: int = 16
-    roughness: float = 0.5
-    metallic: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -142,6 +114,11 @@ class MeshResult:
         """The specular level for the base colour, not negative; 0 where unknown."""
         return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
+    @property
+    def roughness(self) -> float:
+        """The fitted roughness, or that of the options."""
+        return self.options.roughness if self.gloss.roughness is None else self.gloss.roughness
+
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
         """Return the light that gives the diffuse image with the mesh's texture.
 
@@ -169,15 +146,23 @@ class MeshResult:
             "pbrMetallicRoughness": {
                 "baseColorTexture": {"index": 0},
                 "metallicFactor": self.options.metallic,
-                "roughnessFactor": _roughness(self.options, self.gloss),
+                "roughnessFactor": self.roughness,
             },
             "normalTexture": {"index": 1},
             # The mesh is open at the back, and should stay visible from behind.
             "doubleSided": True,
             "extensions": {_SPECULAR: extension},
         }
-        textures = [_png(_color_codes(self.base_color)), _png(_vector_codes(self.detail))]
+        textures = [self.base_color_png(), self.normal_png()]
         return encode_glb(self.mesh, material, textures + pictures)
+
+    def base_color_png(self) -> bytes:
+        """Return the base colour as the bytes of a PNG, 8-bit sRGB."""
+        return encoded_png(_color_codes(self.base_color))
+
+    def normal_png(self) -> bytes:
+        """Return the tangent-space normal map as the bytes of a PNG, green upward."""
+        return encoded_png(_vector_codes(self.detail))
 
     def _specular_extension(self, first_texture: int) -> tuple[dict[str, Any], list[bytes]]:
         """KHR_materials_specular of the material, and the texture that it refers to, if any."""
@@ -190,7 +175,7 @@ class MeshResult:
         if variation is None:
             return extension, []
         extension["specularTexture"] = {"index": first_texture}
-        return extension, [_png(_alpha_codes(variation / largest))]
+        return extension, [encoded_png(_alpha_codes(variation / largest))]
 
     def describe(self) -> dict[str, Any]:
         """Return what a reader needs beside the file, ready for JSON."""
@@ -202,7 +187,7 @@ class MeshResult:
             "vertices": len(self.mesh.vertices),
             "faces": len(self.mesh.faces),
             "roughness": {
-                "value": _roughness(self.options, self.gloss),
+                "value": self.roughness,
                 "source": self.gloss.roughness_source,
             },
             "specular": {
@@ -541,11 +526,17 @@ def _alpha_codes(values: np.ndarray) -> np.ndarray:
     return pixels
 
 
-def _png(pixels: np.ndarray) -> bytes:
+def encoded_png(pixels: np.ndarray) -> bytes:
+    """Return pixels as the bytes of a PNG.
+
+    Parameters
+    ----------
+    pixels : (H, W), (H, W, 3) or (H, W, 4) uint8 ndarray
+
+    Returns
+    -------
+    bytes
+    """
     stream = io.BytesIO()
     Image.fromarray(pixels).save(stream, format="png")
     return stream.getvalue()
-
-
-def _roughness(options: MeshOptions, gloss: SpecularFit) -> float:
-    return options.roughness if gloss.roughness is None else gloss.roughness

@@ -26,7 +26,8 @@ from ..shading.lights import VIEW, DirectionalLight, sphere_directions, toward, 
 from ..shading.lobe_rendering import Lobe
 from ..shading.radiance import DistantLights, radiance, sh_shading
 from .glb import TexturedMesh
-from .mesh import MeshOptions, build_mesh
+from .mesh import build_mesh
+from .mesh_options import MeshOptions
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 from .turned_view import turned_view
 

@@ -36,7 +36,8 @@ from .arrays_file import ARRAYS, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
-from .mesh import MeshOptions, MeshResult
+from .mesh import MeshResult
+from .mesh_options import MeshOptions
 
 SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
 LAYERS = {

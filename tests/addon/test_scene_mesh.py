@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from isc_core.result_files.mesh import MeshOptions
+from isc_core.result_files.mesh_options import MeshOptions
 from tests.addon.scene_fixture import bump, write_result
 
 

@@ -7,8 +7,10 @@ from pathlib import Path
 
 from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
-from ...result_files.arrays_file import ARRAYS, write_arrays
+from ...result_files.arrays_file import ARRAYS, mesh_of, write_arrays
+from ...result_files.mesh_options import MeshOptions
 from ...result_files.result_folder import load
+from ..interface.options import add_triangles
 from ..interface.parser import describe, hints
 
 _EXAMPLES = """  isc arrays cup"""
@@ -33,6 +35,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
     )
+    add_triangles(parser)
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -53,6 +56,6 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     require_writable_file(path)
     monitor.report("writing arrays", 0.3)
     with new_file(path) as partial:
-        write_arrays(result, partial)
+        write_arrays(result, partial, mesh_of(result, MeshOptions(triangles=options.triangles)))
         monitor.report("writing arrays", 1.0)
     return hints(options, f"wrote {path}")

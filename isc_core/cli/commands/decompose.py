@@ -14,6 +14,7 @@ from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
 from ...result_files.diagnostics_text import CROPPED, note_lines
 from ...result_files.known_inputs import read_height, read_light
+from ...result_files.mesh_options import MeshOptions
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...sirfs.priors.prior_file import load_prior_set
@@ -29,6 +30,7 @@ from ..interface.options import (
     add_output,
     add_photo,
     add_transfer,
+    add_triangles,
     limits_of,
     names_table,
 )
@@ -80,6 +82,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
     )
+    add_triangles(main)
     add_open(main)
     reading = parser.add_argument_group("reading the photo")
     add_transfer(reading)
@@ -199,7 +202,15 @@ def _decompose_photo(
     )
     writing = monitor.part(0.8, 1.0)
     cover = None if photo.found is None else photo.found.cover
-    save(result, output, arrays=options.arrays, png=options.png, cover=cover, monitor=writing)
+    save(
+        result,
+        output,
+        mesh=MeshOptions(triangles=options.triangles),
+        arrays=options.arrays,
+        png=options.png,
+        cover=cover,
+        monitor=writing,
+    )
     preview = output / "preview.png"
     return hints(
         options,

@@ -48,6 +48,7 @@ CORE = (
     _core("mask", "find the object in a photo"),
     _core("edit", "another light, gloss or colour for a decomposed photo"),
     _core("batch", "isc decompose for many photos, resumable", "batch"),
+    _core("export", "a result as textures or a mesh for other programs"),
     _core("arrays", "a result as plain NumPy arrays"),
     _core("evaluate", "accuracy on a data set with ground truth"),
     _core("fit-priors", "fit the priors of shape, reflectance and light"),

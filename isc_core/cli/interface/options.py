@@ -12,6 +12,7 @@ from ...decomposition.settings import (
 )
 from ...io.limits import USUAL, Limits
 from ...photo import TRANSFERS
+from ...result_files.mesh_options import MeshOptions
 from ...separation import SUMMARIES
 from .parser import table
 from .values import count, current_name, whole
@@ -170,6 +171,24 @@ def add_main_settings(group: Group) -> None:
         "--arrays",
         action="store_true",
         help="write arrays.npz too: everything as plain NumPy arrays, for other programs",
+    )
+
+
+def add_triangles(group: Group | argparse.ArgumentParser) -> None:
+    """Add --triangles.
+
+    Parameters
+    ----------
+    group : argparse._ArgumentGroup or argparse.ArgumentParser
+        Changed in place.
+    """
+    group.add_argument(
+        "--triangles",
+        type=count,
+        default=MeshOptions().triangles,
+        metavar="N",
+        help="most triangles of the mesh; the normal map has the rest (default %(default)s; 0: a "
+        "vertex at each pixel)",
     )
 
 

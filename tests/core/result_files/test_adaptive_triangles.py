@@ -8,7 +8,8 @@ from isc_core.result_files.adaptive_triangles import (
     adaptive_triangles,
     covered_pixels,
 )
-from isc_core.result_files.mesh import MeshOptions, build_mesh
+from isc_core.result_files.mesh import build_mesh
+from isc_core.result_files.mesh_options import MeshOptions
 from tests.core.ball_scene import ball
 
 SIDE = 200

@@ -17,13 +17,8 @@ from scipy import ndimage
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
-from isc_core.result_files.mesh import (
-    MeshOptions,
-    MeshResult,
-    base_color,
-    build_mesh,
-    limit_rim,
-)
+from isc_core.result_files.mesh import MeshResult, base_color, build_mesh, limit_rim
+from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import LIGHT, ball

@@ -1,0 +1,1 @@
+"""Measurements of the mesh of a result."""

@@ -1,0 +1,134 @@
+"""`isc export`: a result as a texture set or as a mesh for other programs."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+from ...batch.names import safe_name
+from ...io.atomic import require_writable
+from ...lobe_fitting.specular_level import SpecularSource
+from ...progress import Monitor
+from ...result_files.arrays_file import mesh_of
+from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_mesh_file
+from ...result_files.exports.soft_alpha import object_cover
+from ...result_files.exports.texture_set import (
+    TARGETS,
+    texture_files,
+    write_texture_set,
+)
+from ...result_files.exports.usd import require_usd
+from ...result_files.mesh_options import MeshOptions
+from ...result_files.result_folder import MASK, load
+from ...scene.decomposition import Decomposition
+from ..interface.options import add_triangles
+from ..interface.parser import describe, hints
+from ..interface.values import share
+
+_EXAMPLES = """  isc export cup --textures unreal -o cup_textures
+  isc export cup --textures generic --name mug -o mug_textures
+  isc export cup --format usd -o cup.usdz
+  isc export cup --format obj --triangles 20000 -o cup.obj"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
+    describe(
+        parser,
+        run,
+        "Writes a result for other programs: --textures a set of textures under the names and in "
+        "the packings that a program expects, --format the mesh with its material.",
+        examples=_EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="PATH",
+        help="the folder of the textures, or the file of the mesh",
+    )
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument(
+        "--textures", choices=tuple(TARGETS), help="write a texture set for this program"
+    )
+    what.add_argument(
+        "--format",
+        choices=tuple(SUFFIXES),
+        help="write the mesh in this format; obj and usd have their textures beside them, usdz "
+        "(by its suffix) and glb inside",
+    )
+    parser.add_argument(
+        "--name", metavar="NAME", help="begins the textures' names (default: the photo's name)"
+    )
+    parser.add_argument(
+        "--roughness",
+        type=share,
+        metavar="R",
+        help="roughness from 0 to 1 (default: the fitted one)",
+    )
+    add_triangles(parser)
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Run the command; inputs are checked before the work begins.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If the result cannot be read, or the output cannot be written.
+    """
+    output: Path = options.output
+    if options.format is not None:
+        check_mesh_path(output, options.format)
+        if options.format == "usd":
+            require_usd(output)
+    monitor.report("reading", 0.0)
+    d = load(options.result)
+    name = safe_name(options.name or _name_of(d, options.result))
+    if options.textures is not None:
+        require_writable(output, texture_files(name), (options.result / MASK,))
+    monitor.report("building the mesh", 0.2)
+    built = mesh_of(d, MeshOptions(triangles=options.triangles))
+    if options.roughness is not None:
+        given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
+        built = replace(built, gloss=replace(built.gloss, **given))
+    monitor.report("writing", 0.4)
+    if options.format is not None:
+        files = write_mesh_file(built, output, options.format)
+        return hints(options, f"wrote {', '.join(map(str, files))}")
+    cover = object_cover(d, options.result / MASK)
+    writing = monitor.part(0.4, 1.0)
+    write_texture_set(
+        d,
+        built,
+        cover,
+        options.textures,
+        output,
+        name=name,
+        monitor=writing,
+    )
+    return hints(options, f"wrote {output}, see {output / texture_files(name)[0]}")
+
+
+def _name_of(d: Decomposition, folder: Path) -> str:
+    """The photo's name without its suffix, else the folder's."""
+    return Path(str(d.provenance.input.get("name", ""))).stem or folder.resolve().name

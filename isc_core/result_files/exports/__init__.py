@@ -1,0 +1,1 @@
+"""A result as files for other programs: texture sets and meshes."""

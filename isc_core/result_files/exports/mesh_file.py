@@ -1,0 +1,84 @@
+"""The mesh of a result as a file for other programs, with its textures.
+
+A `.glb` and a `.usdz` hold everything. Beside an `.obj` (with its `.mtl`) and a `.usd`, `.usda` or
+`.usdc` are the textures NAME_basecolor.png, NAME_mesh_normal.png (where the mesh has fewer vertices
+than pixels) and NAME_specular.png (where the level varies), NAME being that of the file.
+"""
+
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+
+from ...errors import InputError
+from ...io.atomic import new_file, require_writable_file
+from ..mesh import MeshResult
+from .obj import encode_obj
+from .usd import encode_usd
+
+SUFFIXES: Mapping[str, tuple[str, ...]] = {
+    "glb": (".glb",),
+    "obj": (".obj",),
+    "usd": (".usd", ".usda", ".usdc", ".usdz"),
+}
+
+
+def _encode_glb(built: MeshResult, path: Path) -> dict[str, bytes]:
+    return {path.name: built.glb()}
+
+
+_ENCODERS: Mapping[str, Callable[[MeshResult, Path], dict[str, bytes]]] = {
+    "glb": _encode_glb,
+    "obj": encode_obj,
+    "usd": encode_usd,
+}
+
+
+def check_mesh_path(path: Path, kind: str) -> None:
+    """Check, before the work, that a mesh can be written.
+
+    Parameters
+    ----------
+    path : Path
+    kind : str
+        One of `SUFFIXES`.
+
+    Raises
+    ------
+    InputError
+        If the format is unknown, the name has another suffix, or the file cannot be written.
+    """
+    if kind not in SUFFIXES:
+        raise InputError(f'unknown format "{kind}": choose {", ".join(SUFFIXES)}')
+    if path.suffix.lower() not in SUFFIXES[kind]:
+        raise InputError(f"{path}: give a name that ends with {' or '.join(SUFFIXES[kind])}")
+    require_writable_file(path)
+
+
+def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
+    """Write a mesh and what belongs to it: all files or none.
+
+    Parameters
+    ----------
+    built : MeshResult
+    path : Path
+    kind : str
+        One of `SUFFIXES`.
+
+    Returns
+    -------
+    list of Path
+        The files; `path` is the first.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be written, or a package is missing.
+    """
+    check_mesh_path(path, kind)
+    contents = _ENCODERS[kind](built, path)
+    targets = [path.with_name(name) for name in contents]
+    with ExitStack() as stack:
+        # All are complete before the first one gets its name; the mesh is the last.
+        for target, content in zip(targets, contents.values(), strict=True):
+            stack.enter_context(new_file(target)).write_bytes(content)
+    return targets

@@ -1,0 +1,329 @@
+"""A result as textures under the names and in the packings that other programs expect.
+
+Problem: each program wants the same quantities in files of its own: green of normal maps upward or
+downward, roughness or smoothness, several values in the channels of one file.
+
+The textures describe the surface over the plane of the photo: height, normal and occlusion belong
+together, on a flat sheet with the photo's proportions. Base colour, roughness, specular and
+occlusion serve the mesh, too (its texture coordinates are those of the photo), with `mesh_normal`
+in place of `normal`, which is written where the mesh needs one.
+
+    basecolor             sRGB, 8 bits: k * reflectance as in the mesh; alpha is the object's cover
+    normal, mesh_normal   (n + 1) / 2, 8 bits; green upward (OpenGL) or downward (DirectX)
+    roughness             8 bits, linear as all that follow
+    specular              8 bits; .5 is plastic, f0 = .08 * specular = .04
+    ao                    8 bits, see `shading.ambient_occlusion`
+    height                16 bits: 0 the lowest point of the object, 65535 the highest; float32 EXR:
+                          metres above the lowest
+    orm                   red occlusion, green roughness, blue metallic
+    metallic_smoothness   red metallic, alpha 1 - roughness
+    mask_map              red metallic, green occlusion, blue detail mask, alpha 1 - roughness
+
+A JSON file beside them has the scales, the conventions and where roughness and specular come from.
+
+Sources of the conventions: B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 courses
+(the specular scale, which Unreal and Blender share). Epic Games, Unreal Engine documentation,
+"Physically Based Materials" and "Normal Map Creation" (green downward). The packing orm is glTF's,
+Khronos Group (2021), section 3.9.2. Unity manual, "Standard Shader: Metallic mode" (smoothness in
+alpha) and "Normal map" (green upward); Unity HDRP manual, "Mask and detail maps". Blender manual,
+"Normal Map Node" (green upward) and "Node Wrangler" (recognises the names above).
+
+Limits: 8 bits clip base colours above 1 (.5 % of the pixels) and specular levels above that of f0 =
+.08. Unity's metallic materials have no specular level. Metallic is 0. Beyond 16 pixels around the
+object, textures hold the mean colour or a flat surface.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+from scipy import ndimage
+
+from ...errors import InputError
+from ...imaging.srgb import linear_to_srgb
+from ...io.atomic import new_folder
+from ...io.exr import write_channels
+from ...lobe_fitting.specular_level import SpecularSource
+from ...progress import Monitor
+from ...scene.decomposition import Decomposition
+from ...shading.ambient_occlusion import ambient_occlusion
+from ..mesh import MeshResult
+from .textures import PLASTIC
+
+_COMPRESSION = 2  # of 9: a third of the time of the usual 6
+_SEPARATE = ("basecolor", "normal", "mesh_normal", "roughness", "specular", "height", "ao")
+
+
+@dataclass(frozen=True)
+class TextureTarget:
+    """What a program expects.
+
+    Attributes
+    ----------
+    textures : tuple of str
+        Their names; `height` is written as PNG and as EXR.
+    green_down : bool
+        Normal maps are DirectX's.
+    """
+
+    textures: tuple[str, ...]
+    green_down: bool = False
+
+
+TARGETS: Mapping[str, TextureTarget] = {
+    "generic": TextureTarget(_SEPARATE),
+    "blender": TextureTarget(_SEPARATE),
+    "unity": TextureTarget(
+        (
+            *("basecolor", "normal", "mesh_normal", "metallic_smoothness", "mask_map"),
+            *("height", "ao"),
+        )
+    ),
+    "unreal": TextureTarget(
+        ("basecolor", "normal", "mesh_normal", "orm", "specular", "height"), green_down=True
+    ),
+}
+
+
+def texture_files(name: str) -> tuple[str, ...]:
+    """Return the files that any texture set of that name may have, the description first.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    tuple of str
+    """
+    textures = sorted({texture for target in TARGETS.values() for texture in target.textures})
+    pictures = (f"{name}_{texture}.png" for texture in textures)
+    return (f"{name}_textures.json", *pictures, f"{name}_height.exr")
+
+
+def write_texture_set(
+    d: Decomposition,
+    built: MeshResult,
+    cover: np.ndarray,
+    target: str,
+    folder: Path,
+    *,
+    name: str,
+    monitor: Monitor | None = None,
+) -> None:
+    """Write a texture set, completely or not at all; an earlier one of that name is replaced.
+
+    Parameters
+    ----------
+    d : Decomposition
+    built : MeshResult
+        The mesh of `d`.
+    cover : (H, W) ndarray
+        Alpha of the base colour.
+    target : str
+        One of `TARGETS`.
+    folder : Path
+    name : str
+        Begins the files' names.
+    monitor : Monitor, optional
+
+    Raises
+    ------
+    InputError
+        If the target is unknown, no roughness is known, or the folder cannot be written.
+    """
+    if target not in TARGETS:
+        raise InputError(f'unknown target "{target}": choose {", ".join(TARGETS)}')
+    monitor, wanted = monitor or Monitor(), TARGETS[target]
+    layers = _Layers(d, built, cover, *known_roughness(built), wanted.green_down)
+    textures = [
+        one for one in wanted.textures if one != "mesh_normal" or built.mesh.tangents is not None
+    ]
+    with new_folder(folder, texture_files(name)) as partial:
+        for number, texture in enumerate(textures):
+            monitor.report(f"writing {texture}", number / len(textures))
+            picture = Image.fromarray(getattr(layers, texture))
+            picture.save(partial / f"{name}_{texture}.png", compress_level=_COMPRESSION)
+        write_channels(partial / f"{name}_height.exr", {"Y": layers.metres})
+        text = json.dumps(_description(d, layers, target, textures, name), indent=2)
+        (partial / f"{name}_textures.json").write_text(text + "\n", encoding="utf-8")
+        monitor.report("writing textures", 1.0)
+
+
+def known_roughness(built: MeshResult) -> tuple[float, str]:
+    """Return the roughness of the textures, and where it comes from.
+
+    Parameters
+    ----------
+    built : MeshResult
+
+    Returns
+    -------
+    roughness : float
+        In [0, 1]; 1 for an object without highlights.
+    source : str
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    gloss = built.gloss
+    if gloss.roughness is not None:
+        return gloss.roughness, str(gloss.roughness_source)
+    if gloss.specular_source == SpecularSource.NO_HIGHLIGHTS:
+        return 1.0, str(gloss.specular_source)
+    raise InputError(
+        "the result has no fitted roughness: give one, such as --roughness 0.5, or decompose the "
+        "photo with --model joint"
+    )
+
+
+@dataclass(frozen=True)
+class _Layers:
+    """The textures as codes, computed when they are asked for."""
+
+    d: Decomposition
+    built: MeshResult
+    cover: np.ndarray
+    roughness_value: float
+    roughness_source: str
+    green_down: bool
+
+    @property
+    def basecolor(self) -> np.ndarray:
+        color = linear_to_srgb(np.clip(self.built.base_color, 0, 1))
+        return _codes(np.dstack([color, self.cover]))
+
+    @property
+    def normal(self) -> np.ndarray:
+        return self._vectors(self._continued(self.d.normal, (0.0, 0.0, 1.0)))
+
+    @property
+    def mesh_normal(self) -> np.ndarray:
+        return self._vectors(self.built.detail)
+
+    @property
+    def roughness(self) -> np.ndarray:
+        return np.full(self.d.mask.shape, _code(self.roughness_value), np.uint8)
+
+    @property
+    def specular(self) -> np.ndarray:
+        level = np.float32(PLASTIC * self.built.specular)
+        if self.built.gloss.variation is None:
+            return _codes(np.full(self.d.mask.shape, level))
+        return _codes(level * self._continued(self.built.gloss.variation, 1.0))
+
+    @property
+    def height(self) -> np.ndarray:
+        share = self.metres / max(self.highest, 1e-12)
+        return np.rint(65535 * np.clip(share, 0, 1)).astype(np.uint16)
+
+    @cached_property
+    def ao(self) -> np.ndarray:
+        share = ambient_occlusion(self.d.height, self.d.mask)
+        return _codes(self._continued(share, 1.0))
+
+    @property
+    def orm(self) -> np.ndarray:
+        return np.dstack([self.ao, self.roughness, np.zeros_like(self.ao)])
+
+    @property
+    def metallic_smoothness(self) -> np.ndarray:
+        empty = np.zeros_like(self.roughness)
+        return np.dstack([empty, empty, empty, 255 - self.roughness])
+
+    @property
+    def mask_map(self) -> np.ndarray:
+        empty = np.zeros_like(self.ao)
+        return np.dstack([empty, self.ao, empty, 255 - self.roughness])
+
+    @cached_property
+    def metres(self) -> np.ndarray:
+        """Heights (H, W) float32 above the lowest point of the object."""
+        level = (self.d.height - self.d.height[self.d.mask].min()) * self.built.metres_per_pixel
+        return self._continued(level.astype(np.float32), 0.0)
+
+    @property
+    def highest(self) -> float:
+        return float(self.metres.max())
+
+    @cached_property
+    def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Flat places of the pixels near the object, and those of their nearest of its pixels."""
+        return nearest_inside(self.d.mask, self.built.options.bleed)
+
+    def _continued(self, values: np.ndarray, beyond: Any) -> np.ndarray:
+        """The values inside the mask, continued around it; `beyond` further out."""
+        mask = self.d.mask if values.ndim == 2 else self.d.mask[..., None]
+        result = np.where(mask, values, np.asarray(beyond, values.dtype))
+        near, source = self._nearest
+        flat = result.reshape(mask.size, -1)
+        flat[near] = values.reshape(flat.shape)[source]
+        return result
+
+    def _vectors(self, vectors: np.ndarray) -> np.ndarray:
+        codes = _codes((vectors + 1) / 2)
+        if self.green_down:
+            codes[..., 1] = 255 - codes[..., 1]
+        return codes
+
+
+def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndarray]:
+    """Find the nearest pixels of a mask to those around it.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    distance : int
+        Largest distance in pixels.
+
+    Returns
+    -------
+    near : (N,) ndarray
+        Flat indices of the pixels outside the mask within that distance.
+    source : (N,) ndarray
+        Of the nearest pixel inside to each.
+    """
+    distances, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
+    near = np.flatnonzero(~mask & (distances <= distance))
+    return near, rows.reshape(-1)[near] * mask.shape[1] + columns.reshape(-1)[near]
+
+
+def _codes(values: np.ndarray) -> np.ndarray:
+    return np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8)
+
+
+def _code(value: float) -> int:
+    return round(255 * value)
+
+
+def _description(
+    d: Decomposition, layers: _Layers, target: str, textures: list[str], name: str
+) -> dict[str, Any]:
+    built = layers.built
+    gloss = built.describe()
+    return {
+        "target": target,
+        "photo": d.provenance.input.get("name", ""),
+        "size": list(d.mask.shape[::-1]),
+        "files": {texture: f"{name}_{texture}.png" for texture in textures}
+        | {"height_float": f"{name}_height.exr"},
+        "colour_space": {"basecolor": "sRGB", "others": "linear"},
+        "normal": "DirectX, green downward" if layers.green_down else "OpenGL, green upward",
+        "metres_per_pixel": built.metres_per_pixel,
+        "height": {"metres_at_0": 0.0, "metres_at_65535": layers.highest},
+        "reflectance_scale": built.reflectance_scale,
+        "roughness": {"value": layers.roughness_value, "source": layers.roughness_source},
+        "specular": {
+            "value": PLASTIC * built.specular,
+            "source": gloss["specular"]["source"],
+            "convention": "f0 = .08 * specular",
+        },
+        "metallic": 0.0,
+    }

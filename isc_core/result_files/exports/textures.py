@@ -1,0 +1,70 @@
+"""The textures of a mesh as PNG files, and its material in the terms of formats that name them."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..mesh import MeshResult, encoded_png
+
+PLASTIC = 0.5  # a specular texture's value for f0 = .04, as in Blender and Unreal
+
+
+def plain_stem(path: Path) -> str:
+    """Return the name of a file without its suffix, as formats allow names: without spaces.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    str
+    """
+    return re.sub(r"[^\w.-]", "_", path.stem)
+
+
+@dataclass(frozen=True)
+class MeshTextures:
+    """Names and contents of the textures of a mesh.
+
+    Attributes
+    ----------
+    files : dict of str to bytes
+        Name and content of each file.
+    base_color : str
+        Name.
+    normal, specular : str or None
+        Names; None where a value is enough.
+    """
+
+    files: dict[str, bytes]
+    base_color: str
+    normal: str | None
+    specular: str | None
+
+    @staticmethod
+    def of(built: MeshResult, name: str) -> "MeshTextures":
+        """Encode the textures of a mesh.
+
+        Parameters
+        ----------
+        built : MeshResult
+        name : str
+            Begins the files' names.
+
+        Returns
+        -------
+        MeshTextures
+        """
+        base_color = f"{name}_basecolor.png"
+        files, normal, specular = {base_color: built.base_color_png()}, None, None
+        if built.mesh.tangents is not None:
+            normal = f"{name}_mesh_normal.png"
+            files[normal] = built.normal_png()
+        if built.gloss.variation is not None:
+            specular = f"{name}_specular.png"
+            level = PLASTIC * built.specular * built.gloss.variation
+            files[specular] = encoded_png(np.rint(255 * np.clip(level, 0, 1)).astype(np.uint8))
+        return MeshTextures(files, base_color, normal, specular)
