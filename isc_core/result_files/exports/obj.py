@@ -4,7 +4,7 @@ Format: lines of vertices (`v`), texture coordinates (`vt`, v from the bottom), 
 faces (`f`), whose indices begin at 1. The material's roughness `Pr`, metallic `Pm` and normal map
 `norm` are the extension for physically based materials (R. Mach, exocortex, 2013), which Blender
 and others read; `Ns` and `Ks` are what Blender writes for the same roughness and specular level, .5
-being plastic.
+being plastic. Blender takes the normal map from `map_Bump`, which programs that know `norm` ignore.
 
 Citation: M. Ramey et al., "Object files (.obj)", Wavefront Technologies 1995 (no DOI).
 
@@ -62,7 +62,7 @@ def _rows(line: str, values: np.ndarray) -> Iterator[str]:
 
 
 def _material(built: MeshResult, name: str, textures: MeshTextures) -> str:
-    level = min(PLASTIC * built.specular, 1.0)
+    level = 1.0 if textures.specular else min(PLASTIC * built.specular, 1.0)
     lines = [
         f"newmtl {name}",
         "Kd 1 1 1",
@@ -73,6 +73,7 @@ def _material(built: MeshResult, name: str, textures: MeshTextures) -> str:
         f"Pm {built.options.metallic:.6g}",
         f"map_Kd {textures.base_color}",
         *([f"norm {textures.normal}"] if textures.normal else []),
+        *([f"map_Bump -bm 1 {textures.normal}"] if textures.normal else []),
         *([f"map_Ks {textures.specular}"] if textures.specular else []),
     ]
     return "\n".join(["# ISC", *lines, ""])

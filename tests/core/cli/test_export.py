@@ -1,0 +1,115 @@
+"""`isc export`: what it writes, and one line for what it cannot."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from isc_core.cli.main import main
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.result_files.result_folder import save
+from tests.core.ball_scene import ball
+from tests.core.command_line import run_isc
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ball whose lobe is known."""
+    d, folder = ball(), tmp_path_factory.mktemp("results") / "ball"
+    save(replace(d, brdf=fit_lobe(d.specular, d.normal, d.mask)), folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def unfitted(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("results") / "plain"
+    save(ball((48, 60), 20.0, (22, 33)), folder)
+    return folder
+
+
+def exported(*arguments: object) -> int:
+    return main(["export", *map(str, arguments)])
+
+
+def test_textures_are_named_after_the_photo_or_as_asked(result: Path, tmp_path: Path) -> None:
+    assert exported(result, "--textures", "unreal", "-o", tmp_path / "a") == 0
+    assert (tmp_path / "a" / "ball_orm.png").is_file()
+    again = [result, "--textures", "generic", "--name", "my mug", "-o", tmp_path / "b"]
+    assert exported(*again, "--roughness", "0.25") == 0
+    description = json.loads((tmp_path / "b" / "my_mug_textures.json").read_text())
+    assert description["roughness"] == {"value": 0.25, "source": "given"}
+    assert description["photo"] == "ball.png"
+
+
+def test_the_mesh_has_as_many_triangles_as_asked_for(result: Path, tmp_path: Path) -> None:
+    faces = {}
+    for most in (0, 2000):
+        path = tmp_path / f"ball{most}.glb"
+        assert exported(result, "--format", "glb", "--triangles", most, "-o", path) == 0
+        faces[most] = len(trimesh.load(path, force="mesh").faces)
+    assert faces[0] > 4000 and 1900 < faces[2000] <= 2000
+    assert (tmp_path / "ball0.glb").read_bytes() == (result / "mesh.glb").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--textures", "godot", "-o", "out"], "invalid choice: 'godot'"),
+        (["--format", "fbx", "-o", "out.fbx"], "invalid choice: 'fbx'"),
+        (["-o", "out"], "one of the arguments --textures --format is required"),
+        (["--textures", "unity", "--format", "obj", "-o", "out"], "not allowed with"),
+        (["--format", "obj", "-o", "out.glb"], "give a name that ends with .obj"),
+        (["--textures", "unity", "-o", "out"], "no fitted roughness: give one"),
+        (["--textures", "unity", "--roughness", "2", "-o", "out"], "not a number from 0 to 1"),
+        (["--textures", "unity", "--triangles", "-3", "-o", "out"], "not a whole number, 0 or"),
+    ],
+)
+def test_what_cannot_be_exported_is_one_line(
+    unfitted: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert exported(unfitted, "-q", *arguments) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_is_no_result_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "photos").mkdir()
+    for folder in ("photos", "absent"):
+        given = [tmp_path / folder, "-q", "--textures", "unity", "-o", tmp_path / "out"]
+        assert exported(*given) == 2
+        error = capsys.readouterr().err
+        assert "is not a result folder" in error and error.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["photos"]
+
+
+# From the moment when the result has been read, no file may have more than 9,000 bytes.
+LIMIT = """import resource, signal
+import isc_core.cli.commands.export as command
+build = command.mesh_of
+def limited(*arguments):
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
+    return build(*arguments)
+command.mesh_of = limited"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("what", "output"), [(["--textures", "generic"], "set"), (["--format", "obj"], "ball.obj")]
+)
+def test_a_disk_that_takes_no_more_leaves_nothing(
+    result: Path, tmp_path: Path, what: list[str], output: str
+) -> None:
+    done = run_isc("export", result, "-q", *what, "-o", tmp_path / output, before=LIMIT)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1 and "cannot write" in done.stderr
+    assert not list(tmp_path.iterdir())

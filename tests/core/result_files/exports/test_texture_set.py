@@ -1,0 +1,216 @@
+"""Texture sets: every channel is the quantity that it is named after."""
+
+import errno
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from isc_core.errors import InputError
+from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
+from isc_core.photo.grabcut import encoded_mask
+from isc_core.result_files.exports import texture_set
+from isc_core.result_files.exports.soft_alpha import object_cover
+from isc_core.result_files.exports.texture_set import TARGETS, texture_files, write_texture_set
+from isc_core.result_files.mesh import MeshResult, build_mesh
+from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.ambient_occlusion import ambient_occlusion
+from tests.core.ball_scene import ball
+
+FITTED = SpecularSource.FITTED
+
+
+def glossy(d: Decomposition, triangles: int = 3000, gloss: SpecularFit | None = None) -> MeshResult:
+    given = gloss or SpecularFit(0.3, 0.5, FITTED, FITTED)
+    options = MeshOptions(triangles=triangles)
+    return build_mesh(d.height, d.normal, d.mask, d.reflectance, options, given)
+
+
+def written(target: str, folder: Path, built: MeshResult | None = None) -> Path:
+    d = ball()
+    cover = d.mask.astype(np.float32)
+    write_texture_set(d, built or glossy(d), cover, target, folder, name="ball")
+    return folder
+
+
+def codes(path: Path) -> np.ndarray:
+    with Image.open(path) as image:
+        return np.asarray(image)
+
+
+def floats(path: Path) -> np.ndarray:
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        return np.asarray(file.channels()["Y"].pixels)
+
+
+@pytest.fixture(scope="module")
+def generic(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return written("generic", tmp_path_factory.mktemp("set") / "generic")
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_target_has_the_files_that_its_description_names(target: str, tmp_path: Path) -> None:
+    folder = written(target, tmp_path / "set")
+    description = json.loads((folder / "ball_textures.json").read_text())
+    assert description["target"] == target
+    assert sorted(p.name for p in folder.iterdir()) == sorted(
+        ["ball_textures.json", *description["files"].values()]
+    )
+    assert set(description["files"].values()) <= set(texture_files("ball"))
+    sizes = {codes(path).shape[:2] for path in folder.glob("*.png")}
+    assert sizes == {(96, 120)} and description["size"] == [120, 96]
+
+
+def test_the_base_color_is_that_of_the_mesh_with_the_object_as_alpha(generic: Path) -> None:
+    d, found = ball(), codes(generic / "ball_basecolor.png")
+    assert found.dtype == np.uint8 and found.shape == (96, 120, 4)
+    assert (found[..., 3] == 255 * d.mask).all()
+    linear = srgb_to_linear(found[..., :3] / 255)
+    assert np.abs(linear - glossy(d).base_color).max() < 0.005
+
+
+def test_normals_are_opengl_or_directx(generic: Path, tmp_path: Path) -> None:
+    d = ball()
+    upward = codes(generic / "ball_normal.png").astype(int)
+    downward = codes(written("unreal", tmp_path / "set") / "ball_normal.png").astype(int)
+    assert np.abs(upward[d.mask] / 127.5 - 1 - d.normal[d.mask]).max() < 0.005
+    top = np.argwhere(d.mask)[0]
+    assert upward[tuple(top)][1] > 200 > 60 > downward[tuple(top)][1]
+    assert (downward[..., 1] == 255 - upward[..., 1]).all()
+    assert (downward[..., ::2] == upward[..., ::2]).all()
+    assert (upward[0, 0] == [128, 128, 255]).all()
+
+
+def test_the_mesh_has_a_normal_map_of_its_own_where_it_needs_one(
+    generic: Path, tmp_path: Path
+) -> None:
+    built = glossy(ball())
+    local = codes(generic / "ball_mesh_normal.png") / 127.5 - 1
+    assert np.abs(local - built.detail).max() < 0.005
+    folder = written("generic", tmp_path / "set", glossy(ball(), triangles=0))
+    assert not (folder / "ball_mesh_normal.png").exists()
+
+
+def test_roughness_and_specular_are_the_fitted_ones(generic: Path) -> None:
+    assert (codes(generic / "ball_roughness.png") == round(255 * 0.3)).all()
+    level = 0.5 * glossy(ball()).specular
+    assert np.abs(codes(generic / "ball_specular.png") / 255 - level).max() < 0.003
+    description = json.loads((generic / "ball_textures.json").read_text())
+    assert description["roughness"] == {"value": 0.3, "source": "fitted"}
+    assert description["specular"]["value"] == pytest.approx(level)
+
+
+def test_a_level_that_varies_is_in_the_specular_texture(tmp_path: Path) -> None:
+    d = ball()
+    variation = np.where(np.indices(d.mask.shape)[1] > 60, 1.0, 0.5)
+    built = glossy(d, gloss=SpecularFit(0.3, 0.5, FITTED, FITTED, variation))
+    found = codes(written("generic", tmp_path / "set", built) / "ball_specular.png") / 255
+    assert np.abs(found - 0.5 * built.specular * variation)[d.mask].max() < 0.003
+
+
+def test_height_has_its_scale_in_the_description(generic: Path) -> None:
+    d, built = ball(), glossy(ball())
+    whole, exact = codes(generic / "ball_height.png"), floats(generic / "ball_height.exr")
+    assert whole.dtype == np.uint16 and exact.dtype == np.float32
+    scale = json.loads((generic / "ball_textures.json").read_text())["height"]
+    metres = (d.height - d.height[d.mask].min()) * built.metres_per_pixel
+    assert np.abs(exact - metres)[d.mask].max() < 1e-8
+    span = scale["metres_at_65535"] - scale["metres_at_0"]
+    assert np.abs(whole / 65535 * span - metres)[d.mask].max() <= 0.51 * span / 65535 + 1e-9
+    assert whole[d.mask].max() == 65535 and whole[d.mask].min() == 0
+
+
+def test_the_occlusion_is_that_of_the_height_map(generic: Path) -> None:
+    d = ball()
+    expected = ambient_occlusion(d.height, d.mask)
+    assert np.abs(codes(generic / "ball_ao.png") / 255 - expected)[d.mask].max() < 0.003
+
+
+def test_packed_channels(generic: Path, tmp_path: Path) -> None:
+    roughness, ao = (codes(generic / f"ball_{name}.png") for name in ("roughness", "ao"))
+    orm = codes(written("unreal", tmp_path / "unreal") / "ball_orm.png")
+    assert (orm == np.dstack([ao, roughness, 0 * ao])).all()
+    unity = written("unity", tmp_path / "unity")
+    smooth = codes(unity / "ball_metallic_smoothness.png")
+    assert (smooth[..., 0] == 0).all() and (smooth[..., 3] == 255 - roughness).all()
+    packed = codes(unity / "ball_mask_map.png")
+    assert (packed == np.dstack([0 * ao, ao, 0 * ao, 255 - roughness])).all()
+
+
+def test_textures_continue_beyond_the_object(generic: Path) -> None:
+    """So that filtering draws no rim of flat normals or black height."""
+    d = ball()
+    row = 44
+    column = np.flatnonzero(d.mask[row])[-1]
+    for name in ("normal", "height", "ao", "basecolor"):
+        values = codes(generic / f"ball_{name}.png")[..., None][row, column - 0 : column + 3]
+        colors = values.reshape(3, -1)[:, :3]
+        assert (colors[1] == colors[0]).all() and (colors[2] == colors[0]).all(), name
+
+
+def test_no_roughness_is_one_line_and_no_folder(tmp_path: Path) -> None:
+    built = glossy(ball(), gloss=SpecularFit())
+    with pytest.raises(InputError, match="no fitted roughness: give one, such as --roughness") as e:
+        written("generic", tmp_path / "set", built)
+    assert "\n" not in str(e.value)
+    assert not list(tmp_path.iterdir())
+    none = SpecularFit(None, 0.0, SpecularSource.NOT_FITTED, SpecularSource.NO_HIGHLIGHTS)
+    folder = written("generic", tmp_path / "set", glossy(ball(), gloss=none))
+    assert (codes(folder / "ball_roughness.png") == 255).all()
+
+
+def test_an_unknown_target_and_a_foreign_folder_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match='unknown target "godot": choose generic, blender'):
+        written("godot", tmp_path / "set")
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="not empty"):
+        written("generic", tmp_path / "set")
+    assert [path.name for path in (tmp_path / "set").iterdir()] == ["mine.txt"]
+
+
+def test_a_full_disk_leaves_the_earlier_set(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = written("generic", tmp_path / "set")
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+
+    def full(path: Path, channels: object) -> None:
+        path.write_bytes(b"half")
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(texture_set, "write_channels", full)
+    with pytest.raises(InputError, match="no space is left on the disk") as caught:
+        written("unreal", folder)
+    assert "\n" not in str(caught.value)
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+    assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_alpha_is_soft_where_the_mask_was(tmp_path: Path) -> None:
+    """A mask of the photo at twice the size of the maps, whose edge is a ramp of four pixels."""
+    d = ball((96, 120), 40.0, (44.0, 66.0))
+    source = {**d.provenance.input, "scale": 0.5}
+    d = replace(d, provenance=replace(d.provenance, input=source))
+    row, column = (np.indices((192, 240)) + 0.5) / 2 - 0.5
+    away = np.hypot(row - 44, column - 66)
+    cover = np.clip((0.99 * 40 + 1 - away) / 2, 0, 1)
+    cover[:20, :20] = 1  # another thing
+    (tmp_path / "mask.png").write_bytes(encoded_mask(cover))
+    found = object_cover(d, tmp_path / "mask.png")
+    assert found.shape == d.mask.shape
+    mean = cover.reshape(96, 2, 120, 2).mean((1, 3))
+    near = np.hypot(*(np.indices(d.mask.shape) - np.array([44, 66])[:, None, None])) < 42
+    assert np.abs(found - mean)[near].max() < 0.004
+    assert found[:8, :8].max() == 0
+    soft = (found > 0.02) & (found < 0.98)
+    assert soft.sum() > 200
+    assert (object_cover(d, tmp_path / "absent.png") == d.mask).all()
+    (tmp_path / "other.png").write_bytes(encoded_mask(cover[:100]))
+    assert (object_cover(d, tmp_path / "other.png") == d.mask).all()
