@@ -62,6 +62,7 @@ from .mesh_options import MeshOptions
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
+_ROWS = 256  # coded at once
 _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
 
 
@@ -158,11 +159,11 @@ class MeshResult:
 
     def base_color_png(self) -> bytes:
         """Return the base colour as the bytes of a PNG, 8-bit sRGB."""
-        return encoded_png(_color_codes(self.base_color))
+        return encoded_png(color_codes(self.base_color))
 
     def normal_png(self) -> bytes:
         """Return the tangent-space normal map as the bytes of a PNG, green upward."""
-        return encoded_png(_vector_codes(self.detail))
+        return encoded_png(vector_codes(self.detail))
 
     def _specular_extension(self, first_texture: int) -> tuple[dict[str, Any], list[bytes]]:
         """KHR_materials_specular of the material, and the texture that it refers to, if any."""
@@ -311,12 +312,35 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
         k * reflectance, linear.
     k : float
     """
-    inside = reflectance[mask].astype(np.float64)
-    bright = float(np.percentile(inside.max(-1), 99.5))
+    bright = float(np.percentile(reflectance[mask].max(-1).astype(np.float64), 99.5))
     k = _BRIGHT / bright if bright > 0 else 1.0
-    distance, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
-    filled = np.where((distance <= bleed)[..., None], reflectance[rows, columns], inside.mean(0))
-    return k * filled, k
+    mean = reflectance[mask].astype(np.float64).mean(0)
+    near, source = nearest_inside(mask, bleed)
+    color = np.where(mask[..., None], reflectance, mean)
+    color.reshape(-1, 3)[near] = reflectance.reshape(-1, 3)[source]
+    color *= k
+    return color, k
+
+
+def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndarray]:
+    """Find the nearest pixels of a mask to those around it.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    distance : int
+        Largest distance in pixels.
+
+    Returns
+    -------
+    near : (N,) ndarray
+        Flat indices of the pixels outside the mask within that distance.
+    source : (N,) ndarray
+        Of the nearest pixel inside to each.
+    """
+    distances, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
+    near = np.flatnonzero(~mask & (distances <= distance))
+    return near, rows.reshape(-1)[near].astype(np.int64) * mask.shape[1] + columns.reshape(-1)[near]
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
@@ -511,12 +535,40 @@ def _facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _color_codes(linear: np.ndarray) -> np.ndarray:
-    return np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+def color_codes(linear: np.ndarray) -> np.ndarray:
+    """Return linear colours as 8-bit sRGB codes.
+
+    Parameters
+    ----------
+    linear : (H, W, 3) ndarray
+
+    Returns
+    -------
+    (H, W, 3) uint8 ndarray
+    """
+    codes = np.empty(linear.shape, np.uint8)
+    for top in range(0, len(linear), _ROWS):  # so that no large array is made for a step
+        part = linear[top : top + _ROWS]
+        codes[top : top + _ROWS] = np.rint(255 * linear_to_srgb(np.clip(part, 0, 1)))
+    return codes
 
 
-def _vector_codes(vectors: np.ndarray) -> np.ndarray:
-    return np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8)
+def vector_codes(vectors: np.ndarray) -> np.ndarray:
+    """Return unit vectors as 8-bit codes, (n + 1) / 2.
+
+    Parameters
+    ----------
+    vectors : (H, W, 3) ndarray
+
+    Returns
+    -------
+    (H, W, 3) uint8 ndarray
+    """
+    codes = np.empty(vectors.shape, np.uint8)
+    for top in range(0, len(vectors), _ROWS):
+        part = vectors[top : top + _ROWS]
+        codes[top : top + _ROWS] = np.rint(np.clip(part * 127.5 + 127.5, 0, 255))
+    return codes
 
 
 def _alpha_codes(values: np.ndarray) -> np.ndarray:

@@ -42,17 +42,15 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from scipy import ndimage
 
 from ...errors import InputError
-from ...imaging.srgb import linear_to_srgb
 from ...io.atomic import new_folder
 from ...io.exr import write_channels
 from ...lobe_fitting.specular_level import SpecularSource
 from ...progress import Monitor
 from ...scene.decomposition import Decomposition
 from ...shading.ambient_occlusion import ambient_occlusion
-from ..mesh import MeshResult
+from ..mesh import MeshResult, color_codes, nearest_inside, vector_codes
 from .textures import PLASTIC
 
 _COMPRESSION = 2  # of 9: a third of the time of the usual 6
@@ -197,8 +195,7 @@ class _Layers:
 
     @property
     def basecolor(self) -> np.ndarray:
-        color = linear_to_srgb(np.clip(self.built.base_color, 0, 1))
-        return _codes(np.dstack([color, self.cover]))
+        return np.dstack([color_codes(self.built.base_color), _codes(self.cover)])
 
     @property
     def normal(self) -> np.ndarray:
@@ -268,31 +265,10 @@ class _Layers:
         return result
 
     def _vectors(self, vectors: np.ndarray) -> np.ndarray:
-        codes = _codes((vectors + 1) / 2)
+        codes = vector_codes(vectors)
         if self.green_down:
             codes[..., 1] = 255 - codes[..., 1]
         return codes
-
-
-def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nearest pixels of a mask to those around it.
-
-    Parameters
-    ----------
-    mask : (H, W) bool ndarray
-    distance : int
-        Largest distance in pixels.
-
-    Returns
-    -------
-    near : (N,) ndarray
-        Flat indices of the pixels outside the mask within that distance.
-    source : (N,) ndarray
-        Of the nearest pixel inside to each.
-    """
-    distances, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
-    near = np.flatnonzero(~mask & (distances <= distance))
-    return near, rows.reshape(-1)[near] * mask.shape[1] + columns.reshape(-1)[near]
 
 
 def _codes(values: np.ndarray) -> np.ndarray:
