@@ -54,7 +54,7 @@ class PartPrediction:
 
 
 def predict_part(
-    light: np.ndarray, part: Part, hints: Hints, network: MaskNetwork | None
+    light: np.ndarray, part: Part, hints: Hints, network: MaskNetwork | None, side: int = SIDE
 ) -> PartPrediction:
     """Ask the network for the mask of a part.
 
@@ -67,33 +67,35 @@ def predict_part(
         In pixels of `light`; those outside of the part are left out.
     network : MaskNetwork or None
         None: the shipped one.
+    side : int
+        Pixels of the frame, a multiple of 32.
 
     Returns
     -------
     PartPrediction
     """
-    factor = SIDE / max(part.width, part.height)
-    # as many pixels as SIDE on both sides of the middle, so that a mirrored photo is seen mirrored
+    factor = side / max(part.width, part.height)
+    # as many pixels on both sides of the middle, so that a mirrored photo is seen mirrored
     width, height = (
-        min(max(2 * round(n * factor / 2), 2), SIDE) for n in (part.width, part.height)
+        min(max(2 * round(n * factor / 2), 2), side) for n in (part.width, part.height)
     )
-    left, top = (SIDE - width) // 2, (SIDE - height) // 2
+    left, top = (side - width) // 2, (side - height) // 2
     place = slice(top, top + height), slice(left, left + width)
-    small, frame = np.zeros((SIDE, SIDE, 3), np.float32), np.zeros((SIDE, SIDE), bool)
+    small, frame = np.zeros((side, side, 3), np.float32), np.zeros((side, side), bool)
     small[place], frame[place] = resized(light[part.slices], width, height), True
     scale = width / part.width, height / part.height
-    drawn = _drawn(hints, part, scale, (left, top))
+    drawn = _drawn(hints, part, scale, (left, top), side)
     found = predict_mask(small, frame, drawn, network)
     cover = resized(found.cover[place], part.width, part.height)
     return PartPrediction(cover.clip(0, 1), found.counts)
 
 
 def _drawn(
-    hints: Hints, part: Part, scale: tuple[float, float], place: tuple[int, int]
+    hints: Hints, part: Part, scale: tuple[float, float], place: tuple[int, int], side: int
 ) -> np.ndarray:
-    """The hints (SIDE, SIDE, 3) as the network sees them."""
-    maps = np.zeros((SIDE, SIDE, 3), np.float32)
-    rows, columns = np.indices((SIDE, SIDE))
+    """The hints (side, side, 3) as the network sees them."""
+    maps = np.zeros((side, side, 3), np.float32)
+    rows, columns = np.indices((side, side))
 
     def placed(x: float, y: float) -> tuple[float, float]:
         return (

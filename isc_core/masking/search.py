@@ -3,10 +3,9 @@
 Problem: a photo without mask, alpha channel or plain border shows a thing before something else.
 
 Equation: the network (`networks.mask_network`) looks at the whole photo, then at the surroundings
-of what it found, where the thing is larger. They agree by o, the sum of the smaller over the sum of
-the larger probabilities. The log odds of a right mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o)
-for the log odds l of one thing at both looks and of their agreement; w is fitted
-(`training.masks.mask_calibration`).
+of what it found, where the thing is larger. The second look is the mean of two, in frames of 96 and
+of 128 pixels: what is large to the one is small to the other, and they err apart. `evidence` tells
+how sure the mask is, and `refinement` brings it to the photo's own pixels.
 
 Citation: see `networks.mask_network` and `refinement`; a thing reaches the sides of its box: V.
 Lempitsky et al. 2009, doi:10.1109/ICCV.2009.5459262. Where the network's mask does not, the box is
@@ -15,7 +14,6 @@ segmented by colours alone (`photo.grabcut`).
 Limits: measured in docs/methods/automatic_mask.md.
 """
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -26,16 +24,16 @@ from ..networks.mask_network import Count, MaskNetwork
 from ..photo.found_mask import FoundMask
 from ..photo.grabcut import Box, grabcut
 from ..photo.masks import resized, tidy_mask
+from .evidence import evidence_of, no_evidence, sureness_of
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
 from .refinement import refined
 
 WORKING = 768  # pixels of the longer side of the photo that is worked on
+_SIDES = (96, 128)  # pixels of the network's frame at the second look
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _FILLED = 0.75  # of the sides of a box: a smaller mask is not what the box was drawn around
 _NOTHING = 0.5  # probability from which a photo shows no things
-_UNSURE = 1e-3
-_LEAST = 1e-6
 
 
 def find_mask(
@@ -160,15 +158,11 @@ def _second_look(
 ) -> FoundMask:
     """Look closer at what the first look found, and refine its outline."""
     inside = _meant(first.cover, hints)
+    weights = (network or MaskNetwork.shipped()).sureness
     if not inside.any():
-        nothing = evidence_of(float(first.counts[Count.ONE]), 0, 0)
-        return FoundMask(np.zeros_like(first.cover), 0.0, first.counts, nothing)
+        return FoundMask(np.zeros_like(first.cover), 0.0, first.counts, no_evidence(first))
     part = _around(mask_box(inside), light.shape)
-    second = predict_part(light, part, hints, network)
-    before = first.cover[part.slices]
-    agreement = float(np.minimum(before, second.cover).sum(dtype=float)) / max(
-        float(np.maximum(before, second.cover).sum(dtype=float)), _LEAST
-    )
+    second = _averaged([predict_part(light, part, hints, network, side) for side in _SIDES])
     known = _known(hints, part, second.cover.shape)
     cover = np.zeros_like(first.cover)
     cover[part.slices] = refined(light[part.slices], second.cover, known)
@@ -177,30 +171,15 @@ def _second_look(
         left, top, wide, high = hints.box
         outside[top : top + high, left : left + wide] = False
         cover[outside] = 0
-    looks = float(first.counts[Count.ONE]), float(second.counts[Count.ONE])
-    evidence = evidence_of(*looks, agreement)
-    weights = (network or MaskNetwork.shipped()).sureness
-    sureness = 1 / (1 + math.exp(-float((weights * evidence).sum())))
-    return FoundMask(cover, sureness, first.counts, evidence)
+    evidence = evidence_of(first, second, first.cover[part.slices])
+    return FoundMask(cover, sureness_of(evidence, weights), first.counts, evidence)
 
 
-def evidence_of(first: float, second: float, agreement: float) -> np.ndarray:
-    """Return what sureness is computed from.
-
-    Parameters
-    ----------
-    first, second : float
-        Probability of one thing at the first and at the second look.
-    agreement : float
-        Of both masks, 0 to 1.
-
-    Returns
-    -------
-    (4,) ndarray
-        1, and log odds of the three.
-    """
-    shares = np.clip([first, second, agreement], _UNSURE, 1 - _UNSURE)
-    return np.concatenate([[1.0], np.log(shares / (1 - shares))])
+def _averaged(looks: list[PartPrediction]) -> PartPrediction:
+    cover, counts = (
+        np.mean([getattr(one, name) for one in looks], axis=0) for name in ("cover", "counts")
+    )
+    return PartPrediction(cover, counts)
 
 
 def _meant(cover: np.ndarray, hints: Hints) -> np.ndarray:

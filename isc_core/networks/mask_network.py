@@ -42,7 +42,7 @@ SIDE, BLOCK = 96, 4  # pixels of the network's frame, and of a block
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
 COARSE = 2  # levels that the number of things is read from, the coarsest ones
-SURENESS = 4
+SURENESS = 6
 _LEAST = 1e-6
 
 
@@ -66,9 +66,8 @@ class MaskNetwork(Network):
     dense : tuple of (inputs, outputs) ndarray
         The two layers of the number of things.
     offsets : tuple of (outputs,) ndarray
-    sureness : (4,) ndarray
-        Weights of the log odds that a mask is right: a constant, the log odds of one thing at the
-        first and at the second look, those of their agreement.
+    sureness : (SURENESS,) ndarray
+        Weights of the log odds that a mask is right, see `isc_core.masking.evidence`.
     """
 
     title = "mask network"
@@ -202,11 +201,11 @@ def predict_mask(
 
     Parameters
     ----------
-    light : (SIDE, SIDE, 3) ndarray
-        Linear, not negative.
-    frame : (SIDE, SIDE) bool ndarray
+    light : (side, side, 3) ndarray
+        Linear, not negative; `SIDE` pixels or another multiple of 32.
+    frame : (side, side) bool ndarray
         The photo's place in the frame.
-    hints : (SIDE, SIDE, 3) ndarray
+    hints : (side, side, 3) ndarray
         See `channels_of`.
     network : MaskNetwork, optional
         By default the shipped one.

@@ -20,8 +20,8 @@ class FoundMask:
         Probability that this is the one thing meant, 0 to 1; not calibrated with hints.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several things.
-    evidence : (4,) ndarray
-        What the sureness was computed from, see `masking.search.evidence_of`.
+    evidence : (N,) ndarray
+        What the sureness was computed from, see `masking.evidence`.
     """
 
     cover: np.ndarray

@@ -24,6 +24,7 @@ from ..world.random_draws import log_uniform
 from ..world.tensor_batch import TensorBatch
 from .ingredients import LENGTH, SIDE, Ingredients
 from .scenes import MEANT, SHARES, Scene, Thing, draw_scene
+from .variation import varied_light, varied_scene
 
 _HALVED = (0.62, 0.31)  # bodies smaller than that are taken from pictures of half the size
 _COARSE = 2  # pixels of a pixel of shadow
@@ -69,6 +70,8 @@ class Composites:
         Share of photos with hints.
     shares : tuple of float
         Of scenes without a thing, with one, with several.
+    varied : bool
+        Vary bodies and backgrounds, see `variation`.
     """
 
     def __init__(
@@ -78,6 +81,7 @@ class Composites:
         side: int = SIDE,
         hinted: float = 0.5,
         shares: tuple[float, ...] = SHARES,
+        varied: bool = False,
     ) -> None:
         self._bodies = [torch.from_numpy(ingredients.bodies)]
         for _ in _HALVED:
@@ -85,6 +89,7 @@ class Composites:
         self._backgrounds = torch.from_numpy(ingredients.backgrounds)
         self._linear = decoded_srgb(torch.arange(256) / 255)
         self._size, self._side, self._hinted, self._shares = size, side, hinted, shares
+        self._varied = varied
 
     def __call__(self, rng: np.random.Generator) -> Composite:
         """Draw a batch.
@@ -98,6 +103,8 @@ class Composites:
         Composite
         """
         scenes = [draw_scene(rng, len(self._bodies[0]), self._shares) for _ in range(self._size)]
+        if self._varied:
+            scenes = [varied_scene(one, rng) for one in scenes]
         frame = frames(np.array([one.shape for one in scenes]), self._side)
         light = self._grounds(scenes, rng)
         most = max(len(one.things) for one in scenes)
@@ -124,6 +131,8 @@ class Composites:
         size = [len(scenes), 3, self._side, self._side]
         grid = functional.affine_grid(torch.from_numpy(theta).float(), size, align_corners=False)
         light = functional.grid_sample(light, grid, padding_mode="border", align_corners=False)
+        if self._varied:
+            light = varied_light(light, rng)
         level = torch.tensor([one.level for one in scenes]).float()[:, None, None, None]
         return light * (level / light.mean((1, 2, 3), keepdim=True).clamp(min=1e-3))
 
@@ -138,7 +147,9 @@ class Composites:
             rows = np.flatnonzero(levels == level)
             coded = self._bodies[level][torch.tensor([things[k].body for k in rows])]
             cover = coded[:, 3:].float() / 255
-            layers = torch.cat([self._linear[coded[:, :3].long()] * cover, cover], dim=1)
+            shown = torch.tensor([things[k].channels for k in rows])
+            colours = coded[torch.arange(len(rows))[:, None], shown]
+            layers = torch.cat([self._linear[colours.long()] * cover, cover], dim=1)
             size = [len(rows), 4, self._side, self._side]
             grid = functional.affine_grid(theta[rows], size, align_corners=False)
             found[rows] = functional.grid_sample(layers, grid, align_corners=False)
@@ -269,8 +280,9 @@ def _inverse(thing: Thing) -> np.ndarray:
     """The affine map (2, 3) from the frame to the body's picture, as `affine_grid` wants it."""
     c, s = np.cos(thing.angle), np.sin(thing.angle)
     turn = np.array([[c, s], [-s, c]]) * [[thing.mirror], [1]]
-    scale = LENGTH / thing.length
-    return np.concatenate([scale * turn, -scale * turn @ thing.place[:, None]], axis=1)
+    scale = LENGTH / thing.length / np.array(thing.stretch)[:, None]
+    turn = scale * turn
+    return np.concatenate([turn, -turn @ thing.place[:, None]], axis=1)
 
 
 def _halved(bodies: torch.Tensor) -> torch.Tensor:

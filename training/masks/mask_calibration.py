@@ -3,7 +3,7 @@
   python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
 Equation: logistic regression of "the photo shows one thing, and the mask overlaps it by .5 or
-more" on `isc_core.masking.search.evidence_of`, with a small ridge. Photos are those of part A of
+more" on `isc_core.masking.evidence`, with a small ridge. Photos are those of part A of
 `training.masks.held_out`; part B judges. A table of thresholds follows.
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
@@ -61,7 +61,7 @@ def observed(photos: list[HeldOut], network: MaskNetwork) -> tuple[np.ndarray, n
 
     Returns
     -------
-    evidence : (N, 4) ndarray
+    evidence : (N, SURENESS) ndarray
     right : (N,) bool ndarray
     """
     rows, right = [], []
@@ -83,7 +83,7 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--weights", type=Path, required=True, metavar="NPZ", help="what was fitted")
-    add("--count", type=int, default=160, help="photos (default: %(default)s)")
+    add("--count", type=int, default=480, help="photos (default: %(default)s)")
     add("--seed", type=int, default=0, help="of the photos (default: %(default)s)")
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
     given = parser.parse_args()

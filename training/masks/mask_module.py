@@ -18,7 +18,7 @@ from torch import nn
 from torch.nn import functional
 
 from isc_core.networks.layers import DARK
-from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, Count
+from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, SURENESS, Count
 
 from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
 from .composites import Composite
@@ -143,7 +143,7 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         """Return the weights in the layout that the core reads."""
         dense = {"hidden": self.hidden, "count": self.count}
         found = stored_arrays(self._pairs, self.out, dense)
-        found["sureness"] = np.array([0, 1, 0, 0], np.float32)
+        found["sureness"] = np.eye(SURENESS, dtype=np.float32)[1]
         return found
 
     def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:

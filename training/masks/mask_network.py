@@ -62,7 +62,7 @@ def main() -> None:
         network.load_arrays(weights)
     fit(
         network,
-        Composites(learned, options.batch, arguments.side, arguments.hinted),
+        Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),
         replace(SCHEDULE, rate=arguments.rate),
         options,
         Composites(judged, options.batch, arguments.side),

@@ -46,6 +46,10 @@ class Thing:
         Of the cast shadow and of that where it touches, 0 to 1.
     blur : int
         Of its shadows, 0 to 3.
+    stretch : tuple of float
+        Factors along the picture's axes.
+    channels : tuple of int
+        Those of its picture that are shown as red, green and blue.
     """
 
     body: int
@@ -58,6 +62,8 @@ class Thing:
     touch: np.ndarray
     strength: tuple[float, float]
     blur: int
+    stretch: tuple[float, float] = (1.0, 1.0)
+    channels: tuple[int, ...] = (0, 1, 2)
 
 
 @dataclass(frozen=True)

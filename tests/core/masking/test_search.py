@@ -157,6 +157,14 @@ def test_what_the_user_says_is_known() -> None:
     assert labels[10, 10] == Label.PROBABLY_OBJECT
 
 
+def test_thin_parts_are_known_along_their_middle() -> None:
+    cover = np.full((60, 60), 0.01, np.float32)
+    cover[28:31, 5:55] = 0.9
+    labels = trimap(cover, np.zeros(cover.shape, np.int8))
+    assert (labels[29, 10:50] == Label.OBJECT).all()
+    assert (labels[28, 10:50] == Label.PROBABLY_OBJECT).all()
+
+
 def test_the_outline_moves_to_the_objects_own() -> None:
     light, (truth,) = balls(ONE)
     codes = np.rint(255 * linear_to_srgb(light)).astype(np.uint8)

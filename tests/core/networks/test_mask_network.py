@@ -40,7 +40,7 @@ def weights(seed: int) -> dict[str, np.ndarray]:
     for name, rows, columns in (("hidden", features, HIDDEN), ("count", HIDDEN, len(Count))):
         arrays[f"{name}_weight"] = rng.normal(0, rows**-0.5, (rows, columns)).astype(np.float16)
         arrays[f"{name}_bias"] = rng.normal(0, 0.1, columns).astype(np.float16)
-    return {**arrays, "sureness": np.array([0, 1, 0.5, 1], np.float32)}
+    return {**arrays, "sureness": np.array([0, 1, 0.5, 1, 0.5, 0.5], np.float32)}
 
 
 def network(folder: Path, **changes: np.ndarray | None) -> MaskNetwork:
