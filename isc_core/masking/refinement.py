@@ -4,9 +4,9 @@ Problem: the network sees 96 pixels; the outline that it finds is off by one of 
 
 Equation: pixels that the network is sure of and that lie away from the outline are known, and so is
 the middle line of what it takes for the thing, by which thin parts are kept; the others are not
-known. GrabCut labels these by colours and contrast (`photo.grabcut`). The soft cover a of
-the rim is the guided filter of the labels with the photo as its guide, a = A I + b in windows of a
-few pixels.
+known. GrabCut labels these by colours and contrast (`photo.grabcut`). The soft cover a of the rim
+is the guided filter of the labels with the photo as its guide, a = A I + b in windows of a few
+pixels.
 
 Citation: C. Rother et al. 2004, doi:10.1145/1015706.1015720; K. He, J. Sun, X. Tang 2013,
 doi:10.1109/TPAMI.2012.213 (section 4, feathering).

@@ -3,13 +3,13 @@
 Problem: a photo of a thing before a room or a table has no mask. What stands in front, all of one
 piece, with a shadow of its own, is seen from what things look like, not from colours alone.
 
-Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo, each
-half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Pixels go
-in and come out in blocks of 4 x 4 (space to depth). Each pixel gets the log odds of being part of
-the thing. Means and maxima of the coarse feature maps give the log odds of none, one and several
-things. Photo and mirror image are averaged. Hints, if there are any, are drawn into channels of
-their own: points on the thing, points on the background, a box. What the network says together
-makes it as sure as a logistic regression on photos that the weights have not seen tells.
+Equation: an encoder of convolutions computes feature maps of the photo, each half as fine as the
+one before; a decoder goes back up with the encoder's maps beside it (`encoder_decoder`). Each pixel
+gets the log odds of being part of the thing. Means and maxima of the coarse feature maps give the
+log odds of none, one and several things. Photo and mirror image are averaged. Hints, if there are
+any, are drawn into channels of their own: points on the thing, points on the background, a box.
+What the network says together makes it as sure as a logistic regression on photos that the weights
+have not seen tells.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
@@ -25,20 +25,11 @@ from enum import IntEnum
 
 import numpy as np
 
-from ..errors import InputError
-from .layers import (
-    DARK,
-    average_pool,
-    conv_block,
-    convolved,
-    depth_to_space,
-    is_chain,
-    softmax,
-    space_to_depth,
-)
-from .loader import Network, Parameters
+from .encoder_decoder import EncoderDecoder
+from .layers import DARK, softmax
+from .loader import Parameters
 
-SIDE, BLOCK = 96, 4  # pixels of the network's frame, and of a block
+SIDE = 96  # pixels of the network's frame
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
 COARSE = 2  # levels that the number of things is read from, the coarsest ones
@@ -55,61 +46,24 @@ class Count(IntEnum):
 
 
 @dataclass(frozen=True)
-class MaskNetwork(Network):
-    """The mask network. Raises `InputError` where parts do not fit each other.
+class MaskNetwork(EncoderDecoder):
+    """The mask network; its answer is the log odds of `Count`.
 
     Attributes
     ----------
-    weights : tuple of (9, inputs, outputs) float32 ndarray
-        Two for each level down, two for each level up from the coarsest, the output.
-    biases : tuple of (outputs,) float32 ndarray
-    dense : tuple of (inputs, outputs) ndarray
-        The two layers of the number of things.
-    offsets : tuple of (outputs,) ndarray
     sureness : (SURENESS,) ndarray
         Weights of the log odds that a mask is right, see `isc_core.masking.evidence`.
     """
 
     title = "mask network"
     file = "mask_network.npz"
+    inputs, outputs, coarse, answers = INPUTS, 1, COARSE, len(Count)
 
-    weights: tuple[np.ndarray, ...]
-    biases: tuple[np.ndarray, ...]
-    dense: tuple[np.ndarray, ...]
-    offsets: tuple[np.ndarray, ...]
     sureness: np.ndarray
 
-    def __post_init__(self) -> None:
-        if not self._fits():
-            raise InputError(
-                "these are not the weights of a mask network of this version: "
-                "fit them anew, or use the shipped ones"
-            )
-
-    def _fits(self) -> bool:
-        if len(self.weights) < 7 or len(self.weights) % 4 != 3:
-            return False
-        if any(w.ndim != 3 for w in self.weights) or any(m.ndim != 2 for m in self.dense):
-            return False
-        down = 2 * self._levels
-        wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * INPUTS
-        for width in wide:
-            shapes += [(9, inputs, width), (9, width, width)]
-            inputs = width
-        for skip, up in zip(wide[-2::-1], self.weights[down:-1:2], strict=True):
-            width = up.shape[-1]
-            shapes += [(9, skip + inputs, width), (9, width, width)]
-            inputs = width
-        shapes.append((9, inputs, BLOCK**2))
-        hidden = self.dense[0].shape[-1]
-        counts = [(2 * sum(wide[-COARSE:]), hidden), (hidden, len(Count))]
-        return (
-            is_chain(self.weights, self.biases, shapes)
-            and [m.shape for m in self.dense] == counts
-            and [o.shape for o in self.offsets] == [s[1:] for s in counts]
-            and self.sureness.shape == (SURENESS,)
-        )
+    def fits(self) -> bool:
+        """Return whether the parts fit each other."""
+        return super().fits() and self.sureness.shape == (SURENESS,)
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "MaskNetwork":
@@ -138,10 +92,6 @@ class MaskNetwork(Network):
             others["sureness"],
         )
 
-    @property
-    def _levels(self) -> int:
-        return (len(self.weights) + 1) // 4
-
     def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict the mask and the number of things.
 
@@ -157,25 +107,12 @@ class MaskNetwork(Network):
         counts : (3,) ndarray
             Log odds of `Count`.
         """
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, skips = space_to_depth(channels, BLOCK), []
-        for level in range(self._levels):
-            layer = conv_block(layer if level == 0 else average_pool(layer), steps)
-            skips.append(layer)
-        counts = self._counts(skips[-COARSE:])
-        for skip in skips[-2::-1]:
-            layer = conv_block(
-                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
-            )
-        return depth_to_space(convolved(layer, *next(steps)), BLOCK)[..., 0], counts
-
-    def _counts(self, layers: list[np.ndarray]) -> np.ndarray:
+        maps, levels = self.walked(channels)
         features = []
-        for layer in layers:
+        for layer in levels[-COARSE:]:
             values = layer.astype(np.float64)
             features += [values.mean(axis=(0, 1)), values.max(axis=(0, 1))]
-        hidden = np.einsum("n,nk->k", np.concatenate(features), self.dense[0]) + self.offsets[0]
-        return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]
+        return maps[..., 0], self.answer(features)
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,16 @@ Problem: shape, layers, shading and light are ambiguous pixel by pixel. Having s
 many lights helps with all of them, and what helps one helps the others: one network predicts them
 together, each with its uncertainty.
 
-Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo, each
-half as fine as the one before; a decoder goes back up with the encoder's maps beside it. Pixels go
-in and come out in blocks of 4 x 4 (space to depth). Each pixel gets m (3,), the mean of the
-probable unit normals, and the deviation of n_x and n_y from it; the log ratio y (3,) of image and
-diffuse image, and its scale; the log shading (3,) of a photo whose mean light is 1, and its scale;
-and the log odds of a depth edge. The coarse feature maps, averaged over the object, and their
-maxima give the light: mean l and covariance D^2 + F F' of the 27 coefficients of the log shading,
-the number of lamps, the direction of the strongest, and what the object is made of. Photo and
-mirror image are averaged. y and the shading have Laplace distributions, the normals and the light
-normal ones. Each scale is multiplied by a factor fitted on bodies that the weights have not seen.
+Equation: an encoder of convolutions computes feature maps of the photo, each half as fine as the
+one before; a decoder goes back up with the encoder's maps beside it (`encoder_decoder`). Each pixel
+gets m (3,), the mean of the probable unit normals, and the deviation of n_x and n_y from it; the
+log ratio y (3,) of image and diffuse image, and its scale; the log shading (3,) of a photo whose
+mean light is 1, and its scale; and the log odds of a depth edge. The coarse feature maps, averaged
+over the object, and their maxima give the light: mean l and covariance D^2 + F F' of the 27
+coefficients of the log shading, the number of lamps, the direction of the strongest, and what the
+object is made of. Photo and mirror image are averaged. y and the shading have Laplace
+distributions, the normals and the light normal ones. Each scale is multiplied by a factor fitted on
+bodies that the weights have not seen.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; uncertainties: A. Kendall, Y. Gal, "What uncertainties do we need
@@ -30,26 +30,17 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..errors import InputError
 from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
 from ..scene.light_estimate import LightEstimate, mirrored_places
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
+from .encoder_decoder import EncoderDecoder
 from .frame import at_full_size, framed
-from .layers import (
-    average_pool,
-    conv_block,
-    convolved,
-    depth_to_space,
-    inputs_of,
-    is_chain,
-    softmax,
-    space_to_depth,
-)
-from .loader import Network, Parameters
+from .layers import average_pool, inputs_of, softmax
+from .loader import Parameters
 
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
-INPUTS, BLOCK = 6, 4
+INPUTS = 6
 LIGHT, FACTORS = 27, 3
 FACTOR_SCALE = 0.1  # of the covariance's factors, so that they begin small
 COUNTS, PLACE_COUNT, KIND_COUNT = 3, 256, 3
@@ -112,58 +103,25 @@ class RawPrediction:
 
 
 @dataclass(frozen=True)
-class SceneNetwork(Network):
-    """The scene network. Raises `InputError` where parts do not fit each other.
+class SceneNetwork(EncoderDecoder):
+    """The scene network; its answer is the light.
 
     Attributes
     ----------
-    weights : tuple of (9, inputs, outputs) float32 ndarray
-        Two for each level down, two for each level up from the coarsest, the output.
-    biases : tuple of (outputs,) float32 ndarray
-    dense : tuple of (inputs, outputs) ndarray
-        The two layers of the light.
-    offsets : tuple of (outputs,) ndarray
     temperatures : (4,) ndarray
         Factors of the scales, by `TEMPERATURES`.
     """
 
     title = "scene network"
     file = "scene_network.npz"
+    inputs, outputs, coarse, answers = INPUTS, CHANNELS, COARSE, GLOBAL
 
-    weights: tuple[np.ndarray, ...]
-    biases: tuple[np.ndarray, ...]
-    dense: tuple[np.ndarray, ...]
-    offsets: tuple[np.ndarray, ...]
     temperatures: np.ndarray
 
-    def __post_init__(self) -> None:
-        if not self._fits():
-            raise InputError(
-                "these are not the weights of a scene network of this version: "
-                "fit them anew, or use the shipped ones"
-            )
-
-    def _fits(self) -> bool:
-        if len(self.weights) < 7 or len(self.weights) % 4 != 3:
-            return False
-        if any(w.ndim != 3 for w in self.weights) or any(m.ndim != 2 for m in self.dense):
-            return False
-        down = 2 * self._levels
-        wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * INPUTS
-        for width in wide:
-            shapes += [(9, inputs, width), (9, width, width)]
-            inputs = width
-        for width in wide[-2::-1]:
-            shapes += [(9, width + inputs, width), (9, width, width)]
-            inputs = width
-        shapes.append((9, inputs, BLOCK**2 * CHANNELS))
-        hidden = self.dense[0].shape[-1]
-        light = [(2 * sum(wide[-COARSE:]), hidden), (hidden, GLOBAL)]
+    def fits(self) -> bool:
+        """Return whether the parts fit each other."""
         return (
-            is_chain(self.weights, self.biases, shapes)
-            and [m.shape for m in self.dense] == light
-            and [o.shape for o in self.offsets] == [s[1:] for s in light]
+            super().fits()
             and self.temperatures.shape == (len(TEMPERATURES),)
             and bool((self.temperatures > 0).all())
         )
@@ -195,10 +153,6 @@ class SceneNetwork(Network):
             others["temperatures"],
         )
 
-    @property
-    def _levels(self) -> int:
-        return (len(self.weights) + 1) // 4
-
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
         """Predict maps and light for an input of `framed`.
 
@@ -211,17 +165,8 @@ class SceneNetwork(Network):
         -------
         RawPrediction
         """
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, skips = space_to_depth(channels_of(image, mask), BLOCK), []
-        for level in range(self._levels):
-            layer = conv_block(layer if level == 0 else average_pool(layer), steps)
-            skips.append(layer)
-        vector = self._light(skips, mask)
-        for skip in skips[-2::-1]:
-            layer = conv_block(
-                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
-            )
-        return RawPrediction(depth_to_space(convolved(layer, *next(steps)), BLOCK), vector)
+        maps, levels = self.walked(channels_of(image, mask))
+        return RawPrediction(maps, self._light(levels, mask))
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
@@ -234,8 +179,7 @@ class SceneNetwork(Network):
             weight = cover[..., 0] / max(float(cover.sum()), _LEAST)
             features.append(np.einsum("ij,ijc->c", weight, values))
             features.append((values * np.minimum(2 * cover, 1)).max(axis=(0, 1)))
-        hidden = np.einsum("n,nk->k", np.concatenate(features), self.dense[0]) + self.offsets[0]
-        return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]
+        return self.answer(features)
 
 
 def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:

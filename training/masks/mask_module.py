@@ -17,10 +17,11 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
-from isc_core.networks.mask_network import BLOCK, COARSE, INPUTS, SURENESS, Count
+from isc_core.networks.mask_network import COARSE, INPUTS, SURENESS, Count
 
-from ..networks.blocks import Block, Convolution, kernel_of, stored_arrays
+from ..networks.blocks import Block, Convolution, load_arrays, restore, stored_arrays
 from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
@@ -139,10 +140,13 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
     def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
         return [pair for block in [*self.down, *self.up] for pair in block.pairs]
 
+    @property
+    def _dense(self) -> dict[str, nn.Linear]:
+        return {"hidden": self.hidden, "count": self.count}
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        dense = {"hidden": self.hidden, "count": self.count}
-        found = stored_arrays(self._pairs, self.out, dense)
+        found = stored_arrays(self._pairs, self.out, self._dense)
         found["sureness"] = np.eye(SURENESS, dtype=np.float32)[1]
         return found
 
@@ -154,17 +158,7 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         arrays : dict of str to ndarray
             As `arrays` returns them.
         """
-        states = arrays["normalisation"]
-        with torch.no_grad():
-            for k, (convolution, norm) in enumerate(self._pairs):
-                part, states = states[:, : norm.num_features], states[:, norm.num_features :]
-                _restore(convolution, norm, arrays[f"weight{k:02d}"], part)
-            last = len(self._pairs)
-            self.out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
-            self.out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
-            for name, layer in (("hidden", self.hidden), ("count", self.count)):
-                layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
-                layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
+        load_arrays(self._pairs, self.out, self._dense, arrays)
 
     def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
         """Take what the scene network knows: the levels down whose channels agree.
@@ -186,20 +180,8 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
                     weight = grown
                 if weight.shape[1:] != (own[1], own[0]):
                     return
-                _restore(convolution, norm, weight, states[:, place : place + outputs])
+                restore(convolution, norm, weight, states[:, place : place + outputs])
                 place += outputs
-
-
-def _restore(
-    convolution: Convolution, norm: nn.BatchNorm2d, weight: np.ndarray, state: np.ndarray
-) -> None:
-    """Take a convolution and its normalisation apart again."""
-    rows = torch.from_numpy(state.astype(np.float32))
-    parts = (norm.weight, norm.bias, norm.running_mean, norm.running_var)
-    for part, values in zip(parts, rows, strict=True):
-        part.copy_(values)
-    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-    convolution.weight.copy_(kernel_of(weight) / gain[:, None, None, None])
 
 
 def network_channels(batch: Composite) -> torch.Tensor:

@@ -175,3 +175,54 @@ def stored_arrays(
         found[f"{name}_weight"] = as_array(layer.weight).T.astype(np.float16)
         found[f"{name}_bias"] = as_array(layer.bias).astype(np.float16)
     return found
+
+
+def load_arrays(
+    pairs: Sequence[tuple[Convolution, nn.BatchNorm2d]],
+    out: nn.Conv2d,
+    dense: Mapping[str, nn.Linear],
+    arrays: Mapping[str, np.ndarray],
+) -> None:
+    """Start from weights in the core's layout; the inverse of `stored_arrays`.
+
+    Parameters
+    ----------
+    pairs : sequence of (Convolution, BatchNorm2d)
+        Changed in place, like `out` and `dense`.
+    out : Conv2d
+    dense : mapping of str to Linear
+    arrays : mapping of str to ndarray
+        Content of an archive.
+    """
+    states, last = arrays["normalisation"], len(pairs)
+    with torch.no_grad():
+        for k, (convolution, norm) in enumerate(pairs):
+            state, states = states[:, : norm.num_features], states[:, norm.num_features :]
+            restore(convolution, norm, arrays[f"weight{k:02d}"], state)
+        out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
+        out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
+        for name, layer in dense.items():
+            layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
+            layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
+
+
+def restore(
+    convolution: Convolution, norm: nn.BatchNorm2d, weight: np.ndarray, state: np.ndarray
+) -> None:
+    """Take a convolution and its normalisation apart again; gradients must be off.
+
+    Parameters
+    ----------
+    convolution : Convolution
+    norm : BatchNorm2d
+    weight : (9, inputs, outputs) ndarray
+        What both do together.
+    state : (4, outputs) ndarray
+        Of the normalisation, see `norm_state`.
+    """
+    rows = torch.from_numpy(state.astype(np.float32))
+    parts = (norm.weight, norm.bias, norm.running_mean, norm.running_var)
+    for part, values in zip(parts, rows, strict=True):
+        part.copy_(values)
+    gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
+    convolution.weight.copy_(kernel_of(weight) / gain[:, None, None, None])

@@ -24,9 +24,9 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
 from isc_core.networks.scene_network import (
-    BLOCK,
     CHANNELS,
     COARSE,
     COUNTS,
@@ -46,7 +46,7 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
-from .blocks import Block, Convolution, kernel_of, stored_arrays
+from .blocks import Block, Convolution, load_arrays, stored_arrays
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
@@ -148,10 +148,13 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
     def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
         return [pair for block in [*self.down, *self.up] for pair in block.pairs]
 
+    @property
+    def _dense(self) -> dict[str, nn.Linear]:
+        return {"hidden": self.hidden, "light": self.light}
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        dense = {"hidden": self.hidden, "light": self.light}
-        found = stored_arrays(self._pairs, self.out, dense)
+        found = stored_arrays(self._pairs, self.out, self._dense)
         found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
         return found
 
@@ -184,26 +187,7 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         arrays : dict of str to ndarray
             Content of an archive.
         """
-        states = torch.from_numpy(arrays["normalisation"].astype(np.float32))
-        with torch.no_grad():
-            for k, (convolution, norm) in enumerate(self._pairs):
-                state, states = states[:, : norm.num_features], states[:, norm.num_features :]
-                for part, values in zip(
-                    (norm.weight, norm.bias, norm.running_mean, norm.running_var),
-                    state,
-                    strict=True,
-                ):
-                    part.copy_(values)
-                gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
-                convolution.weight.copy_(
-                    kernel_of(arrays[f"weight{k:02d}"]) / gain[:, None, None, None]
-                )
-            last = len(self._pairs)
-            self.out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
-            self.out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
-            for name, layer in (("hidden", self.hidden), ("light", self.light)):
-                layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
-                layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
+        load_arrays(self._pairs, self.out, self._dense, arrays)
 
 
 def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:

@@ -7,8 +7,8 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
+from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.mask_network import (
-    BLOCK,
     COARSE,
     INPUTS,
     SIDE,
