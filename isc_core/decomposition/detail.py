@@ -139,6 +139,38 @@ def fine_relief(
     Cancelled
         If the monitor cancels.
     """
+    relief, evidence = unscaled_relief(diffuse, mask, height, light, finest, monitor, network)
+    return relief * np.float32((rule or RULE).factor(evidence))
+
+
+def unscaled_relief(
+    diffuse: np.ndarray,
+    mask: np.ndarray,
+    height: np.ndarray,
+    light: np.ndarray,
+    finest: int,
+    monitor: Monitor | None = None,
+    network: DetailNetwork | None = None,
+) -> tuple[np.ndarray, Evidence | None]:
+    """Find the relief that patches alone show, and what the whole object says of it.
+
+    Parameters
+    ----------
+    diffuse, mask, height, light, finest, monitor, network
+        As for `fine_relief`.
+
+    Returns
+    -------
+    relief : (H, W) float32 ndarray
+        R_0, 0 outside of the mask.
+    evidence : Evidence or None
+        None where the object is too small to say anything.
+
+    Raises
+    ------
+    Cancelled
+        If the monitor cancels.
+    """
     monitor = monitor or Monitor()
     frame = _Frame.around(mask)
     levels = [Level(frame.cut(np.where(mask[..., None], diffuse, 0)), frame.cut(mask))]
@@ -146,7 +178,7 @@ def fine_relief(
         levels.append(levels[-1].halved())
     slope = slopes(frame.coarsest(height))
     gain = shading_gain(slope, light)
-    evidence = list[Evidence | None]()
+    found = list[Evidence | None]()
     relief: np.ndarray = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
     for k, level in zip(range(frame.halvings, -1, -1), levels[::-1], strict=True):
         monitor.report("fine relief", 1 - (k + 1) / (frame.halvings + 1))
@@ -156,9 +188,9 @@ def fine_relief(
         if length <= finest:
             relief += _band(level, slope, gain, network)
         if length <= _TELLING:
-            evidence.append(evidence_of(level.relative, level.mask, gain))
-    relief *= np.float32((rule or RULE).factor(mean_evidence(evidence)))
-    return np.where(mask, frame.put(relief, mask.shape), np.float32(0))
+            found.append(evidence_of(level.relative, level.mask, gain))
+    inside = np.where(mask, frame.put(relief, mask.shape), np.float32(0))
+    return inside, mean_evidence(found)
 
 
 def _raised_pair(values: np.ndarray) -> np.ndarray:

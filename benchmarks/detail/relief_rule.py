@@ -1,0 +1,222 @@
+"""Fit the rule that tells relief from paint by the whole object.
+
+  python -m benchmarks.detail.relief_rule SET --rows FILE [--weights NPZ] [--count N]
+
+SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief, and
+the relief that the network finds is judged at several factors. A row is stored for each body, so
+that an interrupted run continues.
+
+Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
+free). The factors are those of a grid that explain most of the relief, mean over bodies and
+octaves, with the probabilities of bodies left out, where what is invented on print is at most a
+hundredth of the relief's energy in every octave.
+
+Citation: see `isc_core.decomposition.relief_evidence`.
+
+Limits: sixty bodies decide five numbers; others have to judge them.
+"""
+
+import argparse
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isc_core.decomposition.detail import unscaled_relief
+from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.models import solve
+from isc_core.decomposition.relief_evidence import ReliefRule
+from isc_core.decomposition.settings import MOST_DETAIL, Settings
+from isc_core.decomposition.task import DecompositionTask, SolveOptions
+from isc_core.errors import InputError
+from isc_core.networks.detail_network import DetailNetwork
+from isc_core.photo import read_photo
+
+from ..records import append_row, read_rows
+from .measure import judge
+from .rendering import SetKind
+from .sets import PHOTO, bodies_in, read_truth
+
+FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+_RIDGE = 1.0
+_INVENTED = 0.01
+_STEPS = 50
+
+
+def measured(
+    folder: Path, rows: Path, network: DetailNetwork, count: int | None
+) -> Iterator[Mapping[str, Any]]:
+    """Measure the bodies that have no row yet.
+
+    Parameters
+    ----------
+    folder : Path
+        The set.
+    rows : Path
+        JSON lines, appended to.
+    network : DetailNetwork
+    count : int or None
+        The first bodies of each kind.
+
+    Yields
+    ------
+    mapping
+        "body"; "evidence"; "explained", "error" and "energy" at each of `FACTORS`.
+    """
+    known = {row["body"]: row for row in read_rows(rows)}
+    options = SolveOptions(fit_lobe=False, check_assumptions=False)
+    for kind in SetKind:
+        for body in bodies_in(folder, kind)[:count]:
+            if body.name not in known:
+                photo = read_photo(body / PHOTO)
+                working = photo.resized_to_object(512)
+                settings = Settings(detail=0, threads=1)
+                found = solve(DecompositionTask(working, photo, settings, options=options))
+                relief, evidence = unscaled_relief(
+                    found.split.diffuse,
+                    photo.mask,
+                    found.height,
+                    found.light,
+                    MOST_DETAIL,
+                    network=network,
+                )
+                truth, judged = read_truth(body), []
+                for factor in FACTORS:
+                    normal = shaded(found.height + factor * relief, found.light, photo.mask)[0]
+                    judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
+                row = {
+                    "body": body.name,
+                    "evidence": None if evidence is None else list(asdict(evidence).values()),
+                    **{
+                        name: [np.asarray(getattr(one, name)).tolist() for one in judged]
+                        for name in ("explained", "error", "energy")
+                    },
+                }
+                append_row(rows, row)
+                known[body.name] = row
+            yield known[body.name]
+
+
+def logistic_weights(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
+    """Fit a logistic regression by Newton's method.
+
+    Parameters
+    ----------
+    features : (n, k) ndarray
+    is_relief : (n,) ndarray of bool
+
+    Returns
+    -------
+    (k + 1,) ndarray
+        The offset first.
+    """
+    inputs = np.column_stack([np.ones(len(features)), features])
+    ridge = np.full(inputs.shape[1], _RIDGE)
+    ridge[0] = 1e-6
+    weights = np.zeros(inputs.shape[1])
+    for _ in range(_STEPS):
+        shares = 1 / (1 + np.exp(-inputs @ weights))
+        curvature = (inputs * (shares * (1 - shares))[:, None]).T @ inputs + np.diag(ridge)
+        slope = inputs.T @ (is_relief - shares) - ridge * weights
+        weights = weights + np.linalg.solve(curvature, slope)
+    return weights
+
+
+def left_out(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
+    """Return each body's probability of relief by weights of the others.
+
+    Parameters
+    ----------
+    features : (n, k) ndarray
+    is_relief : (n,) ndarray of bool
+
+    Returns
+    -------
+    (n,) ndarray
+    """
+    found = []
+    for k in range(len(features)):
+        others = np.arange(len(features)) != k
+        weights = logistic_weights(features[others], is_relief[others])
+        found.append(1 / (1 + np.exp(-weights[0] - features[k] @ weights[1:])))
+    return np.array(found)
+
+
+def best_factors(
+    rows: Sequence[Mapping[str, Any]], is_relief: np.ndarray, probability: np.ndarray
+) -> tuple[float, float, np.ndarray, np.ndarray]:
+    """Choose the factors of paint and of relief.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of `measured`.
+    is_relief : (n,) ndarray of bool
+    probability : (n,) ndarray
+        Of relief.
+
+    Returns
+    -------
+    low, high : float
+    explained, invented : (octaves,) ndarray
+    """
+    explained, error, energy = (
+        np.array([row[name] for row in rows]) for name in ("explained", "error", "energy")
+    )
+    scale = energy[is_relief, 0].mean(axis=0)
+    best = (0.0, 0.0, np.zeros(explained.shape[2]), np.zeros(explained.shape[2]))
+    for low, high in product(np.arange(0, 1.01, 0.1), np.arange(0, FACTORS[-1] + 0.01, 0.1)):
+        factor = low + (high - low) * probability
+        known = _at(explained[is_relief], factor[is_relief]).mean(axis=0)
+        false = _at(error[~is_relief], factor[~is_relief]).mean(axis=0) / scale
+        if high >= low and false.max() <= _INVENTED and known.mean() > best[2].mean():
+            best = (float(low), float(high), known, false)
+    return best
+
+
+def _at(values: np.ndarray, factor: np.ndarray) -> np.ndarray:
+    """Figures (n, octaves) at each body's factor, between those measured (n, factors, octaves)."""
+    return np.array(
+        [
+            [np.interp(where, FACTORS, octave) for octave in one.T]
+            for one, where in zip(values, factor, strict=True)
+        ]
+    )
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("folder", type=Path, metavar="SET", help="the choice set of benchmarks.detail.sets")
+    add("--rows", type=Path, required=True, metavar="FILE", help="JSON lines to append to")
+    add("--weights", type=Path, metavar="NPZ", help="of the network (default: the shipped ones)")
+    add("--count", type=int, help="bodies of each kind")
+    given = parser.parse_args()
+    rows = []
+    try:
+        shipped = given.weights is None
+        network = DetailNetwork.shipped() if shipped else DetailNetwork.read(given.weights)
+        for row in measured(given.folder, given.rows, network, given.count):
+            print(row["body"], np.round(row["evidence"] or np.nan, 2), flush=True)
+            rows.append(row)
+    except InputError as error:
+        parser.error(str(error))
+    rows = [row for row in rows if row["evidence"] is not None]
+    is_relief = np.array([row["body"].startswith(SetKind.RELIEF) for row in rows])
+    features = np.array([row["evidence"] for row in rows])
+    weights, probability = logistic_weights(features, is_relief), left_out(features, is_relief)
+    low, high, explained, invented = best_factors(rows, is_relief, probability)
+    print(f"{np.mean((probability > 0.5) == is_relief):.0%} of bodies told, each left out")
+    print("explained", np.round(explained, 3), "invented", np.round(invented, 4))
+    offset, correlation, along = (round(float(weight), 2) for weight in weights)
+    print(ReliefRule(offset, correlation, along, round(low, 2), round(high, 2)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,33 @@
+"""The rule that tells relief from paint: its fit on numbers whose answer is known."""
+
+import numpy as np
+
+from benchmarks.detail.relief_rule import FACTORS, best_factors, left_out, logistic_weights
+
+
+def test_weights_of_a_known_boundary() -> None:
+    rng = np.random.default_rng(0)
+    features = rng.normal(size=(400, 2))
+    is_relief = rng.random(400) < 1 / (1 + np.exp(-(0.5 + 2 * features[:, 0])))
+    offset, first, second = logistic_weights(features, is_relief)
+    assert abs(offset - 0.5) < 0.4 and abs(first - 2) < 0.5 and abs(second) < 0.4
+
+
+def test_a_body_left_out_does_not_decide_about_itself() -> None:
+    features = np.array([[0.0], [0.1], [1.0], [1.1], [0.05]])
+    is_relief = np.array([False, False, True, True, True])
+    assert left_out(features, is_relief)[4] < 0.5
+
+
+def test_factors_stop_where_too_much_is_invented() -> None:
+    factors = np.array(FACTORS)
+    gained = (1 - (1 - factors / 3) ** 2)[:, None]
+    rows = [
+        {"explained": gained, "error": 0 * gained, "energy": np.ones_like(gained)},
+        {"explained": gained, "error": 0.01 * factors[:, None] ** 2, "energy": 0 * gained},
+    ]
+    is_relief = np.array([True, False])
+    low, high, explained, invented = best_factors(rows, is_relief, np.array([1.0, 0.0]))
+    assert high == 3 and low <= 1 and explained[0] == 1 and invented[0] <= 0.01
+    low, high, explained, invented = best_factors(rows, is_relief, np.array([1.0, 1.0]))
+    assert high == 1 and explained[0] < 0.6
