@@ -12,7 +12,7 @@ the smooth body lets it pass, the coefficients of the light that reaches x are
 A_l those of the clamped cosine. Lamps, and directions that outshine the others, add
 P V(x) max(n'.w, 0) with soft shadows. The body's own light is estimated from the share of the
 hemisphere that it covers. Gloss is a GGX lobe: for lamps closed, for the surroundings smoothed as
-wide as the lobe.
+wide as the lobe, times the share that it reflects of uniform light.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317 (A_l); P.-P. Sloan, J. Kautz,
 J. Snyder 2002, doi:10.1145/566654.566612 (coefficients of transferred light); B. Walter et al.
@@ -24,6 +24,7 @@ Limits: relief shades itself by its normals alone; lamps are distant.
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 from scipy import ndimage
 
 from isc_core.shading.environment_map import directions, solid_angles
@@ -31,6 +32,7 @@ from isc_core.shading.lights import sphere_directions
 from isc_core.shading.spherical_harmonics import real_sh
 from synth.scene.tracing import LIFT, Tracer
 from training.world.environments import smoothed_levels
+from training.world.reflectance import reflected_share
 
 _DIRECTIONS = 192
 _OUTSHINES = 0.1  # of all light: such a direction is a lamp
@@ -255,32 +257,43 @@ def outgoing_light(
         level = np.clip(normal @ lamp.toward, 0, None) * share
         irradiance = irradiance + level[:, None] * lamp.power
     found = albedo / np.pi * irradiance
-    return found + _mirrored(light, fields, normal, gloss, room) if gloss.front else found
+    if not gloss.front:
+        return found
+    share = _reflected(gloss, normal[:, 2])[:, None]
+    return found * (1 - share) + _mirrored(light, fields, normal, gloss, room, share)
+
+
+def _reflected(gloss: Gloss, cosine: np.ndarray) -> np.ndarray:
+    """Share (N,) of uniform light that the lobe reflects toward the viewer."""
+    column = torch.from_numpy(cosine).float()[:, None]
+    front, alpha = torch.tensor([gloss.front]), torch.full_like(column, gloss.alpha)
+    return np.asarray(reflected_share(front, column, alpha).numpy()[:, 0])
 
 
 def _mirrored(
-    light: ReachingLight, fields: np.ndarray, normal: np.ndarray, gloss: Gloss, room: Room
+    light: ReachingLight,
+    fields: np.ndarray,
+    normal: np.ndarray,
+    gloss: Gloss,
+    room: Room,
+    share: np.ndarray,
 ) -> np.ndarray:
+    """Light (N, 3) of the lobe; `share` is what it reflects of uniform light."""
     cosine = normal[:, 2]
     mirror = 2 * cosine[:, None] * normal - (0, 0, 1)
     level = smoothed_levels(room.radiance, (gloss.alpha,))[0]
-    around = _looked_up(level, mirror @ room.turn.T) * (1 - fields[54])[:, None]
-    found = around * _fresnel(gloss.front, cosine)[:, None]
+    found = _looked_up(level, mirror @ room.turn.T) * (1 - fields[54])[:, None] * share
     square = gloss.alpha**2
-    for lamp, share in zip(light.lamps, fields[55:], strict=True):
+    for lamp, seen in zip(light.lamps, fields[55:], strict=True):
         half = lamp.toward + (0, 0, 1)
         half = half / np.linalg.norm(half)
         lean, level_at = np.clip(normal @ half, 0, 1), np.clip(normal @ lamp.toward, 0, None)
         density = square / (np.pi * (lean**2 * (square - 1) + 1) ** 2)
         hidden = _masking(cosine, square) * _masking(np.maximum(level_at, 0.02), square)
-        fresnel = float(_fresnel(gloss.front, half[2:])[0])
-        lobe = density * hidden * fresnel / (4 * cosine) * (level_at > 0) * share
+        fresnel = gloss.front + (1 - gloss.front) * (1 - half[2]) ** 5
+        lobe = density * hidden * fresnel / (4 * cosine) * (level_at > 0) * seen
         found = found + lobe[:, None] * lamp.power
     return np.asarray(found)
-
-
-def _fresnel(front: float, cosine: np.ndarray) -> np.ndarray:
-    return np.asarray(front + (1 - front) * (1 - np.clip(cosine, 0, 1)) ** 5)
 
 
 def _masking(cosine: np.ndarray, square: float) -> np.ndarray:
