@@ -22,7 +22,13 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.decomposition.models import DecompositionTask, Settings, SolveOptions, solve
+from isc_core.decomposition.models import (
+    DecompositionTask,
+    SceneEstimate,
+    Settings,
+    SolveOptions,
+    solve,
+)
 from isc_core.decomposition.settings import ILLUMINATIONS
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
@@ -33,6 +39,7 @@ from isc_core.shading.spherical_harmonics import (
     real_sh,
 )
 from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.settings import PredictionWeights
 from training.world.recipes import LightKind
 
 from .ways import Predictions, with_way
@@ -63,7 +70,12 @@ class Lit:
 
 
 def lit_bodies(
-    world: Path, panoramas: Path, count: int, seed: int, light: str | None = None
+    world: Path,
+    panoramas: Path,
+    count: int,
+    seed: int,
+    light: str | None = None,
+    side: int | None = None,
 ) -> list[Lit]:
     """Light and photograph held-out opaque bodies, each from one side.
 
@@ -76,6 +88,8 @@ def lit_bodies(
     seed : int
     light : str, optional
         Kind of light; by default all kinds, as often as the network has seen them.
+    side : int, optional
+        Pixels of a photo's side; by default those of the network's frame.
 
     Returns
     -------
@@ -86,7 +100,7 @@ def lit_bodies(
     from training.networks.scene_batches import read_world
     from training.world.files import Split
     from training.world.recipes import Shares
-    from training.world.samples import Darkroom, draw_batch
+    from training.world.samples import OUTPUT, Darkroom, draw_batch
 
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.BODY,), 0)
@@ -98,7 +112,7 @@ def lit_bodies(
         if len(made) == count:
             break
         draw = draw_batch([bodies[int(k)]], 1, found.atlas, found.judged, rng, shares)
-        sample = Darkroom(found.bank, 1)(draw)
+        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw)
         mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
         photo, ratio, normal, shading = (
             part[0].permute(1, 2, 0).numpy()
@@ -151,6 +165,36 @@ def solved(lit: Lit, seen: ScenePrediction, way: str, illumination: str) -> list
     list of float
         In the order of `METRICS`.
     """
+    found = estimated(lit, seen, way, illumination)
+    normal = normal_from_reference(normals(found.height))
+    return measured(lit, normal, real_sh(normal) @ light_from_reference(found.light))
+
+
+def estimated(
+    lit: Lit,
+    seen: ScenePrediction,
+    way: str,
+    illumination: str,
+    usual: PredictionWeights | None = None,
+    solve_size: int = 0,
+) -> SceneEstimate:
+    """Solve one photo in one way.
+
+    Parameters
+    ----------
+    lit : Lit
+    seen : ScenePrediction
+    way : str
+    illumination : str
+    usual : PredictionWeights, optional
+        All that the way leaves open.
+    solve_size : int, optional
+        See `SolveOptions`.
+
+    Returns
+    -------
+    SceneEstimate
+    """
     size = lit.mask.shape[1], lit.mask.shape[0]
     image = np.where(lit.mask[..., None], lit.diffuse, 0).astype(np.float32)
     photo = Photo(
@@ -163,11 +207,10 @@ def solved(lit: Lit, seen: ScenePrediction, way: str, illumination: str) -> list
         light_prior="dataset",
         shape_prior="silhouette",
     )
-    options = SolveOptions(solve_size=0, fit_lobe=False, check_assumptions=False)
+    options = SolveOptions(solve_size=solve_size, fit_lobe=False, check_assumptions=False)
     task = DecompositionTask(photo, photo, settings, options=options)
-    found = solve(with_way(task, Predictions(seen.normals, seen.shading, seen.light), way))
-    normal = normal_from_reference(normals(found.height))
-    return measured(lit, normal, real_sh(normal) @ light_from_reference(found.light))
+    predictions = Predictions(seen.normals, seen.shading, seen.light)
+    return solve(with_way(task, predictions, way, usual))
 
 
 def measured(lit: Lit, normal: np.ndarray, log_shading: np.ndarray) -> list[float]:
