@@ -1,10 +1,12 @@
 """Float32 OpenEXR files from and to plain arrays, channel by channel.
 
 Channels keep their full names (`diffuse.R`, `height.Z`). Compression is lossless (ZIP), and equal
-arrays give equal bytes.
+arrays give equal bytes. The library compresses large files on several threads, with the same bytes
+as on one.
 """
 
 import errno
+import os
 import shutil
 import struct
 from collections.abc import Mapping
@@ -19,6 +21,9 @@ from .limits import USUAL, Limits
 from .memory import is_exhausted, memory_error
 from .native_io import memory_file, suppress_native_output
 from .regular_files import read_regular
+
+_LARGE = 1 << 20  # pixels
+_MOST_THREADS = 8
 
 
 def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
@@ -37,6 +42,8 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     """
     # The writer silently stores garbage from strided arrays: make every channel contiguous.
     pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    if max((values.size for values in pixels.values()), default=0) >= _LARGE:
+        _start_threads()
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     with memory_file() as file_path:
         try:
@@ -45,6 +52,12 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
         except RuntimeError as error:
             raise OSError(errno.EIO, str(error)) from error
         shutil.copyfile(file_path, path)
+
+
+def _start_threads() -> None:
+    """Give the library threads, if it has none yet; they sleep between files."""
+    if hasattr(OpenEXR, "global_thread_count") and not OpenEXR.global_thread_count():
+        OpenEXR.set_global_thread_count(min(os.cpu_count() or 1, _MOST_THREADS))
 
 
 def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
