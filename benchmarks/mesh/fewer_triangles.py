@@ -2,7 +2,7 @@
 
   python -m benchmarks.mesh.fewer_triangles [RESULT ...] [--size 1024] [--triangles 100000,20000]
 
-Without results of `isc decompose`, ten bodies are made: a smooth form of random lobes with an
+Without results of `isc decompose`, five bodies are made: a smooth form of random lobes with an
 outline of its own, under relief of 8, 16 and 32 pixels wavelength. For each body and number of
 triangles:
 
@@ -30,6 +30,7 @@ from isc_core.result_files.mesh import MeshResult, build_mesh, limit_rim
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.result_files.result_folder import load
 
+_BODIES = 5
 Maps = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Height, normal and mask."""
 
@@ -86,7 +87,7 @@ def bodies(results: list[Path], size: int) -> Iterator[tuple[str, Maps]]:
     for path in results:
         d = load(path)
         yield path.name, (d.height, d.normal, d.mask)
-    for seed in () if results else range(10):
+    for seed in () if results else range(_BODIES):
         yield f"body {seed}", made_body(seed, size)
 
 
