@@ -140,7 +140,7 @@ def accessor(blob: bytes, attribute: str) -> np.ndarray:
     tree = gltf(blob)
     entry = tree["accessors"][tree["meshes"][0]["primitives"][0]["attributes"][attribute]]
     view = tree["bufferViews"][entry["bufferView"]]
-    width = {"VEC2": 2, "VEC3": 3}[entry["type"]]
+    width = {"VEC2": 2, "VEC3": 3, "VEC4": 4}[entry["type"]]
     start = (
         20
         + struct.unpack_from("<I", blob, 12)[0]
@@ -272,6 +272,17 @@ def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
             found[name].append(np.degrees(np.arccos(np.clip(vector @ normal[row, column], -1, 1))))
     assert np.median(found["with map"]) < 2
     assert np.median(found["alone"]) > 5
+
+
+def test_a_thinned_mesh_has_the_tangents_of_its_normal_map() -> None:
+    blob = built(ball(), triangles=3_000).glb()
+    tangent, normal = accessor(blob, "TANGENT"), accessor(blob, "NORMAL")
+    assert (tangent[:, 3] == 1).all()
+    np.testing.assert_allclose(np.linalg.norm(tangent[:, :3], axis=1), 1, atol=1e-6)
+    np.testing.assert_allclose((tangent[:, :3] * normal).sum(1), 0, atol=1e-6)
+    assert (tangent[:, 0] > 0).all(), "the column of the texture grows to the right"
+    full = gltf(built(ball()).glb())["meshes"][0]["primitives"][0]["attributes"]
+    assert "TANGENT" not in full, "its normal map is flat"
 
 
 def tangent_of(corners: np.ndarray, uv: np.ndarray) -> np.ndarray:
