@@ -6,8 +6,9 @@
 WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
 one thing show bodies that no fit has seen, the other half the masked photos of real things in
 --photos; both stand before crops of panoramas that no fit has seen. As many photos again show
-nothing, or several things. Refusals are wrong where one thing is shown; acceptances where none or
-several are. Intervals are those of resampled photos.
+nothing, or several things. Refusals are wrong where one thing is shown, and more so where its mask
+would have been right, with an overlap of .5; acceptances where none or several are shown. Intervals
+are those of resampled photos.
 
 Limits: bodies and panoramas are soft at this size, and the light on a thing is not that of its
 background. Several photos show the same of the real things.
@@ -34,6 +35,7 @@ from training.masks.held_out import HeldOut, held_out_composites, held_out_ingre
 _TILE = 140  # pixels of the sheet's pictures
 _SHOWN = 20
 _SEED = 5
+_RIGHT = 0.5  # overlap of a mask that is right
 
 
 @dataclass(frozen=True)
@@ -99,15 +101,16 @@ def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
     rows += [(name, groups[name]) for name in single]
     rows.append(("all of one thing", [one for name in single for one in groups[name]]))
     lines = [
-        "| shown | photos | IoU, median | 10th percentile | of those accepted | refused |",
-        "|---|---|---|---|---|---|",
+        "| shown | photos | IoU, median | 10th percentile | of those accepted "
+        "| refused | refused of right ones |",
+        "|---|---|---|---|---|---|---|",
     ]
     for name, found in rows:
         overlap = np.array([one.overlap for one in found])
         kept = np.array([one.accepted for one in found])
         pairs = [_with_interval(overlap, q) for q in (0.5, 0.1)]
         accepted = " / ".join(f"{np.quantile(overlap[kept], q):.3f}" for q in (0.5, 0.1))
-        refused = _share(~kept)
+        refused = f"{_share(~kept)} | {_share(~kept[overlap >= _RIGHT])}"
         lines.append(
             f"| {name} | {len(found)} | {pairs[0]} | {pairs[1]} | {accepted} | {refused} |"
         )

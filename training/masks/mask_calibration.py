@@ -27,7 +27,7 @@ from .held_out import HeldOut, held_out_composites, held_out_ingredients
 
 _RIDGE, _STEPS = 0.1, 50
 _RIGHT = 0.5  # overlap of a mask that counts as right
-_THRESHOLDS = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+_THRESHOLDS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7)
 
 
 def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
