@@ -88,7 +88,7 @@ def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
     enough = int(found.mask.sum()) >= MIN_MASK_PIXELS
     if hints:
         return "" if enough else "no object is found there: put --point on it, or --box around it"
-    several = enough and len(separate_parts(found.mask, _SEVERAL)) > 1
+    several = enough and is_apart(found.mask)
     if enough and found.sureness >= SURE and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
@@ -97,6 +97,22 @@ def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
     if kind == Count.NONE or not enough:
         return f"no single thing stands out: {_REMEDY}"
     return f"its mask is uncertain ({found.sureness:.0%} sure): {_REMEDY}"
+
+
+def is_apart(mask: np.ndarray) -> bool:
+    """Return whether a mask shows several things.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Returns
+    -------
+    bool
+        Its second part is about as large as its first.
+    """
+    return len(separate_parts(mask, _SEVERAL)) > 1
 
 
 class EachSearch:

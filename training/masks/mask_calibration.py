@@ -20,6 +20,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
+from isc_core.masking.finder import is_apart
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 
@@ -51,8 +52,10 @@ def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     return weights
 
 
-def observed(photos: list[HeldOut], network: MaskNetwork) -> tuple[np.ndarray, np.ndarray]:
-    """Return the evidence of each photo, and whether its mask is right.
+def observed(
+    photos: list[HeldOut], network: MaskNetwork
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the evidence of each photo, whether its mask is right, and whether it may be used.
 
     Parameters
     ----------
@@ -63,15 +66,18 @@ def observed(photos: list[HeldOut], network: MaskNetwork) -> tuple[np.ndarray, n
     -------
     evidence : (N, SURENESS) ndarray
     right : (N,) bool ndarray
+    whole : (N,) bool ndarray
+        False where the mask shows nothing or several things: it is refused, however sure.
     """
-    rows, right = [], []
+    rows, right, whole = [], [], []
     for photo in photos:
         found = find_mask(photo.light, network=network)
         truth = photo.cover >= 0.5
         overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
         rows.append(found.evidence)
         right.append(photo.count == Count.ONE and overlap >= _RIGHT)
-    return np.array(rows), np.array(right)
+        whole.append(bool(found.mask.any()) and not is_apart(found.mask))
+    return np.array(rows), np.array(right), np.array(whole)
 
 
 def main() -> None:
@@ -99,15 +105,16 @@ def main() -> None:
         for kind, part in numbers
         for photo in held_out_composites(ingredients, kind, given.count // part, given.seed + 1)
     ]
-    evidence, right = observed(photos, network)
+    evidence, right, whole = observed(photos, network)
     weights = logistic_weights(evidence, right)
     print("weights", np.round(weights, 3), "right", right.mean())
     sure, one = 1 / (1 + np.exp(-evidence @ weights)), np.array([p.count for p in photos]) == 1
     for limit in _THRESHOLDS:
-        refused = (sure < limit)[one].mean(), (sure < limit)[right].mean()
+        used = whole & (sure >= limit)
         print(
-            f"{limit:.2f}: refuses {refused[0]:.1%} of single things, {refused[1]:.1%} of right "
-            f"masks; accepts {(sure >= limit)[~one].mean():.1%} without a single thing"
+            f"{limit:.2f}: refuses {(~used)[one].mean():.1%} of single things, "
+            f"{(~used)[right].mean():.1%} of right masks; accepts {used[~one].mean():.1%} without "
+            "a single thing"
         )
     with new_file(given.output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **{**arrays, "sureness": weights.astype(np.float32)})
