@@ -16,7 +16,7 @@ from ..photo.reading import photo_from_raster
 from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
-SURE = 0.3  # least sureness of a mask that is used without being asked for
+SURE = 0.2  # least sureness of a mask that is used without being asked for
 _SEVERAL = 0.3  # of the largest part: a second one as large is another thing
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
