@@ -1,19 +1,19 @@
 """Fit the rule that tells relief from paint by the whole object.
 
-  python -m benchmarks.detail.relief_rule SET --rows FILE [--weights NPZ] [--count N]
+  python -m benchmarks.detail.relief_rule SET --rows FILE [--weights NPZ] [--count N] [--kind KIND]
 
 SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief, and
 the relief that the network finds is judged at several factors. A row is stored for each body, so
-that an interrupted run continues.
+that an interrupted run continues; with `--kind`, rows alone are made.
 
 Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
 free). The factors are those of a grid that explain most of the relief, mean over bodies and
-octaves, with the probabilities of bodies left out, where what is invented on print is at most a
-hundredth of the relief's energy in every octave.
+octaves, with the probabilities of bodies left out, where what is invented on print is at most
+.04 of the relief's energy in every octave.
 
 Citation: see `isc_core.decomposition.relief_evidence`.
 
-Limits: sixty bodies decide five numbers; others have to judge them.
+Limits: some forty bodies decide five numbers; others have to judge them.
 """
 
 import argparse
@@ -40,14 +40,18 @@ from .measure import judge
 from .rendering import SetKind
 from .sets import PHOTO, bodies_in, read_truth
 
-FACTORS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0)
+FACTORS = (0.0, 1.5, 3.0)  # the figures are nearly quadratic in the factor
 _RIDGE = 1.0
-_INVENTED = 0.01
+_INVENTED = 0.04
 _STEPS = 50
 
 
 def measured(
-    folder: Path, rows: Path, network: DetailNetwork, count: int | None
+    folder: Path,
+    rows: Path,
+    network: DetailNetwork,
+    kinds: Sequence[SetKind],
+    count: int | None,
 ) -> Iterator[Mapping[str, Any]]:
     """Measure the bodies that have no row yet.
 
@@ -58,6 +62,7 @@ def measured(
     rows : Path
         JSON lines, appended to.
     network : DetailNetwork
+    kinds : sequence of SetKind
     count : int or None
         The first bodies of each kind.
 
@@ -68,7 +73,7 @@ def measured(
     """
     known = {row["body"]: row for row in read_rows(rows)}
     options = SolveOptions(fit_lobe=False, check_assumptions=False)
-    for kind in SetKind:
+    for kind in kinds:
         for body in bodies_in(folder, kind)[:count]:
             if body.name not in known:
                 photo = read_photo(body / PHOTO)
@@ -178,11 +183,12 @@ def best_factors(
 
 
 def _at(values: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """Figures (n, octaves) at each body's factor, between those measured (n, factors, octaves)."""
+    """Figures (n, octaves) at each body's factor by parabolas through (n, factors, octaves)."""
+    parabolas = [np.polynomial.polynomial.polyfit(FACTORS, one, 2) for one in values]
     return np.array(
         [
-            [np.interp(where, FACTORS, octave) for octave in one.T]
-            for one, where in zip(values, factor, strict=True)
+            np.polynomial.polynomial.polyval(where, parabola)
+            for where, parabola in zip(factor, parabolas, strict=True)
         ]
     )
 
@@ -196,17 +202,20 @@ def main() -> None:
     add("folder", type=Path, metavar="SET", help="the choice set of benchmarks.detail.sets")
     add("--rows", type=Path, required=True, metavar="FILE", help="JSON lines to append to")
     add("--weights", type=Path, metavar="NPZ", help="of the network (default: the shipped ones)")
+    add("--kind", type=SetKind, choices=list(SetKind), help="measure one kind of bodies alone")
     add("--count", type=int, help="bodies of each kind")
     given = parser.parse_args()
-    rows = []
+    rows, kinds = [], list(SetKind) if given.kind is None else [given.kind]
     try:
         shipped = given.weights is None
         network = DetailNetwork.shipped() if shipped else DetailNetwork.read(given.weights)
-        for row in measured(given.folder, given.rows, network, given.count):
+        for row in measured(given.folder, given.rows, network, kinds, given.count):
             print(row["body"], np.round(row["evidence"] or np.nan, 2), flush=True)
             rows.append(row)
     except InputError as error:
         parser.error(str(error))
+    if given.kind is not None:
+        return
     rows = [row for row in rows if row["evidence"] is not None]
     is_relief = np.array([row["body"].startswith(SetKind.RELIEF) for row in rows])
     features = np.array([row["evidence"] for row in rows])

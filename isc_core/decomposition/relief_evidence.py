@@ -106,7 +106,7 @@ class ReliefRule:
         return self.low + (self.high - self.low) * self.probability(evidence)
 
 
-RULE = ReliefRule(-1.5, 3.0, 3.0, 0.3, 2.2)
+RULE = ReliefRule(-1.23, 2.06, 1.69, 0.2, 2.5)
 
 
 def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Evidence | None:
