@@ -18,7 +18,8 @@ Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317 (A_l); P.-
 J. Snyder 2002, doi:10.1145/566654.566612 (coefficients of transferred light); B. Walter et al.
 2007, doi:10.2312/EGWR/EGSR07/195-206 (GGX); C. Schlick 1994, doi:10.1111/1467-8659.1330233.
 
-Limits: relief shades itself by its normals alone; lamps are distant.
+Limits: relief shades itself by its normals alone; lamps are distant; of ten thousand points of the
+grid the tracer takes about one for covered all around.
 """
 
 from dataclasses import dataclass
