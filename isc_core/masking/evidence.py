@@ -54,7 +54,18 @@ def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarra
 
 
 def no_evidence(first: PartPrediction) -> np.ndarray:
-    """Return the evidence of a photo in which nothing is found; see `evidence_of`."""
+    """Return the evidence of a photo in which nothing is found.
+
+    Parameters
+    ----------
+    first : PartPrediction
+        At the whole photo.
+
+    Returns
+    -------
+    (SURENESS,) ndarray
+        As `evidence_of`.
+    """
     found = np.zeros(SURENESS - 1)
     found[0] = first.counts[Count.ONE]
     return _log_odds(found)
