@@ -153,8 +153,8 @@ def cost_of(megapixels: float, settings: Settings) -> dict[str, float]:
     Returns
     -------
     dict of str to float
-        Valid pixels; seconds, and those of the processor; peak memory in bytes, and that of a
-        small photo.
+        Valid pixels; seconds, and those of the processor; peak memory in bytes, and that before
+        the run, with the photo made.
     """
     decompose(ball(_FIRST), settings)
     photo = ball(megapixels)
@@ -164,7 +164,7 @@ def cost_of(megapixels: float, settings: Settings) -> dict[str, float]:
     seconds, busy = time.perf_counter() - start, time.process_time() - busy
     peak = 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     pixels = int(photo.mask.sum())
-    return {"pixels": pixels, "seconds": seconds, "busy": busy, "peak": peak, "first": before}
+    return {"pixels": pixels, "seconds": seconds, "busy": busy, "peak": peak, "before": before}
 
 
 def _print_costs(megapixels: Sequence[float], assignments: Sequence[str]) -> None:
@@ -176,7 +176,7 @@ def _print_costs(megapixels: Sequence[float], assignments: Sequence[str]) -> Non
         print(
             f"{found['pixels'] / 1e6:6.2f} megapixels: {found['seconds']:7.1f} s, of the processor "
             f"{found['busy']:.1f} s, {1e6 * found['busy'] / found['pixels']:.1f} s per megapixel; "
-            f"peak {found['peak'] / 1e6:.0f} MB, of a small photo {found['first'] / 1e6:.0f} MB",
+            f"peak {found['peak'] / 1e6:.0f} MB, before it {found['before'] / 1e6:.0f} MB",
             flush=True,
         )
 
