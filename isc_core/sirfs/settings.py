@@ -20,14 +20,10 @@ class Start:
         has one and no depth was observed.
     light : float
         Factor on the log light that the priors expect.
-    predicted : bool
-        In place of the dome, the shape that the predicted normals add up to, if there are any and
-        no depth was observed.
     """
 
     dome: float = 0.0
     light: float = 0.0
-    predicted: bool = False
 
 
 @dataclass(frozen=True)
@@ -192,10 +188,10 @@ class PredictionWeights:
 
 
 # Chosen on held-out bodies (`benchmarks.sirfs.prediction_weights`), MIT-Berkeley being only looked
-# at afterwards; docs/methods/scene_network.md has both. From the predicted shape two fifths of the
-# evaluations lead to errors as small, see "Fewer evaluations" in the research log.
+# at afterwards; docs/methods/scene_network.md has both. With this tolerance two fifths of the evaluations lead to
+# errors about as small, see "Fewer evaluations" in the research log.
 PHOTO_PREDICTIONS = PredictionWeights(
-    0.5, 0.5, True, 1.0, (Start(dome=1, light=1, predicted=True),), loss_tolerance=1e-3
+    0.5, 0.5, True, 1.0, (Start(dome=1, light=1),), loss_tolerance=1e-3
 )
 # Of the data set's objects the priors know shapes and lights; little is left to predict.
 DATASET_PREDICTIONS = PredictionWeights(0.2, 0.2, False, 4.0, ISC_NATURAL.starts)

@@ -26,7 +26,6 @@ from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
 from .illumination import stack, unstack
-from .normal_prior import PredictedNormals, predicted_height
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
 from .settings import Start
@@ -35,7 +34,6 @@ STAGE = "shape and light"
 MOST_THREADS = 64  # more only wait for each other
 # Level of the pyramid: finer detail of the start belongs to the silhouette, not to the shape.
 _START_LEVEL = 2
-_PREDICTED_LEVEL = 1  # about as fine as the network that predicts the normals
 # Evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
 # differ.
 _TRIAL = 80
@@ -329,21 +327,13 @@ class ParameterVector:
             x[self._edges[-1] :] = solve_linear(
                 prior.unwhiten, (start.light - 1) * prior.offset[:, None]
             )[:, 0]
-        if self.shapes and p.observation is None:
-            self._place_shape(start, self.levels(x))
-        return x
-
-    def _place_shape(self, start: Start, levels: list[np.ndarray]) -> None:
-        """Write the shape of a start into one of the levels."""
-        p, level = self._problem, min(_PREDICTED_LEVEL, len(levels) - 1)
-        if start.predicted and isinstance(p.predicted_normals, PredictedNormals):
-            levels[level][...] = predicted_height(p.predicted_normals, p.mask, 2**level)
-        elif start.dome and p.silhouette is not None:
-            level = min(_START_LEVEL, len(levels) - 1)
+        if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
+            level = min(_START_LEVEL, len(self.shapes) - 1)
             height = start.dome * p.silhouette.dome
             for _ in range(level):
                 height = down(height) / _COARSER
-            levels[level][...] = height
+            self.levels(x)[level][...] = height
+        return x
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x
