@@ -5,9 +5,9 @@
 
 WORLD is a folder of `isc world build`. Held-out bodies are lit and photographed as for
 `prediction_weights`, but larger, and solved with the object 256 pixels long, from the predicted
-normals, shading and light: as photos are now, and as they were before (`LONG`: with a tolerance
-of 2e-4). Settings were chosen on even photos; report odd ones. The table has errors and evaluations, now over before, as geometric means over
-photos with the 95 % interval of resampled photos.
+normals, shading and light: as photos are now, and as they were before (`LONG`: with a tolerance of
+2e-4). Settings were chosen on even photos; report odd ones. The table has errors and evaluations,
+now over before, as geometric means over photos with the 95 % interval of resampled photos.
 
 With `--photos`, a folder of masked photos, it says as well how far their normals move, as the
 median over pixels, when the logarithm of the image changes by up to 1e-7.

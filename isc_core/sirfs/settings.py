@@ -188,8 +188,8 @@ class PredictionWeights:
 
 
 # Chosen on held-out bodies (`benchmarks.sirfs.prediction_weights`), MIT-Berkeley being only looked
-# at afterwards; docs/methods/scene_network.md has both. With this tolerance two fifths of the evaluations lead to
-# errors about as small, see "Fewer evaluations" in the research log.
+# at afterwards; docs/methods/scene_network.md has both. This tolerance takes two fifths of
+# the evaluations of the usual one, see "Fewer evaluations" in the research log.
 PHOTO_PREDICTIONS = PredictionWeights(
     0.5, 0.5, True, 1.0, (Start(dome=1, light=1),), loss_tolerance=1e-3
 )
