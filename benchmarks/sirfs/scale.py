@@ -1,11 +1,12 @@
 """Measure how the result depends on the photo's scale and padding, and what a larger photo costs.
 
-  python -m benchmarks.sirfs.scale [--photos DIR] [--cost]
+  python -m benchmarks.sirfs.scale [--photos DIR] [--resized] [--cost]
 
 For each photo (enlarged if its object is shorter than 512 pixels): normals at --max-size 192, 256
 and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
-normals with 16 and 64 pixels of padding against none. `--cost`: time and peak memory of the solve
-at full scale, from 0.1 to 4 megapixels of valid pixels.
+normals with 16 and 64 pixels of padding against none. `--resized`: photos of these sizes, instead of
+one photo with maps of these sizes, whose overall shape is the same. `--cost`: time and peak memory
+of the solve at full scale, from 0.1 to 4 megapixels of valid pixels.
 """
 
 import argparse
@@ -96,20 +97,23 @@ def padded(photo: Photo, by: int) -> Photo:
     )
 
 
-def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
+def scale_figures(photo: Photo, *, resized: bool = False) -> list[tuple[int, float, float]]:
     """Compare sizes with 512 pixels.
 
     Parameters
     ----------
     photo : Photo
         The photo.
+    resized : bool, optional
+        Whether the photo is resized, and not the maps alone.
 
     Returns
     -------
     list of tuple
         Size, median change of the normals in degrees, ratio of the relative height ranges.
     """
-    results = {size: decompose(photo, Settings(max_size=size)) for size in SIZES}
+    photos = {size: photo.resized_to_object(size) if resized else photo for size in SIZES}
+    results = {size: decompose(one, Settings(max_size=size)) for size, one in photos.items()}
     largest = results[SIZES[-1]]
     figures = []
     for size in SIZES[:-1]:
@@ -209,6 +213,7 @@ def main() -> None:
     parser.add_argument(
         "--photos", type=Path, default=Path("../shared/data/photos"), help="photos with masks"
     )
+    parser.add_argument("--resized", action="store_true", help="photos of these sizes")
     parser.add_argument("--cost", action="store_true", help="measure time and memory")
     parser.add_argument("--one", type=float, help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -224,9 +229,8 @@ def main() -> None:
         return
     for path in sorted(given.photos.glob("*.png")):
         photo = read_photo(path)
-        sizes = "  ".join(
-            f"{s}: {a:.2f} deg, height x{r:.3f}" for s, a, r in scale_figures(magnified(photo, 512))
-        )
+        figures = scale_figures(magnified(photo, 512), resized=given.resized)
+        sizes = "  ".join(f"{s}: {a:.2f} deg, height x{r:.3f}" for s, a, r in figures)
         pads = "  ".join(f"+{by}: {a:.2f} deg" for by, a in padding_figures(photo))
         print(f"{path.stem:12s} {sizes}   padding {pads}", flush=True)
 
