@@ -4,9 +4,9 @@
 
 For each photo (enlarged if its object is shorter than 512 pixels): normals at --max-size 192, 256
 and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
-normals with 16 and 64 pixels of padding against none. `--resized`: photos of these sizes, instead of
-one photo with maps of these sizes, whose overall shape is the same. `--cost`: time and peak memory
-of the solve at full scale, from 0.1 to 4 megapixels of valid pixels.
+normals with 16 and 64 pixels of padding against none. `--resized`: photos of these sizes, instead
+of one photo with maps of these sizes, whose overall shape is the same. `--cost`: time and peak
+memory of the solve at full scale, from 0.1 to 4 megapixels of valid pixels.
 """
 
 import argparse
