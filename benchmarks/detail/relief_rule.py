@@ -11,7 +11,7 @@ free). The factors are those of a grid that explain most of the relief, mean ove
 octaves, with the probabilities of bodies left out, where what is invented on print is at most
 .04 of the relief's energy in every octave.
 
-Citation: see `isc_core.decomposition.relief_evidence`.
+Citation: see `isc_core.shading.relief_evidence`.
 
 Limits: some forty bodies decide five numbers; others have to judge them.
 """
@@ -28,12 +28,12 @@ import numpy as np
 from isc_core.decomposition.detail import unscaled_relief
 from isc_core.decomposition.layers import shaded
 from isc_core.decomposition.models import solve
-from isc_core.decomposition.relief_evidence import ReliefRule
 from isc_core.decomposition.settings import MOST_DETAIL, Settings
 from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.errors import InputError
 from isc_core.networks.detail_network import DetailNetwork
 from isc_core.photo import read_photo
+from isc_core.shading.relief_evidence import ReliefRule
 
 from ..records import append_row, read_rows
 from .measure import judge

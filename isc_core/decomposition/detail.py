@@ -28,8 +28,8 @@ from ..imaging.bounding_box import mask_slices
 from ..networks.detail_network import MULTIPLE, DetailNetwork, predict_relief, raised
 from ..networks.layers import average_pool
 from ..progress import Monitor
+from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
-from .relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from .task import DecompositionTask, SceneEstimate
 
 _SOLVED = 300  # pixels: the coarsest level's object is not longer

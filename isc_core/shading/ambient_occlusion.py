@@ -13,10 +13,10 @@ g' being g on the side of t2 and -g on that of t1. t is at most the angle g + pi
 which the surface itself begins. The result is the sum over the azimuths, divided by what it would
 be without a horizon: 1 for every plane.
 
-The horizon is sought at distances that grow by a quarter, along steps of the pixel grid:
+The horizon is sought at distances that grow by a tenth, along steps of the pixel grid:
 (1, 0), (2, 1), (1, 1) and so on. Each azimuth counts by the angles that it stands for.
 
-Cost: linear in the pixels; some 300 values are read for each.
+Cost: linear in the pixels; some 600 values are read for each.
 
 Citation: L. Bavoil, M. Sainz, R. Dimitrov, "Image-space horizon-based ambient occlusion", SIGGRAPH
 2008 talks, doi:10.1145/1401032.1401061 (the horizon); J. Jimenez et al., "Practical real-time
@@ -24,13 +24,13 @@ strategies for accurate indirect occlusion", SIGGRAPH 2016 courses (the integral
 
 Limits: nothing beyond the mask hides the sky, and nothing beyond the largest distance; ridges
 narrower than the steps are missed at that distance. Light that surfaces reflect is not counted. The
-height map is taken for an orthographic view. Grooves of known opening angles come out within .03.
+height map is taken for an orthographic view. Grooves of known opening angles come out within .05.
 """
 
 import numpy as np
 
 _STEPS = ((0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2))  # row and column
-_GROWTH = 1.25
+_GROWTH = 1.1
 _REACH = 0.25  # of the object's longer side
 _ROWS = 128  # at once
 

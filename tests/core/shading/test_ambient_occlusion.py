@@ -52,11 +52,11 @@ def test_on_a_wall_the_other_one_hides_the_sky(angle: float) -> None:
     height = np.abs(across) / np.tan(half)
     long = np.broadcast_to(height, (801, 41))
     share = ambient_occlusion(long, np.ones(long.shape, bool), reach=0.5)[400]
-    for column in (23, 28, 38):
+    for column in range(22, 40):
         edge = np.arctan2(height[0] - height[column], across[0] - across[column])
         normal = np.pi - half  # of the wall on the right, which rises by pi / 2 - half
         expected = (1 + np.sin(edge - normal)) / 2
-        assert share[column] == pytest.approx(expected, abs=0.03)
+        assert share[column] == pytest.approx(expected, abs=0.05)
 
 
 def test_a_pit_is_darker_than_its_rim_and_the_reach_counts() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.decomposition.relief_evidence import (
+from isc_core.shading.relief_evidence import (
     RULE,
     Evidence,
     evidence_of,
