@@ -98,7 +98,8 @@ def decompose(
     photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
         maps = photo.resized_to_object(0 if settings.full_size else settings.max_size)
-        working = maps if known_shape else _working(photo, maps)
+        own_scale = known_shape or settings.model not in SIRFS_MODELS
+        working = maps if own_scale else _working(photo, maps)
         constraints = _at_scale(inputs, photo, working)
         if not share_in_blocks(maps.mask):
             raise InputError(

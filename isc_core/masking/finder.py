@@ -17,6 +17,7 @@ from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
 SURE = 0.2  # least sureness of a mask that is used without being asked for
+_LIKELY = 0.5  # the same where the whole photo would do as well
 _SEVERAL = 0.3  # of the largest part: a second one as large is another thing
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
@@ -30,7 +31,7 @@ class MaskSearch:
     hints : Hints
         Where to look. With hints, alpha channels and black borders are not used.
     lenient : bool
-        Return None instead of refusing.
+        Return None instead of refusing, and of a mask that is rather wrong than right.
     """
 
     hints: Hints = field(default_factory=Hints)
@@ -64,7 +65,8 @@ class MaskSearch:
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
         problem = why_refused(found, self.hints)
-        if not problem:
+        unlikely = self.lenient and not self.hints and found.sureness < _LIKELY
+        if not problem and not unlikely:
             return found
         if self.lenient and not self.hints:
             return None

@@ -119,7 +119,9 @@ def alone(truth: GroundTruth, model: str) -> SceneEstimate:
         np.zeros((h, w), bool),
         PhotoSource("", (w, h), 16, "linear", "file"),
     )
-    return solve(DecompositionTask(photo, photo, Settings(model, EVERY.separator, threads=1)))
+    return solve(
+        DecompositionTask(photo, photo, Settings(model, EVERY.separator, detail=0, threads=1))
+    )
 
 
 def relative(*ratios: float) -> Scores:

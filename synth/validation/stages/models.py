@@ -104,7 +104,10 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
     # What is predicted from the photo also serves the run on its diffuse layer.
-    usual = Settings("sirfs", options.separator, options.illumination, threads=options.threads)
+    # Without fine relief, so that models that share a shape share its normals.
+    usual = Settings(
+        "sirfs", options.separator, options.illumination, detail=0, threads=options.threads
+    )
     seen = with_predictions(DecompositionTask(photo, photo, usual, monitor=monitor, split=split))
 
     def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
