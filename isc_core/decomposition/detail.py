@@ -24,12 +24,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..imaging.blocks import block_means
 from ..imaging.bounding_box import mask_slices
 from ..networks.detail_network import MULTIPLE, DetailNetwork, predict_relief, raised
-from ..networks.layers import average_pool
 from ..progress import Monitor
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
+from ..sirfs.recover import Window
 from .task import DecompositionTask, SceneEstimate
 
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
@@ -60,9 +61,9 @@ class Level:
 
     def halved(self) -> "Level":
         """Return the next coarser level; sides are even."""
-        share = average_pool(self.mask[..., None].astype(np.float32))
-        image = average_pool(np.where(self.mask[..., None], self.image, 0))
-        return Level(image / np.maximum(share, 1e-9), share[..., 0] >= 0.5)
+        share = block_means(self.mask.astype(np.float32), 2)
+        image = block_means(np.where(self.mask[..., None], self.image, 0), 2)
+        return Level(image / np.maximum(share, 1e-9)[..., None], share >= 0.5)
 
 
 def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneEstimate:
@@ -173,7 +174,8 @@ def unscaled_relief(
     """
     monitor = monitor or Monitor()
     frame = _Frame.around(mask)
-    levels = [Level(frame.cut(np.where(mask[..., None], diffuse, 0)), frame.cut(mask))]
+    inside = np.where(mask[..., None], diffuse, 0).astype(np.float32)
+    levels = [Level(frame.window.cut(inside, 0), frame.window.cut(mask, False))]
     for _ in range(frame.halvings):
         levels.append(levels[-1].halved())
     slope = slopes(frame.coarsest(height))
@@ -183,86 +185,69 @@ def unscaled_relief(
     for k, level in zip(range(frame.halvings, -1, -1), levels[::-1], strict=True):
         monitor.report("fine relief", 1 - (k + 1) / (frame.halvings + 1))
         if k < frame.halvings:
-            slope, gain = _raised_pair(slope), _raised_pair(gain)
+            slope, gain = (raised(part.astype(np.float32)) for part in (slope, gain))
         relief, length = 2 * raised(relief), frame.length / 2**k
+        image = level.relative
         if length <= finest:
-            relief += _band(level, slope, gain, network)
+            relief += _band(image, level.mask, slope, gain, network)
         if length <= _TELLING:
-            found.append(evidence_of(level.relative, level.mask, gain))
-    inside = np.where(mask, frame.put(relief, mask.shape), np.float32(0))
-    return inside, mean_evidence(found)
-
-
-def _raised_pair(values: np.ndarray) -> np.ndarray:
-    values = values.astype(np.float32)
-    return np.stack([raised(values[..., 0]), raised(values[..., 1])], axis=2)
+            found.append(evidence_of(image, level.mask, gain))
+    whole = np.where(mask, frame.window.put(relief, mask.shape), np.float32(0))
+    return whole, mean_evidence(found)
 
 
 @dataclass(frozen=True)
 class _Frame:
     """The object's box with a margin, of a size that can be halved.
 
-    `box` are the rows and columns of the mask, `length` the longer side of the box in pixels, and
-    `halvings` the number of levels less one.
+    `box` are the rows and columns of the mask, `length` the longer side of the box in pixels,
+    `halvings` the number of levels less one, and `window` the frame.
     """
 
     box: tuple[slice, slice]
     length: int
     halvings: int
+    window: Window
 
     @classmethod
     def around(cls, mask: np.ndarray) -> "_Frame":
         box = mask_slices(mask)
-        length = max(one.stop - one.start for one in box)
-        return cls(box, length, max(0, int(np.ceil(np.log2(length / _SOLVED)))))
-
-    def cut(self, values: np.ndarray) -> np.ndarray:
-        """The frame of an image or a mask; its margin is 0."""
-        pads = [*self._pads, (0, 0)][: values.ndim]
-        kind = bool if values.dtype == bool else np.float32
-        return np.pad(values[self.box].astype(kind), pads)
+        sizes = [one.stop - one.start for one in box]
+        halvings = max(0, int(np.ceil(np.log2(max(sizes) / _SOLVED))))
+        multiple = MULTIPLE << halvings
+        height, width = (-(-(size + 2 * _MARGIN) // multiple) * multiple for size in sizes)
+        window = Window(box[0].start - _MARGIN, box[1].start - _MARGIN, height, width)
+        return cls(box, max(sizes), halvings, window)
 
     def coarsest(self, height: np.ndarray) -> np.ndarray:
-        """A height at the coarsest level, in its pixels; the margin continues the border."""
-        coarse = np.pad(height[self.box], self._pads, mode="edge")
+        """A height at the coarsest level, in its pixels; the box's border goes on around it."""
+        of_box = Window(-_MARGIN, -_MARGIN, self.window.height, self.window.width)
+        coarse = of_box.cut_replicated(height[self.box])
         for _ in range(self.halvings):
-            coarse = average_pool(coarse[..., None])[..., 0] / 2
+            coarse = block_means(coarse, 2) / 2
         return coarse
-
-    def put(self, values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """The content of the box in an image that is 0 elsewhere."""
-        out = np.zeros(shape, values.dtype)
-        sizes = (one.stop - one.start for one in self.box)
-        out[self.box] = values[tuple(slice(_MARGIN, _MARGIN + size) for size in sizes)]
-        return out
-
-    @property
-    def _pads(self) -> list[tuple[int, int]]:
-        multiple = MULTIPLE << self.halvings
-        return [
-            (_MARGIN, _MARGIN + (-(one.stop - one.start + 2 * _MARGIN)) % multiple)
-            for one in self.box
-        ]
 
 
 def _band(
-    level: Level, slope: np.ndarray, gain: np.ndarray, network: DetailNetwork | None
+    image: np.ndarray,
+    mask: np.ndarray,
+    slope: np.ndarray,
+    gain: np.ndarray,
+    network: DetailNetwork | None,
 ) -> np.ndarray:
     """The band (h, w) of a level, tile by tile; tiles overlap by what the network looks at."""
-    image, (height, width) = level.relative, level.mask.shape
+    height, width = mask.shape
     band = np.zeros((height, width), np.float32)
     for top in range(0, height, _TILE):
         for left in range(0, width, _TILE):
             inner = slice(top, min(top + _TILE, height)), slice(left, min(left + _TILE, width))
-            if not level.mask[inner].any():
+            if not mask[inner].any():
                 continue
             outer = tuple(
                 slice(max(one.start - _HALO, 0), min(one.stop + _HALO, size))
                 for one, size in zip(inner, (height, width), strict=True)
             )
-            found = predict_relief(
-                image[outer], level.mask[outer], slope[outer], gain[outer], network
-            )
+            found = predict_relief(image[outer], mask[outer], slope[outer], gain[outer], network)
             own = tuple(
                 slice(one.start - wide.start, one.stop - wide.start)
                 for one, wide in zip(inner, outer, strict=True)

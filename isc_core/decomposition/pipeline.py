@@ -97,7 +97,7 @@ def decompose(
     known_shape = inputs.height is not None or inputs.depth is not None
     photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
-        maps = photo.resized_to_object(0 if settings.full_size else settings.max_size)
+        maps = photo.resized_to_object(settings.maps_size)
         own_scale = known_shape or settings.model not in SIRFS_MODELS
         working = maps if own_scale else _working(photo, maps)
         constraints = _at_scale(inputs, photo, working)

@@ -225,6 +225,11 @@ class Settings:
                 object.__setattr__(self, setting, current)
 
     @property
+    def maps_size(self) -> int:
+        """Long side of the object in the maps; 0 for the photo's."""
+        return 0 if self.full_size else self.max_size
+
+    @property
     def takes_priors(self) -> bool:
         """Whether the model uses SIRFS priors."""
         return self.model in SIRFS_MODELS

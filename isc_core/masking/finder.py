@@ -64,16 +64,15 @@ class MaskSearch:
         """
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
-        problem = why_refused(found, self.hints)
-        unlikely = self.lenient and not self.hints and found.sureness < _LIKELY
-        if not problem and not unlikely:
+        problem = why_refused(found, self.hints, _LIKELY if self.lenient else SURE)
+        if not problem:
             return found
         if self.lenient and not self.hints:
             return None
         raise InputError(f"{name}: {problem}")
 
 
-def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
+def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SURE) -> str:
     """Return why a mask is not used.
 
     Parameters
@@ -81,6 +80,8 @@ def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
     found : FoundMask
     hints : Hints, optional
         With them a mask need not be sure.
+    least : float, optional
+        Sureness of a mask that is used.
 
     Returns
     -------
@@ -91,7 +92,7 @@ def why_refused(found: FoundMask, hints: Hints | None = None) -> str:
     if hints:
         return "" if enough else "no object is found there: put --point on it, or --box around it"
     several = enough and is_apart(found.mask)
-    if enough and found.sureness >= SURE and not several:
+    if enough and found.sureness >= least and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
     if several or kind == Count.SEVERAL:

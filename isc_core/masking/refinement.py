@@ -23,7 +23,7 @@ from ..photo.grabcut import Label, segmented
 from ..photo.masks import resized, tidy_mask
 
 SIDE = 384
-_SURE = 0.97  # probability from which the network is believed, away from the outline
+_SURE = 0.97  # probability from which the network is trusted, away from the outline
 _LIKELY = 0.8  # the same on the middle line of the thing
 _LINE = 5  # pixels: no point of the middle line lies less deep than others as near
 _BAND = 0.03  # of the part's longer side: as far off as the network's outline may be

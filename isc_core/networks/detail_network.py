@@ -8,8 +8,9 @@ Equation: for slopes p, q of a smooth surface under known light, relief r change
     g . grad r,   g = (d log S / dp, d log S / dq).
 
 Of all slopes that explain a change of log shading d, g d / |g|^2 are the smallest. A convolutional
-network sees them (with |g|^2 + .15^2 below), the photo's logarithm without its low frequencies, p
-and q, and g, and returns the finest band of r: what an image of half the size cannot hold,
+network (`encoder_decoder`) sees them (with |g|^2 + .15^2 below), the photo's logarithm without its
+low frequencies, p and q, and g, and returns the finest band of r: what an image of half the size
+cannot hold,
 
     band(r) = r - U P r
 
@@ -28,16 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
-from .layers import (
-    average_pool,
-    conv_block,
-    convolved,
-    depth_to_space,
-    is_chain,
-    space_to_depth,
-)
-from .loader import Network, Parameters
+from ..imaging.blocks import block_means
+from .encoder_decoder import EncoderDecoder
+from .loader import Parameters
 
 INPUTS = 11
 LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
@@ -50,43 +44,16 @@ HEIGHT_UNIT = 0.5  # pixels of height: a unit of the network's output
 
 
 @dataclass(frozen=True)
-class DetailNetwork(Network):
-    """The detail network. Raises `InputError` where parts do not fit each other.
-
-    Attributes
-    ----------
-    weights : tuple of (9, inputs, outputs) float32 ndarray
-        Two for each level down, two for each level up from the coarsest, the output.
-    biases : tuple of (outputs,) float32 ndarray
-    """
+class DetailNetwork(EncoderDecoder):
+    """The detail network; it has `LEVELS` levels down."""
 
     title = "detail network"
     file = "detail_network.npz"
+    inputs, outputs, block = INPUTS, 1, BLOCK
 
-    weights: tuple[np.ndarray, ...]
-    biases: tuple[np.ndarray, ...]
-
-    def __post_init__(self) -> None:
-        if not self._fits():
-            raise InputError(
-                "these are not the weights of a detail network of this version: "
-                "fit them anew, or use the shipped ones"
-            )
-
-    def _fits(self) -> bool:
-        if len(self.weights) != 4 * LEVELS - 1 or any(w.ndim != 3 for w in self.weights):
-            return False
-        down = 2 * LEVELS
-        wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * INPUTS
-        for width in wide:
-            shapes += [(9, inputs, width), (9, width, width)]
-            inputs = width
-        for skip, up in zip(wide[-2::-1], self.weights[down:-1:2], strict=True):
-            width = up.shape[-1]
-            shapes += [(9, skip + inputs, width), (9, width, width)]
-            inputs = width
-        return is_chain(self.weights, self.biases, [*shapes, (9, inputs, BLOCK**2)])
+    def fits(self) -> bool:
+        """Return whether the parts fit each other."""
+        return super().fits() and self.depth == LEVELS
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> "DetailNetwork":
@@ -121,16 +88,7 @@ class DetailNetwork(Network):
         (H, W) float32 ndarray
             Heights, pixels toward the viewer, before `band`.
         """
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, skips = space_to_depth(channels, BLOCK), []
-        for level in range(LEVELS):
-            layer = conv_block(average_pool(layer) if level else layer, steps)
-            skips.append(layer)
-        for skip in skips[-2::-1]:
-            layer = conv_block(
-                np.concatenate([skip, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
-            )
-        return HEIGHT_UNIT * depth_to_space(convolved(layer, *next(steps)), BLOCK)[..., 0]
+        return HEIGHT_UNIT * self.walked(channels)[0][..., 0]
 
 
 def predict_relief(
@@ -177,21 +135,21 @@ def band(height: np.ndarray) -> np.ndarray:
     -------
     (H, W) ndarray
     """
-    return height - raised(average_pool(height[..., None])[..., 0])
+    return height - raised(block_means(height, 2))
 
 
 def raised(values: np.ndarray) -> np.ndarray:
-    """Interpolate a map linearly to twice the size.
+    """Interpolate maps linearly to twice the size.
 
     Parameters
     ----------
-    values : (H, W) ndarray
+    values : (H, W) or (H, W, C) ndarray
 
     Returns
     -------
-    (2 H, 2 W) ndarray
+    (2 H, 2 W) or (2 H, 2 W, C) ndarray
     """
-    return _raised_rows(_raised_rows(values).T).T
+    return _raised_rows(_raised_rows(values).swapaxes(0, 1)).swapaxes(0, 1)
 
 
 def _raised_rows(values: np.ndarray) -> np.ndarray:
@@ -227,9 +185,8 @@ def channels_of(
     light = np.where(mask[..., None], image, 0).astype(np.float32)
     log_light = np.log(light + np.float32(DARK))
     parts = [log_light.mean(axis=2), *(log_light[..., c] - log_light[..., 1] for c in (0, 2))]
-    share = _blocks(inside)
-    cover = _spread(share)
-    low = [_spread(_blocks(part * inside)) / np.maximum(cover, 1e-6) for part in parts]
+    cover = _spread(block_means(inside, COARSE))
+    low = [_spread(block_means(part * inside, COARSE)) / np.maximum(cover, 1e-6) for part in parts]
     p, q = slope[..., 0], slope[..., 1]
     length = np.sqrt(1 + p * p + q * q)
     bound = np.clip(gain, -STEEPEST, STEEPEST)
@@ -247,11 +204,6 @@ def channels_of(
         least[..., 1],
     ]
     return (np.stack(channels, axis=2) * inside[..., None]).astype(np.float32)
-
-
-def _blocks(values: np.ndarray) -> np.ndarray:
-    rows, columns = values.shape
-    return values.reshape(rows // COARSE, COARSE, columns // COARSE, COARSE).mean(axis=(1, 3))
 
 
 def _spread(values: np.ndarray) -> np.ndarray:

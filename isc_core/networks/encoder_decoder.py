@@ -1,9 +1,9 @@
-"""What the networks of whole photos share: an encoder, a decoder, and an answer about the photo.
+"""What the networks share: an encoder, a decoder, and for some an answer about the photo.
 
-Equation: pixels go in and come out in blocks of 4 x 4 (space to depth). Each level down is two
-convolutions (`layers`) and half as fine as the one before; each level up sees the level below it,
-repeated, beside the encoder's map of its own size. Two dense layers answer about the photo as a
-whole from what is read of the coarse maps.
+Equation: pixels go in and come out in blocks (space to depth). Each level down is two convolutions
+(`layers`) and half as fine as the one before; each level up sees the level below it, repeated,
+beside the encoder's map of its own size. Two dense layers answer about the photo as a whole from
+what is read of the coarse maps.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28.
@@ -17,41 +17,34 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import InputError
-from .layers import average_pool, conv_block, convolved, depth_to_space, is_chain, space_to_depth
+from ..imaging.blocks import block_means
+from .layers import conv_block, convolved, depth_to_space, is_chain, space_to_depth
 from .loader import Network
 
-BLOCK = 4  # pixels of a block's side
+BLOCK = 4  # pixels of a block's side, in networks of whole photos
 
 
 @dataclass(frozen=True)
 class EncoderDecoder(Network):
-    """A network of a photo. Raises `InputError` where parts do not fit each other.
+    """A network from maps to maps. Raises `InputError` where parts do not fit each other.
 
     Attributes
     ----------
     inputs, outputs : int
         Channels of a pixel.
-    coarse : int
-        Levels that the answer is read from, the coarsest ones: two numbers for each channel.
-    answers : int
-        Numbers of the answer.
+    block : int
+        Pixels of a block's side.
     weights : tuple of (9, inputs, outputs) float32 ndarray
         Two for each level down, two for each level up from the coarsest, the output.
     biases : tuple of (outputs,) float32 ndarray
-    dense : tuple of (inputs, outputs) ndarray
-        The two layers of the answer.
-    offsets : tuple of (outputs,) ndarray
     """
 
     inputs: ClassVar[int]
     outputs: ClassVar[int]
-    coarse: ClassVar[int]
-    answers: ClassVar[int]
+    block: ClassVar[int]
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
-    dense: tuple[np.ndarray, ...]
-    offsets: tuple[np.ndarray, ...]
 
     def __post_init__(self) -> None:
         if not self.fits():
@@ -64,30 +57,30 @@ class EncoderDecoder(Network):
         """Return whether the parts fit each other."""
         if len(self.weights) < 7 or len(self.weights) % 4 != 3:
             return False
-        if any(w.ndim != 3 for w in self.weights) or any(m.ndim != 2 for m in self.dense):
+        if any(w.ndim != 3 for w in self.weights):
             return False
-        down = 2 * self._levels
-        wide = [w.shape[-1] for w in self.weights[1:down:2]]
-        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * self.inputs
-        for width in wide:
+        shapes, inputs = list[tuple[int, ...]](), self.block**2 * self.inputs
+        for width in self.widths:
             shapes += [(9, inputs, width), (9, width, width)]
             inputs = width
-        for skip, up in zip(wide[-2::-1], self.weights[down:-1:2], strict=True):
+        for skip, up in zip(
+            self.widths[-2::-1], self.weights[2 * self.depth : -1 : 2], strict=True
+        ):
             width = up.shape[-1]
             shapes += [(9, skip + inputs, width), (9, width, width)]
             inputs = width
-        shapes.append((9, inputs, BLOCK**2 * self.outputs))
-        hidden = self.dense[0].shape[-1]
-        answer = [(2 * sum(wide[-self.coarse :]), hidden), (hidden, self.answers)]
-        return (
-            is_chain(self.weights, self.biases, shapes)
-            and [m.shape for m in self.dense] == answer
-            and [o.shape for o in self.offsets] == [s[1:] for s in answer]
-        )
+        shapes.append((9, inputs, self.block**2 * self.outputs))
+        return is_chain(self.weights, self.biases, shapes)
 
     @property
-    def _levels(self) -> int:
+    def depth(self) -> int:
+        """Levels down."""
         return (len(self.weights) + 1) // 4
+
+    @property
+    def widths(self) -> list[int]:
+        """Channels of the levels down, the finest first."""
+        return [w.shape[-1] for w in self.weights[1 : 2 * self.depth : 2]]
 
     def walked(self, channels: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Go down and up again.
@@ -95,7 +88,7 @@ class EncoderDecoder(Network):
         Parameters
         ----------
         channels : (H, W, inputs) ndarray
-            Sides are multiples of 4 * 2^(levels - 1).
+            Sides are multiples of `block` * 2^(depth - 1).
 
         Returns
         -------
@@ -104,14 +97,47 @@ class EncoderDecoder(Network):
             The encoder's maps, the finest first.
         """
         steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, levels = space_to_depth(channels, BLOCK), []
-        for level in range(self._levels):
-            layer = conv_block(layer if level == 0 else average_pool(layer), steps)
+        layer, levels = space_to_depth(channels, self.block), []
+        for level in range(self.depth):
+            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps)
             levels.append(layer)
         for skip in levels[-2::-1]:
             finer = layer.repeat(2, axis=0).repeat(2, axis=1)
             layer = conv_block(np.concatenate([skip, finer], axis=2), steps)
-        return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
+        return depth_to_space(convolved(layer, *next(steps)), self.block), levels
+
+
+@dataclass(frozen=True)
+class PhotoNetwork(EncoderDecoder):
+    """A network of a whole photo, which also answers about it.
+
+    Attributes
+    ----------
+    coarse : int
+        Levels that the answer is read from, the coarsest ones: two numbers for each channel.
+    answers : int
+        Numbers of the answer.
+    dense : tuple of (inputs, outputs) ndarray
+        The two layers of the answer.
+    offsets : tuple of (outputs,) ndarray
+    """
+
+    coarse: ClassVar[int]
+    answers: ClassVar[int]
+    block = BLOCK
+
+    dense: tuple[np.ndarray, ...]
+    offsets: tuple[np.ndarray, ...]
+
+    def fits(self) -> bool:
+        """Return whether the parts fit each other."""
+        if not super().fits() or any(m.ndim != 2 for m in self.dense):
+            return False
+        hidden = self.dense[0].shape[-1]
+        answer = [(2 * sum(self.widths[-self.coarse :]), hidden), (hidden, self.answers)]
+        return [m.shape for m in self.dense] == answer and [o.shape for o in self.offsets] == [
+            s[1:] for s in answer
+        ]
 
     def answer(self, features: list[np.ndarray]) -> np.ndarray:
         """Answer about the photo as a whole.

@@ -136,22 +136,6 @@ def depth_to_space(layer: np.ndarray, block: int) -> np.ndarray:
     )
 
 
-def average_pool(layer: np.ndarray) -> np.ndarray:
-    """Average blocks of 2 x 2 pixels.
-
-    Parameters
-    ----------
-    layer : (H, W, C) ndarray
-        H and W even.
-
-    Returns
-    -------
-    (H / 2, W / 2, C) ndarray
-    """
-    rows, columns, channels = layer.shape
-    return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
-
-
 def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
     """Apply the next two convolutions of `steps`, each followed by max(0, .).
 

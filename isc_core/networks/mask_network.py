@@ -25,7 +25,7 @@ from enum import IntEnum
 
 import numpy as np
 
-from .encoder_decoder import EncoderDecoder
+from .encoder_decoder import PhotoNetwork
 from .layers import DARK, softmax
 from .loader import Parameters
 
@@ -46,7 +46,7 @@ class Count(IntEnum):
 
 
 @dataclass(frozen=True)
-class MaskNetwork(EncoderDecoder):
+class MaskNetwork(PhotoNetwork):
     """The mask network; its answer is the log odds of `Count`.
 
     Attributes

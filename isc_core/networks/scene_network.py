@@ -30,13 +30,14 @@ from enum import StrEnum
 
 import numpy as np
 
+from ..imaging.blocks import block_means
 from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
 from ..scene.light_estimate import LightEstimate, mirrored_places
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
-from .encoder_decoder import EncoderDecoder
+from .encoder_decoder import PhotoNetwork
 from .frame import at_full_size, framed
-from .layers import average_pool, inputs_of, softmax
+from .layers import inputs_of, softmax
 from .loader import Parameters
 
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
@@ -103,7 +104,7 @@ class RawPrediction:
 
 
 @dataclass(frozen=True)
-class SceneNetwork(EncoderDecoder):
+class SceneNetwork(PhotoNetwork):
     """The scene network; its answer is the light.
 
     Attributes
@@ -170,9 +171,9 @@ class SceneNetwork(EncoderDecoder):
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
-        cover, features = average_pool(mask.astype(np.float64)[..., None]), []
+        cover, features = block_means(mask.astype(np.float64)[..., None], 2), []
         for level, layer in enumerate(skips):
-            cover = average_pool(cover)
+            cover = block_means(cover, 2)
             if level < len(skips) - COARSE:
                 continue
             values = layer.astype(np.float64)

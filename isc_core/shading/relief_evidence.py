@@ -32,6 +32,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..imaging.blocks import block_means
 from ..imaging.smoothing import masked_gaussian
 
 _BLOCK = 8  # pixels
@@ -127,16 +128,17 @@ def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Eviden
     """
     luminance = np.log(np.where(mask, image.mean(axis=2), 1) + _DARK)
     change = np.where(mask, luminance - masked_gaussian(luminance, mask, _SMOOTH), 0)
-    whole = _blocks(mask.astype(np.float64)) == 1
+    whole = block_means(mask.astype(np.float64), _BLOCK) == 1
     if whole.sum() < _FEWEST:
         return None
     size = np.hypot(gain[..., 0], gain[..., 1])
-    energy, mean = _blocks(change**2)[whole], _blocks(size)[whole]
+    energy, mean = block_means(change**2, _BLOCK)[whole], block_means(size, _BLOCK)[whole]
     down, right = np.gradient(change)
     along = right * gain[..., 0] + down * gain[..., 1]
     across = right * gain[..., 1] - down * gain[..., 0]
     ratios = [
-        float(_blocks(part**2 / np.maximum(size, 1e-6))[whole].sum()) for part in (along, across)
+        float(block_means(part**2 / np.maximum(size, 1e-6), _BLOCK)[whole].sum())
+        for part in (along, across)
     ]
     if min(ratios) <= 0:
         return None
@@ -165,11 +167,6 @@ def mean_evidence(found: list[Evidence | None]) -> Evidence | None:
         float(np.mean([one.correlation for one in known])),
         float(np.mean([one.along for one in known])),
     )
-
-
-def _blocks(values: np.ndarray) -> np.ndarray:
-    rows, columns = (n // _BLOCK for n in values.shape)
-    return np.asarray(values.reshape(rows, _BLOCK, columns, _BLOCK).mean(axis=(1, 3)))
 
 
 def _correlation(a: np.ndarray, b: np.ndarray) -> float:

@@ -321,5 +321,5 @@ def _detail_notes(settings: Settings, length: int) -> tuple[str, ...]:
 def _pixels(photo: Photo, settings: Settings) -> int:
     """Number of the object's pixels in the maps."""
     longest = max(photo.box[2:])
-    keep = settings.full_size or settings.max_size == 0 or longest <= settings.max_size
-    return round(int(photo.mask.sum()) * (1.0 if keep else (settings.max_size / longest) ** 2))
+    length = min(settings.maps_size or longest, longest)
+    return round(int(photo.mask.sum()) * (length / longest) ** 2)

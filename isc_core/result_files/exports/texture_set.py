@@ -51,7 +51,7 @@ from ...progress import Monitor
 from ...scene.decomposition import Decomposition
 from ...shading.ambient_occlusion import ambient_occlusion
 from ..mesh import MeshResult, color_codes, nearest_inside, vector_codes
-from .textures import PLASTIC
+from .textures import PLASTIC, share_codes
 
 _COMPRESSION = 2  # of 9: a third of the time of the usual 6
 _SEPARATE = ("basecolor", "normal", "mesh_normal", "roughness", "specular", "height", "ao")
@@ -195,7 +195,7 @@ class _Layers:
 
     @property
     def basecolor(self) -> np.ndarray:
-        return np.dstack([color_codes(self.built.base_color), _codes(self.cover)])
+        return np.dstack([color_codes(self.built.base_color), share_codes(self.cover)])
 
     @property
     def normal(self) -> np.ndarray:
@@ -213,8 +213,8 @@ class _Layers:
     def specular(self) -> np.ndarray:
         level = np.float32(PLASTIC * self.built.specular)
         if self.built.gloss.variation is None:
-            return _codes(np.full(self.d.mask.shape, level))
-        return _codes(level * self._continued(self.built.gloss.variation, 1.0))
+            return share_codes(np.full(self.d.mask.shape, level))
+        return share_codes(level * self._continued(self.built.gloss.variation, 1.0))
 
     @property
     def height(self) -> np.ndarray:
@@ -224,7 +224,7 @@ class _Layers:
     @cached_property
     def ao(self) -> np.ndarray:
         share = ambient_occlusion(self.d.height, self.d.mask)
-        return _codes(self._continued(share, 1.0))
+        return share_codes(self._continued(share, 1.0))
 
     @property
     def orm(self) -> np.ndarray:
@@ -269,10 +269,6 @@ class _Layers:
         if self.green_down:
             codes[..., 1] = 255 - codes[..., 1]
         return codes
-
-
-def _codes(values: np.ndarray) -> np.ndarray:
-    return np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8)
 
 
 def _code(value: float) -> int:

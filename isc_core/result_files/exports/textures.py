@@ -11,6 +11,20 @@ from ..mesh import MeshResult, encoded_png
 PLASTIC = 0.5  # a specular texture's value for f0 = .04, as in Blender and Unreal
 
 
+def share_codes(values: np.ndarray) -> np.ndarray:
+    """Return values in [0, 1] as 8-bit codes; others are clipped.
+
+    Parameters
+    ----------
+    values : (H, W) ndarray
+
+    Returns
+    -------
+    (H, W) uint8 ndarray
+    """
+    return np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8)
+
+
 def plain_stem(path: Path) -> str:
     """Return the name of a file without its suffix, as formats allow names: without spaces.
 
@@ -66,5 +80,5 @@ class MeshTextures:
         if built.gloss.variation is not None:
             specular = f"{name}_specular.png"
             level = PLASTIC * built.specular * built.gloss.variation
-            files[specular] = encoded_png(np.rint(255 * np.clip(level, 0, 1)).astype(np.uint8))
+            files[specular] = encoded_png(share_codes(level))
         return MeshTextures(files, base_color, normal, specular)
