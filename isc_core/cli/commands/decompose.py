@@ -216,7 +216,7 @@ def _decompose_photo(
         options,
         *reading_note_lines(photo.original.notes),
         *note_lines(result.provenance.diagnostics),
-        *_detail_notes(settings, max(mask_box(result.mask)[2:])),
+        *_detail_notes(settings, max(mask_box(result.mask)[2:]), max(photo.box[2:])),
         *((f"note: {CROPPED}",) if photo.original.cropped and settings.camera == "auto" else ()),
         *(show(preview) if options.open else ()),
         f"see {preview}",
@@ -308,11 +308,13 @@ def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:
     )
 
 
-def _detail_notes(settings: Settings, length: int) -> tuple[str, ...]:
-    """What to say where finer relief was asked for than maps with an object so long can hold."""
+def _detail_notes(settings: Settings, length: int, longest: int) -> tuple[str, ...]:
+    """What to say where finer relief was asked for than maps with an object `length` pixels long
+    can hold; it is `longest` in the photo.
+    """
     if settings.detail <= max(length, Settings.detail):
         return ()
-    remedy = "the photo has no more" if settings.max_size == 0 else "use --max-size 0 for more"
+    remedy = "the photo has no more" if length >= longest else "use --max-size 0 for more"
     return (
         f"note: the object is {length} pixels long in the maps, not {settings.detail}: {remedy}",
     )

@@ -199,6 +199,17 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     assert (printed.out, printed.err) == ("", "")
 
 
+@pytest.mark.parametrize(
+    ("size", "remedy"), [("0", "the photo has no more"), ("24", "use --max-size 0 for more")]
+)
+def test_relief_finer_than_the_maps_is_not_promised(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], size: str, remedy: str
+) -> None:
+    photo, finest = ball_photo(tmp_path), ("--detail", "2048", "--max-size", size)
+    assert isc("decompose", photo, "--model", "naive", *finest, "-o", tmp_path / "out") == 0
+    assert remedy in capfd.readouterr().out
+
+
 # --- known inputs ---------------------------------------------------------------------------------
 
 
