@@ -13,7 +13,6 @@ Limits: none of its own.
 
 import numpy as np
 import torch
-from torch import nn
 from torch.nn import functional
 
 from isc_core.networks.detail_network import (
@@ -26,14 +25,15 @@ from isc_core.networks.detail_network import (
     WEAK,
 )
 
-from ..networks.blocks import Block, Convolution, stored_arrays
+from ..networks.blocks import stored_arrays
+from ..networks.encoder_decoder import EncoderDecoderModule, quieten
 from ..world.tensor_batch import TensorBatch
 
 DOWN, UP = (32, 48, 64), (48, 32)
 _SLOPE = 0.05  # e
 
 
-class DetailNetworkModule(nn.Module):  # type: ignore[misc]
+class DetailNetworkModule(EncoderDecoderModule):
     """The trainable detail network.
 
     Parameters
@@ -43,16 +43,8 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
     """
 
     def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
-        super().__init__()
-        fine = (BLOCK**2 * INPUTS, *down[:-1])
-        self.down = nn.ModuleList([Block(i, o) for i, o in zip(fine, down, strict=True)])
-        below = (down[-1], *up[:-1])
-        self.up = nn.ModuleList(
-            [Block(skip + i, o) for skip, i, o in zip(down[-2::-1], below, up, strict=True)]
-        )
-        self.out = nn.Conv2d(up[-1], BLOCK**2, 3, padding=1)
-        nn.init.zeros_(self.out.bias)
-        self.out.weight.data *= 0.1
+        super().__init__(INPUTS, 1, down, up, BLOCK)
+        quieten(self.out)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> torch.Tensor:
@@ -68,20 +60,7 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
         (B, 1, H, W) tensor
             Heights, before `band_of`.
         """
-        layer, skips = functional.pixel_unshuffle(inputs, BLOCK), []
-        layer = layer.contiguous(memory_format=torch.channels_last)
-        with torch.autocast(inputs.device.type, torch.bfloat16, enabled=self.training):
-            for level, block in enumerate(self.down):
-                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
-                skips.append(layer)
-            for block, skip in zip(self.up, skips[-2::-1], strict=True):
-                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
-                layer = block(torch.cat([skip, finer], 1))
-            return HEIGHT_UNIT * functional.pixel_shuffle(self.out(layer), BLOCK).float()
-
-    def matrices(self) -> list[nn.Parameter]:
-        """Return the weights of the blocks."""
-        return [convolution.matrix for convolution, _ in self._pairs]
+        return HEIGHT_UNIT * self.walked(inputs)[0]
 
     def loss(self, batch: TensorBatch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its terms.
@@ -117,13 +96,9 @@ class DetailNetworkModule(nn.Module):  # type: ignore[misc]
             }
         return loss, terms
 
-    @property
-    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
-        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
-
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        return stored_arrays(self._pairs, self.out, {})
+        return stored_arrays(self.pairs, self.out, {})
 
 
 def _energy(height: torch.Tensor, mask: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:

@@ -21,7 +21,8 @@ from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import COARSE, INPUTS, SURENESS, Count
 
-from ..networks.blocks import Block, Convolution, load_arrays, restore, stored_arrays
+from ..networks.blocks import load_arrays, restore, stored_arrays
+from ..networks.encoder_decoder import EncoderDecoderModule, quieten
 from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
@@ -31,7 +32,7 @@ _OUTLINE = 3.0  # weight of pixels near the outline
 _COUNT, _OVERLAP = 0.3, 1.0
 
 
-class MaskNetworkModule(nn.Module):  # type: ignore[misc]
+class MaskNetworkModule(EncoderDecoderModule):
     """The trainable mask network.
 
     Parameters
@@ -41,25 +42,11 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
     """
 
     def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
-        super().__init__()
-        fine = (BLOCK**2 * INPUTS, *down[:-1])
-        self.down = nn.ModuleList(
-            [Block(inputs, outputs) for inputs, outputs in zip(fine, down, strict=True)]
-        )
-        below = (down[-1], *up[:-1])
-        self.up = nn.ModuleList(
-            [
-                Block(skip + inputs, outputs)
-                for skip, inputs, outputs in zip(down[-2::-1], below, up, strict=True)
-            ]
-        )
-        self.out = nn.Conv2d(up[-1], BLOCK**2, 3, padding=1)
+        super().__init__(INPUTS, 1, down, up, BLOCK)
         self.hidden = nn.Linear(2 * sum(down[-COARSE:]), HIDDEN)
         self.count = nn.Linear(HIDDEN, len(Count))
         nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
-        for module in (self.out, self.count):
-            nn.init.zeros_(module.bias)
-            module.weight.data *= 0.1
+        quieten(self.out, self.count)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -76,26 +63,10 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         counts : (B, 3) tensor
             As `MaskNetwork` returns them.
         """
-        layer = functional.pixel_unshuffle(inputs, BLOCK).contiguous(
-            memory_format=torch.channels_last
-        )
-        skips, features = [], []
-        device = inputs.device.type
-        with torch.autocast(device, torch.bfloat16, enabled=self.training):
-            for level, block in enumerate(self.down):
-                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
-                skips.append(layer)
-                if level >= len(self.down) - COARSE:
-                    features += [layer.float().mean((2, 3)), layer.float().amax((2, 3))]
-            for block, skip in zip(self.up, skips[-2::-1], strict=True):
-                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
-                layer = block(torch.cat([skip, finer], 1))
-            odds = functional.pixel_shuffle(self.out(layer), BLOCK).float()
+        odds, levels = self.walked(inputs)
+        coarse = [layer.float() for layer in levels[-COARSE:]]
+        features = [part for layer in coarse for part in (layer.mean((2, 3)), layer.amax((2, 3)))]
         return odds, self.count(functional.relu(self.hidden(torch.cat(features, 1))))
-
-    def matrices(self) -> list[nn.Parameter]:
-        """Return the weights of the blocks."""
-        return [convolution.matrix for convolution, _ in self._pairs]
 
     def loss(self, batch: Composite) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its terms.
@@ -137,16 +108,12 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         return total, terms
 
     @property
-    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
-        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
-
-    @property
     def _dense(self) -> dict[str, nn.Linear]:
         return {"hidden": self.hidden, "count": self.count}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        found = stored_arrays(self._pairs, self.out, self._dense)
+        found = stored_arrays(self.pairs, self.out, self._dense)
         found["sureness"] = np.eye(SURENESS, dtype=np.float32)[1]
         return found
 
@@ -158,7 +125,7 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         arrays : dict of str to ndarray
             As `arrays` returns them.
         """
-        load_arrays(self._pairs, self.out, self._dense, arrays)
+        load_arrays(self.pairs, self.out, self._dense, arrays)
 
     def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
         """Take what the scene network knows: the levels down whose channels agree.
@@ -170,7 +137,7 @@ class MaskNetworkModule(nn.Module):  # type: ignore[misc]
         """
         states, place = arrays["normalisation"], 0
         with torch.no_grad():
-            for k, (convolution, norm) in enumerate(self._pairs[: 2 * len(self.down)]):
+            for k, (convolution, norm) in enumerate(self.pairs[: 2 * len(self.down)]):
                 weight = arrays[f"weight{k:02d}"]
                 outputs = weight.shape[2]
                 own = convolution.weight.shape

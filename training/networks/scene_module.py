@@ -46,13 +46,14 @@ from isc_core.networks.scene_network import (
 )
 
 from ..world.samples import Sample
-from .blocks import Block, Convolution, load_arrays, stored_arrays
+from .blocks import load_arrays, stored_arrays
+from .encoder_decoder import EncoderDecoderModule, quieten
 
 WIDTHS = (64, 128, 192, 256)
 HIDDEN = 192
 
 
-class SceneNetworkModule(nn.Module):  # type: ignore[misc]
+class SceneNetworkModule(EncoderDecoderModule):
     """The trainable scene network.
 
     Parameters
@@ -62,22 +63,11 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
     """
 
     def __init__(self, widths: tuple[int, ...] = WIDTHS) -> None:
-        super().__init__()
-        fine = (BLOCK**2 * INPUTS, *widths[:-1])
-        self.down = nn.ModuleList(
-            [Block(inputs, outputs) for inputs, outputs in zip(fine, widths, strict=True)]
-        )
-        pairs = list(zip(widths[-2::-1], widths[:0:-1], strict=True))
-        self.up = nn.ModuleList([Block(skip + inputs, skip) for skip, inputs in pairs])
-        self.out = nn.Conv2d(widths[0], BLOCK**2 * CHANNELS, 3, padding=1)
+        super().__init__(INPUTS, CHANNELS, widths, widths[-2::-1], BLOCK)
         self.hidden = nn.Linear(2 * sum(widths[-COARSE:]), HIDDEN)
         self.light = nn.Linear(HIDDEN, GLOBAL)
-        for module in self.modules():
-            if isinstance(module, nn.Conv2d):
-                nn.init.kaiming_normal_(module.weight, nonlinearity="relu")
-        for module in (self.out, self.light):
-            nn.init.zeros_(module.bias)
-            module.weight.data *= 0.1
+        nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
+        quieten(self.out, self.light)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -94,29 +84,14 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         vector : (B, GLOBAL) tensor
             As `RawPrediction` describes them.
         """
-        cover = functional.avg_pool2d(inputs[:, 3:4], BLOCK // 2)
-        layer = functional.pixel_unshuffle(inputs, BLOCK).contiguous(
-            memory_format=torch.channels_last
-        )
-        skips, features = [], []
-        device = inputs.device.type
-        with torch.autocast(device, torch.bfloat16, enabled=self.training):
-            for level, block in enumerate(self.down):
-                layer = block(functional.avg_pool2d(layer, 2) if level else layer)
-                skips.append(layer)
-                cover = functional.avg_pool2d(cover, 2)
-                if level >= len(self.down) - COARSE:
-                    features += _pooled(layer.float(), cover)
-            for block, skip in zip(self.up, skips[-2::-1], strict=True):
-                finer = functional.interpolate(layer, scale_factor=2, mode="nearest")
-                layer = block(torch.cat([skip, finer], 1))
-            maps = functional.pixel_shuffle(self.out(layer), BLOCK).float()
+        maps, levels = self.walked(inputs)
+        cover, features = functional.avg_pool2d(inputs[:, 3:4], BLOCK // 2), []
+        for level, layer in enumerate(levels):
+            cover = functional.avg_pool2d(cover, 2)
+            if level >= len(levels) - COARSE:
+                features += _pooled(layer.float(), cover)
         hidden = functional.relu(self.hidden(torch.cat(features, 1)))
         return maps, self.light(hidden)
-
-    def matrices(self) -> list[nn.Parameter]:
-        """Return the weights of the blocks."""
-        return [convolution.matrix for convolution, _ in self._pairs]
 
     def loss(self, batch: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its terms.
@@ -145,16 +120,12 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         return total, terms
 
     @property
-    def _pairs(self) -> list[tuple[Convolution, nn.BatchNorm2d]]:
-        return [pair for block in [*self.down, *self.up] for pair in block.pairs]
-
-    @property
     def _dense(self) -> dict[str, nn.Linear]:
         return {"hidden": self.hidden, "light": self.light}
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
-        found = stored_arrays(self._pairs, self.out, self._dense)
+        found = stored_arrays(self.pairs, self.out, self._dense)
         found["temperatures"] = np.ones(len(TEMPERATURES), np.float32)
         return found
 
@@ -187,7 +158,7 @@ class SceneNetworkModule(nn.Module):  # type: ignore[misc]
         arrays : dict of str to ndarray
             Content of an archive.
         """
-        load_arrays(self._pairs, self.out, self._dense, arrays)
+        load_arrays(self.pairs, self.out, self._dense, arrays)
 
 
 def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
