@@ -17,8 +17,9 @@ median angle of the overall shape. Intervals are of 2,000 sets of resampled bodi
 
 import argparse
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,10 +33,10 @@ from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.errors import InputError
 from isc_core.photo import read_photo
 
-from ..records import append_row, read_rows
+from .body_rows import body_rows
 from .measure import OCTAVES, at_size, judge
 from .rendering import SetKind
-from .sets import PHOTO, Truth, bodies_in, read_truth
+from .sets import PHOTO, Truth, read_truth
 from .settings import settings_of
 
 _RESAMPLED = 2000
@@ -113,43 +114,27 @@ def stored_normals(folder: Path) -> Estimator:
     return estimate
 
 
-def measured(
-    folder: Path, rows: Path, estimator: Estimator, kinds: Sequence[SetKind], count: int, key: str
-) -> Iterator[Mapping[str, Any]]:
-    """Judge the bodies that have no row yet.
+def judged(body: Path, estimator: Estimator) -> dict[str, Any]:
+    """Judge one body.
 
     Parameters
     ----------
-    folder : Path
-        The set.
-    rows : Path
-        JSON lines, appended to.
+    body : Path
+        Its folder.
     estimator : callable
         See `pipeline_normals`.
-    kinds : sequence of SetKind
-    count : int
-        The first bodies of each kind.
-    key : str
-        Names what is judged; rows of another key are left alone.
 
-    Yields
-    ------
-    mapping
-        All rows of the key for these bodies.
+    Returns
+    -------
+    dict of str to Any
+        Seconds, and the figures of `measure.Judgement`.
     """
-    earlier = {row["body"]: row for row in read_rows(rows) if row["key"] == key}
-    for kind in kinds:
-        for body in bodies_in(folder, kind)[:count]:
-            if body.name not in earlier:
-                truth, start = read_truth(body), time.perf_counter()
-                estimated = estimator(body, truth)
-                seconds = time.perf_counter() - start
-                found = judge(estimated, truth.normal, truth.mask, truth.smooth)
-                figures = {name: np.asarray(one).tolist() for name, one in asdict(found).items()}
-                row = {"key": key, "body": body.name, "seconds": seconds, **figures}
-                append_row(rows, row)
-                earlier[body.name] = row
-            yield earlier[body.name]
+    truth, start = read_truth(body), time.perf_counter()
+    estimated = estimator(body, truth)
+    seconds = time.perf_counter() - start
+    found = judge(estimated, truth.normal, truth.mask, truth.smooth)
+    figures = {name: np.asarray(one).tolist() for name, one in asdict(found).items()}
+    return {"seconds": seconds, **figures}
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -158,7 +143,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     rows : sequence of mapping
-        Of `measured`.
+        Of `body_rows`, measured by `judged`.
 
     Returns
     -------
@@ -222,7 +207,8 @@ def main() -> None:
         else:
             estimator, key = pipeline_normals(settings), str(settings)
         rows = []
-        for row in measured(given.folder, given.rows, estimator, kinds, given.count, key):
+        measure = partial(judged, estimator=estimator)
+        for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
             shown = "explained" if row["body"].startswith(SetKind.RELIEF) else "error"
             print(row["body"], shown, *(f"{value:.3g}" for value in row[shown]), flush=True)
             rows.append(row)

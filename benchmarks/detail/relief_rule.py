@@ -17,8 +17,9 @@ Limits: some forty bodies decide five numbers; others have to judge them.
 """
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from functools import partial
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ import numpy as np
 from isc_core.decomposition.detail import unscaled_relief
 from isc_core.decomposition.layers import shaded
 from isc_core.decomposition.models import solve
+from isc_core.decomposition.pipeline import WORKING_SIZE
 from isc_core.decomposition.settings import MOST_DETAIL, Settings
 from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.errors import InputError
@@ -35,10 +37,10 @@ from isc_core.networks.detail_network import DetailNetwork
 from isc_core.photo import read_photo
 from isc_core.shading.relief_evidence import ReliefRule
 
-from ..records import append_row, read_rows
+from .body_rows import body_rows
 from .measure import judge
 from .rendering import SetKind
-from .sets import PHOTO, bodies_in, read_truth
+from .sets import PHOTO, read_truth
 
 FACTORS = (0.0, 1.5, 3.0)  # the figures are nearly quadratic in the factor
 _RIDGE = 1.0
@@ -46,63 +48,38 @@ _INVENTED = 0.04
 _STEPS = 50
 
 
-def measured(
-    folder: Path,
-    rows: Path,
-    network: DetailNetwork,
-    kinds: Sequence[SetKind],
-    count: int | None,
-) -> Iterator[Mapping[str, Any]]:
-    """Measure the bodies that have no row yet.
+def at_factors(body: Path, network: DetailNetwork) -> dict[str, Any]:
+    """Judge the relief that the network finds on a body, at several factors.
 
     Parameters
     ----------
-    folder : Path
-        The set.
-    rows : Path
-        JSON lines, appended to.
+    body : Path
+        Its folder.
     network : DetailNetwork
-    kinds : sequence of SetKind
-    count : int or None
-        The first bodies of each kind.
 
-    Yields
-    ------
-    mapping
-        "body"; "evidence"; "explained", "error" and "energy" at each of `FACTORS`.
+    Returns
+    -------
+    dict of str to Any
+        "evidence"; "explained", "error" and "energy" at each of `FACTORS`.
     """
-    known = {row["body"]: row for row in read_rows(rows)}
+    photo, settings = read_photo(body / PHOTO), Settings(detail=0, threads=1)
     options = SolveOptions(fit_lobe=False, check_assumptions=False)
-    for kind in kinds:
-        for body in bodies_in(folder, kind)[:count]:
-            if body.name not in known:
-                photo = read_photo(body / PHOTO)
-                working = photo.resized_to_object(512)
-                settings = Settings(detail=0, threads=1)
-                found = solve(DecompositionTask(working, photo, settings, options=options))
-                relief, evidence = unscaled_relief(
-                    found.split.diffuse,
-                    photo.mask,
-                    found.height,
-                    found.light,
-                    MOST_DETAIL,
-                    network=network,
-                )
-                truth, judged = read_truth(body), []
-                for factor in FACTORS:
-                    normal = shaded(found.height + factor * relief, found.light, photo.mask)[0]
-                    judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
-                row = {
-                    "body": body.name,
-                    "evidence": None if evidence is None else list(asdict(evidence).values()),
-                    **{
-                        name: [np.asarray(getattr(one, name)).tolist() for one in judged]
-                        for name in ("explained", "error", "energy")
-                    },
-                }
-                append_row(rows, row)
-                known[body.name] = row
-            yield known[body.name]
+    working = photo.resized_to_object(WORKING_SIZE)
+    found = solve(DecompositionTask(working, photo, settings, options=options))
+    relief, evidence = unscaled_relief(
+        found.split.diffuse, photo.mask, found.height, found.light, MOST_DETAIL, network=network
+    )
+    truth, judged = read_truth(body), []
+    for factor in FACTORS:
+        normal = shaded(found.height + factor * relief, found.light, photo.mask)[0]
+        judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
+    return {
+        "evidence": None if evidence is None else list(asdict(evidence).values()),
+        **{
+            name: [np.asarray(getattr(one, name)).tolist() for one in judged]
+            for name in ("explained", "error", "energy")
+        },
+    }
 
 
 def logistic_weights(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
@@ -158,7 +135,7 @@ def best_factors(
     Parameters
     ----------
     rows : sequence of mapping
-        Of `measured`.
+        Of `at_factors`.
     is_relief : (n,) ndarray of bool
     probability : (n,) ndarray
         Of relief.
@@ -209,7 +186,9 @@ def main() -> None:
     try:
         shipped = given.weights is None
         network = DetailNetwork.shipped() if shipped else DetailNetwork.read(given.weights)
-        for row in measured(given.folder, given.rows, network, kinds, given.count):
+        key = "shipped" if shipped else str(given.weights.resolve())
+        measure = partial(at_factors, network=network)
+        for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
             print(row["body"], np.round(row["evidence"] or np.nan, 2), flush=True)
             rows.append(row)
     except InputError as error:

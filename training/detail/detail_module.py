@@ -27,7 +27,7 @@ from isc_core.networks.detail_network import (
 
 from ..networks.blocks import stored_arrays
 from ..networks.encoder_decoder import EncoderDecoderModule, quieten
-from ..world.tensor_batch import TensorBatch
+from .patches import Patch, band_of
 
 DOWN, UP = (32, 48, 64), (48, 32)
 _SLOPE = 0.05  # e
@@ -62,7 +62,7 @@ class DetailNetworkModule(EncoderDecoderModule):
         """
         return HEIGHT_UNIT * self.walked(inputs)[0]
 
-    def loss(self, batch: TensorBatch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+    def loss(self, batch: Patch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
         """Return the loss of a batch and its terms.
 
         Parameters
@@ -76,9 +76,9 @@ class DetailNetworkModule(EncoderDecoderModule):
             "left": squared error over relief's energy, of the patches that have relief; "false":
             mean slope of what is not there, of those without.
         """
-        mask = batch.mask  # type: ignore[attr-defined]
+        mask = batch.mask
         relief = band_of(self(network_channels(batch)) * mask) * mask
-        truth = batch.height * mask  # type: ignore[attr-defined]
+        truth = batch.height * mask
         (error, known), (true, _) = (_energy(part, mask) for part in (relief - truth, truth))
         error, energy = (
             part.sum((1, 2, 3)) / known.sum((1, 2, 3)).clamp(min=1) for part in (error, true)
@@ -110,24 +110,7 @@ def _energy(height: torch.Tensor, mask: torch.Tensor) -> tuple[torch.Tensor, tor
     return (right.square() + down.square()) * known, known
 
 
-def band_of(height: torch.Tensor) -> torch.Tensor:
-    """Return the finest band; equal to `isc_core.networks.detail_network.band`.
-
-    Parameters
-    ----------
-    height : (B, 1, H, W) tensor
-
-    Returns
-    -------
-    (B, 1, H, W) tensor
-    """
-    coarse = functional.avg_pool2d(height, 2)
-    return height - functional.interpolate(
-        coarse, scale_factor=2, mode="bilinear", align_corners=False
-    )
-
-
-def network_channels(batch: TensorBatch) -> torch.Tensor:
+def network_channels(batch: Patch) -> torch.Tensor:
     """Return the input channels; equal to `isc_core.networks.detail_network.channels_of`.
 
     Parameters
@@ -138,8 +121,8 @@ def network_channels(batch: TensorBatch) -> torch.Tensor:
     -------
     (B, INPUTS, H, W) tensor
     """
-    photo, mask = batch.photo, batch.mask  # type: ignore[attr-defined]
-    slope, gain = batch.slope, batch.gain  # type: ignore[attr-defined]
+    photo, mask = batch.photo, batch.mask
+    slope, gain = batch.slope, batch.gain
     log_light = torch.log(photo * mask + DARK)
     parts = torch.cat([log_light.mean(1, keepdim=True), log_light[:, ::2] - log_light[:, 1:2]], 1)
     cover = _low(mask)

@@ -28,7 +28,6 @@ from ..world.camera import CameraDraw, draw_camera, exposed, photographed
 from ..world.patterns import make_atlas
 from ..world.random_draws import log_uniform
 from ..world.tensor_batch import Pool, TensorBatch
-from .detail_module import band_of
 from .reliefs import draw_reliefs
 
 FINE = 2  # fine pixels a pixel, each way
@@ -172,6 +171,23 @@ class Patches:
         second = np.where(printed[:, None], np.clip(second, 0.02, 0.95), first)
         a, b = (torch.from_numpy(np.log(v)).float()[..., None, None] for v in (first, second))
         return torch.exp(a + (b - a) * share)
+
+
+def band_of(height: torch.Tensor) -> torch.Tensor:
+    """Return the finest band; equal to `isc_core.networks.detail_network.band`.
+
+    Parameters
+    ----------
+    height : (B, 1, H, W) tensor
+
+    Returns
+    -------
+    (B, 1, H, W) tensor
+    """
+    coarse = functional.avg_pool2d(height, 2)
+    return height - functional.interpolate(
+        coarse, scale_factor=2, mode="bilinear", align_corners=False
+    )
 
 
 def _patch(

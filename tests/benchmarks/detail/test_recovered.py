@@ -1,5 +1,6 @@
 """The program that judges: stored normals, rows that are kept, its table."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
 from benchmarks.detail import recovered
+from benchmarks.detail.body_rows import body_rows
 from benchmarks.detail.rendering import DetailScene, SetKind
 from benchmarks.detail.sets import bodies_in, read_truth, write_scene
 from isc_core.errors import InputError
@@ -32,7 +34,8 @@ def bodies(tmp_path: Path) -> Path:
 
 def run(folder: Path, estimator: recovered.Estimator, key: str) -> list[dict[str, object]]:
     rows = folder / "rows.jsonl"
-    return [dict(row) for row in recovered.measured(folder, rows, estimator, list(SetKind), 9, key)]
+    measure = partial(recovered.judged, estimator=estimator)
+    return [dict(row) for row in body_rows(folder, rows, list(SetKind), 9, key, measure)]
 
 
 def test_the_truth_is_complete_and_swapped_bodies_are_not(bodies: Path) -> None:

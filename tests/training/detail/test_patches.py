@@ -9,10 +9,9 @@ from isc_core.networks import detail_network as core  # noqa: E402
 from isc_core.networks.layers import weights_in  # noqa: E402
 from training.detail.detail_module import (  # noqa: E402
     DetailNetworkModule,
-    band_of,
     network_channels,
 )
-from training.detail.patches import Patch, Patches  # noqa: E402
+from training.detail.patches import Patch, Patches, band_of  # noqa: E402
 from training.detail.reliefs import draw_reliefs  # noqa: E402
 
 SIDE = 32
