@@ -23,49 +23,19 @@ from ..world.random_draws import log_uniform
 Drawn = Callable[[np.random.Generator, int], np.ndarray]
 
 
-def fractal(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw noise, of one scale or of many.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side) ndarray
-    """
+def _fractal(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Draw noise, of one scale or of many."""
     return filtered_noise(rng, side, rng.uniform(1.5, 5), log_uniform(rng, 4, side / 8))
 
 
-def brushed(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw noise that is longer along one axis.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side) ndarray
-    """
+def _brushed(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Draw noise that is longer along one axis."""
     least = log_uniform(rng, 4, side / 8)
     return filtered_noise(rng, side, rng.uniform(1.5, 4), least, (1, log_uniform(rng, 2, 12)))
 
 
-def cells(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw cells: hammered metal, pebbles, leather, tiles with grooves between them.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side) ndarray
-    """
+def _cells(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Draw cells: hammered metal, pebbles, leather, tiles with grooves between them."""
     width = log_uniform(rng, 5, 32)
     points = rng.uniform(-width, side + width, (int((side / width + 2) ** 2), 2))
     places = np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), -1)
@@ -79,18 +49,8 @@ def cells(rng: np.random.Generator, side: int) -> np.ndarray:
     return np.asarray(np.sqrt(between + 1) * rng.choice([-1, 1]))
 
 
-def dents(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw scattered bumps or dents of like sizes.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side) ndarray
-    """
+def _dents(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Draw scattered bumps or dents of like sizes."""
     width = log_uniform(rng, 1.5, 8)
     impulses = np.zeros((side, side))
     count = int(log_uniform(rng, 0.02, 0.4) * side**2 / width**2)
@@ -102,18 +62,8 @@ def dents(rng: np.random.Generator, side: int) -> np.ndarray:
     )
 
 
-def ridges(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw parallel or warped ridges, round or with edges.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side) ndarray
-    """
+def _ridges(rng: np.random.Generator, side: int) -> np.ndarray:
+    """Draw parallel or warped ridges, round or with edges."""
     x, y = np.meshgrid(np.arange(side), np.arange(side))
     angle, length = rng.uniform(0, np.pi), log_uniform(rng, 4, 40)
     warp = filtered_noise(rng, side, 4, 2) * rng.choice([0, log_uniform(rng, 0.3, 6)])
@@ -121,7 +71,7 @@ def ridges(rng: np.random.Generator, side: int) -> np.ndarray:
     return np.asarray(np.tanh(wave * log_uniform(rng, 0.3, 3)))
 
 
-_DRAWN: tuple[Drawn, ...] = (fractal, fractal, brushed, cells, cells, dents, ridges)
+_DRAWN: tuple[Drawn, ...] = (_fractal, _fractal, _brushed, _cells, _cells, _dents, _ridges)
 _FROM_ATLAS = 0.4
 
 

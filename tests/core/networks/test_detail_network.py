@@ -18,6 +18,7 @@ from isc_core.networks.detail_network import (
     predict_relief,
     raised,
 )
+from tests.core.networks.random_convolutions import random_convolutions
 
 DOWN, UP = (5, 6, 7), (6, 5)
 SIDE = 8 * MULTIPLE
@@ -25,20 +26,8 @@ SIDE = 8 * MULTIPLE
 
 def weights(seed: int = 0) -> dict[str, np.ndarray]:
     """Random content of an archive."""
-    rng = np.random.default_rng(seed)
-    shapes, inputs = list[tuple[int, int]](), BLOCK**2 * INPUTS
-    for width in DOWN:
-        shapes += [(inputs, width), (width, width)]
-        inputs = width
-    for skip, width in zip(DOWN[-2::-1], UP, strict=True):
-        shapes += [(skip + inputs, width), (width, width)]
-        inputs = width
-    arrays: dict[str, np.ndarray] = {}
-    for k, (rows, columns) in enumerate([*shapes, (inputs, BLOCK**2)]):
-        kernel = rng.normal(0, (2 / (9 * rows)) ** 0.5, (9, rows, columns))
-        arrays[f"weight{k:02d}"] = kernel.astype(np.float16)
-        arrays[f"bias{k:02d}"] = rng.normal(0, 0.1, columns).astype(np.float16)
-    return arrays
+    ends = BLOCK**2 * INPUTS, BLOCK**2
+    return random_convolutions(np.random.default_rng(seed), ends, DOWN, UP)
 
 
 def network(folder: Path, **changes: np.ndarray | None) -> DetailNetwork:

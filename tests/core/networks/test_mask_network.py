@@ -16,6 +16,7 @@ from isc_core.networks.mask_network import (
     MaskNetwork,
     predict_mask,
 )
+from tests.core.networks.random_convolutions import random_convolutions
 
 DOWN, UP, HIDDEN = (4, 6, 8, 6), (7, 5, 4), 9
 
@@ -23,19 +24,7 @@ DOWN, UP, HIDDEN = (4, 6, 8, 6), (7, 5, 4), 9
 def weights(seed: int) -> dict[str, np.ndarray]:
     """Random content of an archive."""
     rng = np.random.default_rng(seed)
-    shapes, inputs = list[tuple[int, int]](), BLOCK**2 * INPUTS
-    for width in DOWN:
-        shapes += [(inputs, width), (width, width)]
-        inputs = width
-    for skip, width in zip(DOWN[-2::-1], UP, strict=True):
-        shapes += [(skip + inputs, width), (width, width)]
-        inputs = width
-    shapes.append((inputs, BLOCK**2))
-    arrays: dict[str, np.ndarray] = {}
-    for k, (rows, columns) in enumerate(shapes):
-        kernel = rng.normal(0, (2 / (9 * rows)) ** 0.5, (9, rows, columns))
-        arrays[f"weight{k:02d}"] = kernel.astype(np.float16)
-        arrays[f"bias{k:02d}"] = rng.normal(0, 0.1, columns).astype(np.float16)
+    arrays = random_convolutions(rng, (BLOCK**2 * INPUTS, BLOCK**2), DOWN, UP)
     features = 2 * sum(DOWN[-COARSE:])
     for name, rows, columns in (("hidden", features, HIDDEN), ("count", HIDDEN, len(Count))):
         arrays[f"{name}_weight"] = rng.normal(0, rows**-0.5, (rows, columns)).astype(np.float16)

@@ -18,32 +18,18 @@ from isc_core.networks.scene_network import (
     predict_scene,
 )
 from isc_core.scene.light_estimate import mirrored_places
+from tests.core.networks.random_convolutions import random_convolutions
 
 WIDTHS = (4, 6, 6, 8)
 HIDDEN = 10
 FLIPPED = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])[:, None]  # harmonics odd in x
 
 
-def shapes() -> list[tuple[int, int]]:
-    """Inputs and outputs of each convolution."""
-    found, inputs = [], BLOCK**2 * INPUTS
-    for width in WIDTHS:
-        found += [(inputs, width), (width, width)]
-        inputs = width
-    for width in WIDTHS[-2::-1]:
-        found += [(width + inputs, width), (width, width)]
-        inputs = width
-    return [*found, (inputs, BLOCK**2 * CHANNELS)]
-
-
 def weights(seed: int) -> dict[str, np.ndarray]:
     """Random content of an archive."""
     rng = np.random.default_rng(seed)
-    arrays: dict[str, np.ndarray] = {}
-    for k, (inputs, outputs) in enumerate(shapes()):
-        kernel = rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs))
-        arrays[f"weight{k:02d}"] = kernel.astype(np.float16)
-        arrays[f"bias{k:02d}"] = rng.normal(0, 0.1, outputs).astype(np.float16)
+    ends = BLOCK**2 * INPUTS, BLOCK**2 * CHANNELS
+    arrays = random_convolutions(rng, ends, WIDTHS, WIDTHS[-2::-1])
     features = 2 * sum(WIDTHS[-COARSE:])
     for name, (inputs, outputs) in {
         "hidden": (features, HIDDEN),
