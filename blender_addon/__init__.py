@@ -8,6 +8,8 @@ Modules at the top may import the folders, never the other way round. The folder
 other in this order: `files` and `worker`, then `scene` and `settings`, then `operators`.
 """
 
+from typing import Any
+
 
 def register() -> None:
     """Register properties, operators and panels with Blender."""
@@ -21,3 +23,19 @@ def unregister() -> None:
     from . import registration
 
     registration.unregister()
+
+
+def glTF2_pre_export_callback(export_settings: Any) -> None:
+    """Prepare the materials; Blender's glTF exporter calls this before it reads them."""
+    from .operators.live_edits import prepare_export
+
+    del export_settings
+    prepare_export()
+
+
+def glTF2_post_export_callback(export_settings: Any) -> None:
+    """Restore the materials; Blender's glTF exporter calls this at its end."""
+    from .operators.live_edits import finish_export
+
+    del export_settings
+    finish_export()

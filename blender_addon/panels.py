@@ -12,7 +12,7 @@ import bpy
 from .operators.worker_run import RunState, active_run
 from .scene.build import BuiltObject, find_built
 from .scene.copies import objects_sharing_material
-from .scene.material import dichromatic_node
+from .scene.material_edits import dichromatic_node
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")
@@ -151,6 +151,7 @@ class _Edit(_Panel):
         column.prop(context.scene.isc, "max_size")
         self.layout.operator("isc.redo", icon="FILE_REFRESH").max_size = context.scene.isc.max_size
         self.layout.operator("isc.export", icon="EXPORT")
+        self.layout.operator("isc.export_textures", icon="TEXTURE")
 
     def _draw_material(self, built: BuiltObject) -> None:
         node = dichromatic_node(built.material)

@@ -7,6 +7,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import operators, panels
+from .operators.live_edits import add_handlers, remove_handlers
 from .operators.modal import update_display
 from .operators.worker_run import active_run, cancel_active_run
 from .settings import preferences, properties
@@ -25,6 +26,7 @@ def register() -> None:
         bpy.utils.register_class(kind)
     properties.add_properties()
     bpy.app.handlers.load_pre.append(_cancel_before_loading)
+    add_handlers()
     # Blender exits without notifying add-ons. The worker would stop by itself, but leave its files.
     atexit.register(cancel_active_run)
 
@@ -33,6 +35,7 @@ def unregister() -> None:
     """Cancel the active run and undo the registration in reverse order."""
     cancel_active_run()
     atexit.unregister(cancel_active_run)
+    remove_handlers()
     bpy.app.handlers.load_pre.remove(_cancel_before_loading)
     properties.remove_properties()
     for kind in reversed(_CLASSES):

@@ -90,7 +90,7 @@ def render(
         built.scene.view_layers[0].material_override = _white()
     if variant.relit is not None:
         _relight(built, variant.relit)
-    return _rendered(built.scene, variant.filter_width, samples)
+    return render_scene(built.scene, samples, variant.filter_width)
 
 
 def emitting_nodes(material: bpy.types.Material) -> list[str]:
@@ -159,9 +159,27 @@ def _relight(built: BuiltObject, new: RelitTruth) -> None:
     built.scene.cycles.max_bounces = 0
 
 
-def _rendered(
-    scene: bpy.types.Scene, filter_width: float | None, samples: int
+def render_scene(
+    scene: bpy.types.Scene, samples: int, filter_width: float | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Render a scene as it is.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        The scene.
+    samples : int
+        Samples per pixel.
+    filter_width : float, optional
+        Pixel filter, in pixels; that of the scene if None.
+
+    Returns
+    -------
+    image : (H, W, 3) ndarray
+        Linear, 0 outside the objects.
+    coverage : (H, W) ndarray
+        In [0, 1].
+    """
     scene.render.engine = "CYCLES"
     cycles, image = scene.cycles, scene.render.image_settings
     cycles.device, cycles.samples, cycles.seed = "CPU", samples, 0

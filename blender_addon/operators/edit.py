@@ -16,10 +16,12 @@ from isc_core.errors import InputError
 
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import find_material, make_material_single_user
-from ..scene.material import dichromatic_node, set_specular_gain
+from ..scene.material import set_specular_gain
+from ..scene.material_edits import dichromatic_node
 from ..scene.provenance import KEY
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
+from .live_edits import settle_edits
 
 _LIGHTS = (
     (
@@ -78,6 +80,7 @@ class EditOperator:
             if built is None:
                 raise InputError("no object made by ISC is active: select one")
             self.edit(built)
+            settle_edits(find_material(built.object) or built.material)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

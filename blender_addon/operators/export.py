@@ -1,50 +1,109 @@
-"""Export for other programs: the mesh as GLB, the maps as OpenEXR.
+"""Export for other programs: the object as GLB, USD, FBX or OBJ by Blender's own exporters, its
+textures under the names of other programs, and the recovered maps as OpenEXR.
 
-While the result folder exists, its own files are copied: mesh.glb and the multilayer maps.exr, as
-recovered. Otherwise the scene is exported: the mesh by Blender's exporter, with a plain material
-that contains the colour edits (`scene.export_material`), and each packed map as an OpenEXR file.
+What is seen is exported: edits are baked first, and the layer with the photo's highlights is hidden
+meanwhile. Objects of files from earlier versions get a plain material meanwhile
+(`scene.export_material`). Blender's OBJ exporter names packed textures without writing them: they
+are written beside the file.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
-import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import BoolProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, StringProperty
 
 from isc_core.errors import InputError
+from isc_core.result_files.exports.targets import TARGETS
 
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import is_copy
-from ..scene.export_material import export_material
+from ..scene.export_material import export_material, temporarily_assigned
+from ..scene.material_edits import surface_node
 from ..scene.provenance import KEY, ROLE
+from .live_edits import finish_export, prepare_export
+from .texture_set import linked_image, write_texture_set
 
-_RESULT_FILES = ("mesh.glb", "maps.exr", "decomposition.json", "preview.png")
-_REQUIRED_FILES = _RESULT_FILES[:2]
 _EXR_MAGIC = b"v/1\x01"
+# Names of the recovered maps in files, where they differ from the role.
+_MAP_NAMES = {"lobe": "specular_fit", "residual": "difference", "reflectance": "albedo"}
+# Light and camera are the scene's; textures are the material's.
+_NOT_MAPS = ("environment_map", "photo", "base_color", "edited_base_color", "normal_map")
+_FORMATS = (
+    ("GLB", "glTF Binary (.glb)", "One file with textures, read by most programs and the web"),
+    ("USD", "USD (.usdc)", "Universal Scene Description with preview surface and textures"),
+    ("FBX", "FBX (.fbx)", "One file with textures, read by most game engines"),
+    ("OBJ", "Wavefront (.obj)", "Geometry, material library and textures"),
+)
+_FILE_FORMATS = (
+    ("PNG8", "PNG, 8 Bits", "Eight bits per channel"),
+    ("PNG16", "PNG, 16 Bits", "Sixteen bits per channel"),
+    ("EXR", "OpenEXR", "Linear 32-bit floats"),
+)
+_NORMALS = (
+    ("TARGET", "As Program", "As the chosen program expects"),
+    ("OPENGL", "OpenGL", "Green upward"),
+    ("DIRECTX", "DirectX", "Green downward"),
+)
+_PROGRAMS = tuple((name, name.title(), f"Names and packings of {name.title()}") for name in TARGETS)
 
 
-class ISC_OT_export(bpy.types.Operator):
-    """Export the active object's mesh and maps."""
+def _export_gltf(path: Path) -> None:
+    bpy.ops.export_scene.gltf(
+        filepath=str(path),
+        export_format="GLB",
+        use_selection=True,
+        use_active_scene=True,
+        export_apply=True,
+    )
 
-    bl_idname = "isc.export"
-    bl_label = "Export GLB and Maps"
-    bl_description = "Export the object's mesh as GLB and its maps as OpenEXR"
+
+def _export_usd(path: Path) -> None:
+    bpy.ops.wm.usd_export(
+        filepath=str(path),
+        selected_objects_only=True,
+        generate_preview_surface=True,
+        export_custom_properties=False,
+        convert_world_material=False,
+    )
+
+
+def _export_fbx(path: Path) -> None:
+    bpy.ops.export_scene.fbx(
+        filepath=str(path), use_selection=True, path_mode="COPY", embed_textures=True
+    )
+
+
+def _export_obj(path: Path) -> None:
+    bpy.ops.wm.obj_export(
+        filepath=str(path),
+        export_selected_objects=True,
+        export_pbr_extensions=True,
+        path_mode="RELATIVE",
+    )
+
+
+_EXPORTERS: Mapping[str, tuple[str, Callable[[Path], None]]] = {
+    "GLB": (".glb", _export_gltf),
+    "USD": (".usdc", _export_usd),
+    "FBX": (".fbx", _export_fbx),
+    "OBJ": (".obj", _export_obj),
+}
+
+
+class _FolderOperator:
+    """Mixin for operators that write into a folder of the user's choice.
+
+    `write` writes into an existing folder of the object's name, or raises `InputError`.
+    """
+
+    report: Any  # from bpy.types.Operator
+    directory: str
     bl_options = {"REGISTER"}
-
-    directory: StringProperty(
-        name="Folder",
-        description="Folder in which a folder with the object's name is created",
-        subtype="DIR_PATH",
-    )
-    filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
-    from_scene: BoolProperty(
-        name="As Edited",
-        description="Export the edited object of the scene even where the result folder exists",
-        default=False,
-    )
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -61,7 +120,7 @@ class ISC_OT_export(bpy.types.Operator):
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select an object made by ISC")
+            cls.poll_message_set("Select an object made by ISC")  # type: ignore[attr-defined]
             return False
         return True
 
@@ -101,18 +160,140 @@ class ISC_OT_export(bpy.types.Operator):
         try:
             if built is None or not self.directory:
                 raise InputError("nothing to export: select an object made by ISC, and a folder")
-            names = export_object(
-                built, Path(bpy.path.abspath(self.directory)), from_scene=self.from_scene
-            )
+            names = self.write(built, Path(bpy.path.abspath(self.directory)))
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, f"exported {', '.join(names)}")
         return {"FINISHED"}
 
+    def write(self, built: BuiltObject, parent: Path) -> list[str]:
+        """Write the files of an object; returns their names.
 
-def export_object(built: BuiltObject, parent: Path, *, from_scene: bool = False) -> list[str]:
-    """Write the files of an object into a folder with its name.
+        Parameters
+        ----------
+        built : BuiltObject
+            The object.
+        parent : Path
+            Folder in which the object's folder is created.
+
+        Returns
+        -------
+        list of str
+            Names of the files.
+
+        Raises
+        ------
+        InputError
+            If the files cannot be written.
+        """
+        raise NotImplementedError
+
+
+class ISC_OT_export(_FolderOperator, bpy.types.Operator):
+    """Export the active object as it is seen."""
+
+    bl_idname = "isc.export"
+    bl_label = "Export Object"
+    bl_description = "Export the object as it is seen, with its edits and textures"
+
+    directory: StringProperty(
+        name="Folder",
+        description="Folder in which a folder with the object's name is created",
+        subtype="DIR_PATH",
+    )
+    filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
+    file_format: EnumProperty(
+        name="Format", description="Format of the object's file", items=_FORMATS, default="GLB"
+    )
+    maps: BoolProperty(
+        name="Recovered Maps",
+        description="Also write albedo, normals, height and the other recovered maps as OpenEXR",
+        default=False,
+    )
+
+    def write(self, built: BuiltObject, parent: Path) -> list[str]:
+        """Write the object's file; see `_FolderOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The object.
+        parent : Path
+            Folder in which the object's folder is created.
+
+        Returns
+        -------
+        list of str
+            Names of the files.
+
+        Raises
+        ------
+        InputError
+            If the files cannot be written.
+        """
+        return export_object(built, parent, self.file_format, maps=self.maps)
+
+
+class ISC_OT_export_textures(_FolderOperator, bpy.types.Operator):
+    """Export the textures of the active object."""
+
+    bl_idname = "isc.export_textures"
+    bl_label = "Export Texture Set"
+    bl_description = "Export the object's textures under the names of other programs"
+
+    directory: StringProperty(
+        name="Folder",
+        description="Folder in which a folder with the object's name is created",
+        subtype="DIR_PATH",
+    )
+    filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
+    program: EnumProperty(
+        name="Program",
+        description="Names and packings of the textures",
+        items=_PROGRAMS,
+        default="generic",
+    )
+    file_format: EnumProperty(
+        name="Format", description="Format of the textures", items=_FILE_FORMATS, default="PNG8"
+    )
+    normals: EnumProperty(
+        name="Normal Map", description="Direction of green", items=_NORMALS, default="TARGET"
+    )
+
+    def write(self, built: BuiltObject, parent: Path) -> list[str]:
+        """Write the textures; see `_FolderOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The object.
+        parent : Path
+            Folder in which the object's folder is created.
+
+        Returns
+        -------
+        list of str
+            Names of the files.
+
+        Raises
+        ------
+        InputError
+            If the files cannot be written.
+        """
+        green_down = self.normals == "DIRECTX" or (
+            self.normals == "TARGET" and TARGETS[self.program].green_down
+        )
+        with _object_folder(built, parent) as folder, _settled():
+            return write_texture_set(
+                built, folder, folder.name, self.program, self.file_format, green_down
+            )
+
+
+def export_object(
+    built: BuiltObject, parent: Path, file_format: str = "GLB", *, maps: bool = False
+) -> list[str]:
+    """Write the files of an object, as it is seen, into a folder with its name.
 
     Parameters
     ----------
@@ -120,39 +301,49 @@ def export_object(built: BuiltObject, parent: Path, *, from_scene: bool = False)
         The object, or a copy of it.
     parent : Path
         Folder in which the object's folder is created.
-    from_scene : bool, optional
-        Whether to export the scene even where the result folder exists.
+    file_format : str, optional
+        "GLB", "USD", "FBX" or "OBJ".
+    maps : bool, optional
+        Whether to write the recovered maps as OpenEXR files, too.
 
     Returns
     -------
     list of str
-        Names of the files.
+        Names of the files; of USD and OBJ without those of the textures.
 
     Raises
     ------
     InputError
         If the files cannot be written.
     """
-    key = str(built.object[KEY])
-    name = built.object.name if is_copy(built.object) else key
-    folder = parent / "".join(
-        letter if letter.isalnum() or letter in " -_." else "_" for letter in name
-    ).strip(" .")
-    result = Path(str(built.object.get("isc_folder", "")))
+    with _object_folder(built, parent) as folder:
+        names = [_export_mesh(built, folder, file_format)]
+        return names + (_export_maps(str(built.object[KEY]), folder) if maps else [])
+
+
+@contextmanager
+def _object_folder(built: BuiltObject, parent: Path) -> Iterator[Path]:
+    """The folder of an object, created; errors of writing are the user's to solve."""
+    name = built.object.name if is_copy(built.object) else str(built.object[KEY])
+    letters = (letter if letter.isalnum() or letter in " -_." else "_" for letter in name)
+    folder = parent / ("".join(letters).strip(" .") or "object")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not from_scene and all((result / file).is_file() for file in _REQUIRED_FILES):
-            present = [file for file in _RESULT_FILES if (result / file).is_file()]
-            for file in present:
-                shutil.copyfile(result / file, folder / file)
-            return present
-        return [_export_mesh(built, folder / "mesh.glb"), *_export_maps(key, folder)]
-    except shutil.SameFileError as error:
-        raise InputError(f"{folder} is the result folder itself: choose another") from error
+        yield folder
     except OSError as error:
         raise InputError(
             f"cannot write to {folder} ({error.strerror or error}): choose another folder"
         ) from error
+
+
+@contextmanager
+def _settled() -> Iterator[None]:
+    """All edits are in the BSDF while the context lasts."""
+    prepare_export()
+    try:
+        yield
+    finally:
+        finish_export()
 
 
 def _export_maps(key: str, folder: Path) -> list[str]:
@@ -160,33 +351,60 @@ def _export_maps(key: str, folder: Path) -> list[str]:
     names = []
     for image in bpy.data.images:
         packed = image.packed_file if image.get(KEY) == key else None
-        if packed is not None and packed.data[:4] == _EXR_MAGIC:
-            names.append(f"{image[ROLE]}.exr")
+        role = str(image.get(ROLE, ""))
+        if packed is not None and role not in _NOT_MAPS and packed.data[:4] == _EXR_MAGIC:
+            names.append(f"{_MAP_NAMES.get(role, role)}.exr")
             (folder / names[-1]).write_bytes(packed.data)
     return names
 
 
-def _export_mesh(built: BuiltObject, path: Path) -> str:
-    """Blender's exporter ignores node groups, so the object has a plain material meanwhile."""
+def _export_mesh(built: BuiltObject, folder: Path, file_format: str) -> str:
+    suffix, export = _EXPORTERS[file_format]
+    path = folder / f"{folder.name}{suffix}"
     selected = [obj for obj in bpy.context.selected_objects if obj != built.object]
-    with export_material(built.object, built.material):
+    with _exportable(built):
         try:
             for obj in selected:
                 obj.select_set(False)
             built.object.select_set(True, view_layer=bpy.context.view_layer)
-            bpy.ops.export_scene.gltf(
-                filepath=str(path),
-                export_format="GLB",
-                use_selection=True,
-                use_active_scene=True,
-                export_apply=True,
-            )
+            if file_format == "OBJ":
+                _write_textures(built.object, folder)
+            export(path)
         except (RuntimeError, AttributeError) as error:
             reason = str(error).strip().splitlines()[-1]
             raise InputError(
-                f"Blender's glTF exporter failed ({reason}): enable it in the preferences"
+                f"Blender's exporter for {file_format} failed ({reason}): enable it in the "
+                "preferences, or choose another format"
             ) from error
         finally:
             for obj in selected:
                 obj.select_set(True)
     return path.name
+
+
+@contextmanager
+def _exportable(built: BuiltObject) -> Iterator[None]:
+    """The object has a material that exporters read while the context lasts."""
+    material = built.material
+    if surface_node(material) is None:
+        with export_material(built.object, material):
+            yield
+        return
+    with _settled(), temporarily_assigned(built.object, material, material):
+        color = surface_node(material).inputs["Base Color"]  # type: ignore[union-attr]
+        if color.is_linked and linked_image(color) is None:
+            raise InputError(
+                f"the base color of {built.object.name} is not an image: connect an image texture "
+                "to the node's Base Color, or bake it"
+            )
+        yield
+
+
+def _write_textures(obj: bpy.types.Object, folder: Path) -> None:
+    for slot in obj.material_slots:
+        nodes = slot.material.node_tree.nodes if slot.material is not None else ()
+        for node in nodes:
+            image = node.image if node.type == "TEX_IMAGE" else None
+            if image is not None and image.packed_file is not None and image.filepath_raw:
+                name = Path(bpy.path.abspath(image.filepath_raw)).name
+                (folder / name).write_bytes(image.packed_file.data)

@@ -17,9 +17,19 @@ from .closed_back import close_back
 from .collection import ensure_collection, ensure_scene, link_object, use_standard_view
 from .copies import COPY, OBJECT, find_material
 from .displacement import add_displacement, flatten, remove_displacement
-from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_color_spaces
+from .images import (
+    COLOR,
+    DATA,
+    SRGB,
+    attach_maps,
+    ensure_image,
+    ensure_maps,
+    ensure_texture,
+    require_color_spaces,
+)
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
 from .mesh import fill_mesh, front_geometry
+from .photo_highlights import forget_view
 from .provenance import (
     KEY,
     PHOTO_HASH,
@@ -33,6 +43,7 @@ from .provenance import (
     tag,
     write_provenance,
 )
+from .specular_share import specular_share
 from .sun import relight
 from .world import ensure_world
 
@@ -65,7 +76,8 @@ class BuildOptions:
     closed_back : bool
         Whether to close the mesh with a wall and a flat back.
     specular_from : str
-        Source of the highlights: the fitted "lobe", the photo's specular "image", or "none".
+        Source of the highlights: the fitted "lobe", the photo's specular "image" until light,
+        camera or pose change, or "none".
     own_shadows : bool or None
         Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
         already contains those of the photo, so the object looks as in the photo without them. None
@@ -156,7 +168,7 @@ def build_object(
     collection = ensure_collection(key, scene)
     maps = ensure_maps(key, result)
     specular = _specular_settings(result, options)
-    material = ensure_material(key, _material_maps(key, result, maps), specular)
+    material = ensure_material(key, _material_maps(key, result, maps, specular.share), specular)
     obj = _ensure_object(key, collection, result, options, material)
     attach_maps(obj, maps)
     camera = ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
@@ -173,6 +185,7 @@ def build_object(
     relight(obj, options.sun)
     built = BuiltObject(collection, obj, camera, world, scene, material)
     _set_scene(built, options, result)
+    forget_view(material)  # the layer of highlights belongs to what is seen now
     return built
 
 
@@ -245,7 +258,7 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
         )
     if options.displacement and options.closed_back:
         raise InputError("a displaced grid has no back: choose Displacement or Closed Back")
-    require_color_spaces(COLOR, DATA)
+    require_color_spaces(COLOR, DATA, SRGB)
     require_local(key)
     obj = find_tagged(bpy.data.objects, key, OBJECT)
     if obj is not None and obj.mode != "OBJECT":
@@ -284,23 +297,34 @@ def _ensure_object(
 
 
 def _material_maps(
-    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image]
+    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image], share: float
 ) -> MaterialMaps:
     variation, normal = None, None
     if result.specular_variation is not None:
-        variation = ensure_image(key, "specular_variation", result.specular_variation, DATA)
+        values = result.specular_variation / _peak(result)
+        variation = ensure_texture(key, "specular_variation", values, DATA)
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
-        normal = ensure_image(key, "normal_map", result.normal_map, DATA)
-    base_color = ensure_image(key, "base_color", result.base_color, COLOR)
+        normal = ensure_texture(key, "normal_map", result.normal_map, DATA)
+    base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
     return MaterialMaps(base_color, maps["specular"], variation, normal)
 
 
+def _peak(result: ResultArrays) -> float:
+    """The largest factor of the specular level: textures hold values up to 1."""
+    variation = result.specular_variation
+    return 1.0 if variation is None else max(1.0, float(variation.max()))
+
+
 def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:
-    """Values of the fit; without a fitted level the lobe is off, as the photo would not show it."""
+    """Values of the fit; without a fitted level the object is diffuse, as in the photo's light."""
     level = result.specular_level if np.isfinite(result.specular_level) else 0.0
     roughness = result.roughness if np.isfinite(result.roughness) else _DEFAULT_ROUGHNESS
-    return SpecularSettings(level, roughness, options.specular_from)
+    mean = level if options.specular_from != "none" else 0.0
+    if result.specular_variation is not None:
+        mean *= float(result.specular_variation[result.mask].mean())
+    share = specular_share(mean, roughness, result.normal[result.mask][:, 2])
+    return SpecularSettings(level * _peak(result), roughness, options.specular_from, share)
 
 
 def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) -> None:

@@ -1,31 +1,24 @@
-"""The node group "ISC Dichromatic": a surface that is the sum of a diffuse and a specular lobe, as
-the photo was decomposed.
+"""The node group "ISC Dichromatic": the edits of an object's diffuse and specular light, before its
+Principled BSDF.
 
-Equation: radiance = g_d * rho' / pi * E + g_s * (specular reflection). rho' is the reflectance with
-edited hue, saturation and value; E the irradiance. The specular lobe is GGX with the given
-roughness and Fresnel's equations at the facets. Its level scales the whole lobe, as in its fit and
-in glTF's KHR_materials_specular: the reflectance along the normal is f0 = 0.04 * level, toward
-grazing angles f90 = min(level, 1). Blender's own level scales f0 alone, so the lobe of plastic is
-mixed with black by min(level, 1), and only the excess above 1 goes to Blender's level. A coloured
-specular image is split into its luminance, a factor of the level, and its tint, a factor of f0.
+Equation: base colour = g_d v (1 - p s) rotated(rho; hue, saturation), g_d the diffuse gain, v the
+value, p 1 while the photo's own highlights are shown and s the share of the light that the specular
+layer takes from the diffuse one (`specular_share`). Blender's specular level = .5 (1 - p) g_s L for
+a level L (1 is plastic, .04 along the normal) and its gain g_s; roughness = min(1, r / g) for the
+gain g of the gloss.
 
-The two lobes are ADDED: a Diffuse BSDF and a Principled BSDF with a black base. Principled alone
-attenuates the diffuse lobe by what the specular lobe reflects, and the recovered diffuse image
-would become darker than in the photo.
+The group holds the values; its outputs are linked only while a slider moves. Otherwise the BSDF has
+images and numbers, which every exporter reads: see `material_edits`.
 
 "ISC Photo Highlights" shows the photo's own specular image to the camera instead: exact from the
 photo's viewpoint, and without emitting light.
 
 A group stores its version. A file from another version keeps its group, and this one is added
-beside it; materials share it. Version 1 scaled f0 alone: such an object keeps its look until it is
-built again.
+beside it; materials share it. Until version 2 the group was the whole surface, a Diffuse BSDF plus
+a specular lobe: such an object keeps its look until it is built again.
 
 Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and
-Application 10 (1985), doi:10.1002/col.5080100409. B. Walter et al., EGSR 2007,
-doi:10.2312/EGWR/EGSR07/195-206. KHR_materials_specular, Khronos Group 2021 (no DOI).
-
-Limits: f0 cannot exceed 0.99: level * gain above 24 changes nothing. f90 cannot exceed 1: above a
-level of 1 the lobe grows less toward grazing angles than along the normal.
+Application 10 (1985), doi:10.1002/col.5080100409.
 """
 
 from dataclasses import dataclass
@@ -35,7 +28,7 @@ import bpy
 
 from .nodes import add_node, connect
 
-VERSION = 2
+VERSION = 3
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
 
 
@@ -79,12 +72,12 @@ _SPECULAR_GAIN = GroupInput(
 )
 DICHROMATIC_INPUTS = (
     GroupInput(
-        "Reflectance",
+        "Base Color",
         "Color",
         (0.8, 0.8, 0.8, 1.0),
         0,
         1,
-        "Linear color of the surface without light and highlights",
+        "Color of the surface without light and highlights",
     ),
     GroupInput(
         "Diffuse Gain",
@@ -113,30 +106,40 @@ DICHROMATIC_INPUTS = (
     ),
     GroupInput("Value", "Float", 1.0, 0, 2, "Factor of the brightness, 1 as in the photo"),
     GroupInput(
-        "Specular Image",
-        "Color",
-        WHITE,
-        0,
-        1,
-        "Spatial factor of the specular level, and its tint",
-    ),
-    GroupInput(
         "Specular Level",
         "Float",
         0.0,
         0,
         24,
-        "Strength of the specular lobe, 0 is diffuse, 1 is plastic (4 % along the normal)",
+        "Strength of the highlights, 0 is diffuse, 1 is plastic (4 % along the normal)",
     ),
-    GroupInput("Roughness", "Float", 0.5, 0, 1, "Width of the highlights, 0 is a mirror", True),
     _SPECULAR_GAIN,
+    GroupInput("Roughness", "Float", 0.5, 0, 1, "Width of the highlights, 0 is a mirror", True),
     GroupInput(
-        "Normal",
-        "Vector",
-        (0.0, 0.0, 0.0),
-        -1,
+        "Gloss Gain",
+        "Float",
+        1.0,
+        0.1,
+        10,
+        "Divides the roughness, above 1 the highlights are sharper, 1 as in the photo",
+    ),
+    GroupInput(
+        "Specular Share",
+        "Float",
+        0.0,
+        0,
         1,
-        "Normal of a normal map, the mesh's normal if not connected",
+        "Share of the light that the specular layer takes from the diffuse one",
+        factor=True,
+    ),
+    GroupInput(
+        "Photo Highlights",
+        "Float",
+        0.0,
+        0,
+        1,
+        "1 while the photo's own highlights replace those of the surface",
+        factor=True,
     ),
 )
 HIGHLIGHTS_INPUTS = (
@@ -151,6 +154,13 @@ HIGHLIGHTS_INPUTS = (
     _SPECULAR_GAIN,
 )
 
+_DICHROMATIC_OUTPUTS = (
+    ("Base Color", "Color", "Edited color of the surface"),
+    ("Specular IOR Level", "Float", "Edited specular level as the Principled BSDF has it"),
+    ("Roughness", "Float", "Edited roughness"),
+)
+_HIGHLIGHTS_OUTPUTS = (("Surface", "Shader", "The photo's highlights"),)
+
 
 def dichromatic_group() -> bpy.types.NodeTree:
     """Find or create the group "ISC Dichromatic" of this version.
@@ -160,8 +170,8 @@ def dichromatic_group() -> bpy.types.NodeTree:
     bpy.types.NodeTree
         The group; one that the user has edited is kept while its inputs exist.
     """
-    return _find_group(DICHROMATIC, DICHROMATIC_INPUTS) or _wire_dichromatic(
-        _create_group(DICHROMATIC, DICHROMATIC_INPUTS)
+    return _find_group(DICHROMATIC, DICHROMATIC_INPUTS, _DICHROMATIC_OUTPUTS) or _wire_dichromatic(
+        _create_group(DICHROMATIC, DICHROMATIC_INPUTS, _DICHROMATIC_OUTPUTS)
     )
 
 
@@ -173,12 +183,14 @@ def highlights_group() -> bpy.types.NodeTree:
     bpy.types.NodeTree
         The group; one that the user has edited is kept while its inputs exist.
     """
-    return _find_group(HIGHLIGHTS, HIGHLIGHTS_INPUTS) or _wire_highlights(
-        _create_group(HIGHLIGHTS, HIGHLIGHTS_INPUTS)
+    return _find_group(HIGHLIGHTS, HIGHLIGHTS_INPUTS, _HIGHLIGHTS_OUTPUTS) or _wire_highlights(
+        _create_group(HIGHLIGHTS, HIGHLIGHTS_INPUTS, _HIGHLIGHTS_OUTPUTS)
     )
 
 
-def _find_group(name: str, inputs: tuple[GroupInput, ...]) -> bpy.types.NodeTree | None:
+def _find_group(
+    name: str, inputs: tuple[GroupInput, ...], outputs: tuple[tuple[str, str, str], ...]
+) -> bpy.types.NodeTree | None:
     for group in bpy.data.node_groups:
         if (
             group.library is None
@@ -186,16 +198,19 @@ def _find_group(name: str, inputs: tuple[GroupInput, ...]) -> bpy.types.NodeTree
             and group.get("isc_group_version") == VERSION
         ):
             held = {
-                item.name
+                (item.in_out, item.name)
                 for item in group.interface.items_tree
-                if item.item_type == "SOCKET" and item.in_out == "INPUT"
+                if item.item_type == "SOCKET"
             }
-            if held >= {socket.name for socket in inputs}:
+            needed = {("INPUT", socket.name) for socket in inputs}
+            if held >= needed | {("OUTPUT", output) for output, *_ in outputs}:
                 return group
     return None
 
 
-def _create_group(name: str, inputs: tuple[GroupInput, ...]) -> bpy.types.NodeTree:
+def _create_group(
+    name: str, inputs: tuple[GroupInput, ...], outputs: tuple[tuple[str, str, str], ...]
+) -> bpy.types.NodeTree:
     group = bpy.data.node_groups.new(name, "ShaderNodeTree")
     group["isc_group"], group["isc_group_version"] = name, VERSION
     for socket in inputs:
@@ -212,66 +227,41 @@ def _create_group(name: str, inputs: tuple[GroupInput, ...]) -> bpy.types.NodeTr
                 socket.low,
                 socket.high,
             )
-        # Unconnected, a vector input uses the mesh's normal.
-        item.hide_value = socket.kind == "Vector"
-    group.interface.new_socket(
-        "Surface",
-        description="Sum of the diffuse and the specular lobe",
-        in_out="OUTPUT",
-        socket_type="NodeSocketShader",
-    )
+    for output, kind, description in outputs:
+        group.interface.new_socket(
+            output, description=description, in_out="OUTPUT", socket_type=f"NodeSocket{kind}"
+        )
     return group
 
 
 def _wire_dichromatic(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
-    inputs = add_node(group, "NodeGroupInput", (-900, 0)).outputs
-    diffuse = add_node(group, "BsdfDiffuse", (50, 200), label="Diffuse")
-    total = add_node(group, "AddShader", (600, 100))
-    output = add_node(group, "NodeGroupOutput", (800, 100))
+    inputs = add_node(group, "NodeGroupInput", (-1100, 0)).outputs
+    output = add_node(group, "NodeGroupOutput", (300, 100))
+    shown = add_node(group, "Math", (-800, -350), operation="SUBTRACT", label="Own Highlights")
+    shown.inputs[0].default_value = 1.0
+    level = _product(group, inputs["Specular Level"], inputs["Specular Gain"], (-800, -150))
+    level = _product(group, level, shown.outputs["Value"], (-600, -150))
+    rougher = add_node(group, "Math", (-600, -350), operation="DIVIDE", label="Gloss Gain")
+    roughness = add_node(group, "Math", (-400, -350), operation="MINIMUM", label="At Most 1")
+    roughness.inputs[1].default_value = 1.0
     connect(
         group,
-        (_edited_reflectance(group, inputs), diffuse.inputs["Color"]),
-        (inputs["Normal"], diffuse.inputs["Normal"]),
-        (diffuse.outputs["BSDF"], total.inputs[0]),
-        (_scaled_lobe(group, inputs), total.inputs[1]),
-        (total.outputs["Shader"], output.inputs["Surface"]),
+        (inputs["Photo Highlights"], shown.inputs[1]),
+        # Blender's level of plastic is 0.5.
+        (_product(group, level, 0.5, (-400, -150)), output.inputs["Specular IOR Level"]),
+        (inputs["Roughness"], rougher.inputs[0]),
+        (inputs["Gloss Gain"], rougher.inputs[1]),
+        (rougher.outputs["Value"], roughness.inputs[0]),
+        (roughness.outputs["Value"], output.inputs["Roughness"]),
+        (_edited_color(group, inputs), output.inputs["Base Color"]),
     )
     return group
 
 
-def _scaled_lobe(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.NodeSocket:
-    """The lobe of plastic, mixed with black for a level below 1, with a larger f0 above 1."""
-    grey = add_node(group, "RGBToBW", (-650, -350))
-    # A division by zero gives zero; the level is zero there, too.
-    tint = add_node(group, "VectorMath", (-200, -450), operation="DIVIDE", label="Tint")
-    excess = add_node(group, "Math", (-200, -250), operation="MAXIMUM", label="Excess above 1")
-    lobe = add_node(group, "BsdfPrincipled", (50, 0), distribution="GGX", label="Specular")
-    # The unconnected first input is black; the factor is clamped at 1.
-    mixed = add_node(group, "MixShader", (400, 0), label="Level")
-    lobe.inputs["Base Color"].default_value = BLACK
-    excess.inputs[1].default_value = 0.5  # Blender's level of plastic
-    level = _product(group, inputs["Specular Level"], inputs["Specular Gain"], (-650, -150))
-    local = _product(group, level, grey.outputs["Val"], (-420, -150))
-    connect(
-        group,
-        (inputs["Specular Image"], grey.inputs["Color"]),
-        (inputs["Specular Image"], tint.inputs[0]),
-        (grey.outputs["Val"], tint.inputs[1]),
-        (_product(group, local, 0.5, (-420, -320)), excess.inputs[0]),
-        (excess.outputs["Value"], lobe.inputs["Specular IOR Level"]),
-        (tint.outputs["Vector"], lobe.inputs["Specular Tint"]),
-        (inputs["Roughness"], lobe.inputs["Roughness"]),
-        (inputs["Normal"], lobe.inputs["Normal"]),
-        (local, mixed.inputs["Fac"]),
-        (lobe.outputs["BSDF"], mixed.inputs[2]),
-    )
-    return mixed.outputs["Shader"]
+def _edited_color(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.NodeSocket:
+    """The edited base colour times its gain.
 
-
-def _edited_reflectance(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.NodeSocket:
-    """The edited reflectance times its gain.
-
-    The conversion to hue and back loses some bits, so an unedited reflectance bypasses that node.
+    The conversion to hue and back loses some bits, so an unedited colour bypasses that node.
     """
     recolour = add_node(group, "HueSaturation", (-450, 450), label="Recolor")
     scaled = add_node(group, "VectorMath", (-150, 300), operation="SCALE", label="Diffuse Gain")
@@ -281,6 +271,8 @@ def _edited_reflectance(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.Nod
     ]
     for node, default in zip(unchanged, (0.5, 1.0), strict=True):
         node.inputs[1].default_value, node.inputs[2].default_value = default, 1e-6
+    taken = add_node(group, "Math", (-450, -20), operation="SUBTRACT", label="Not Taken")
+    taken.inputs[0].default_value = 1.0
     changed = add_node(group, "Math", (-550, 650), operation="SUBTRACT", label="Changed?")
     changed.inputs[0].default_value = 1.0
     connect(
@@ -297,10 +289,19 @@ def _edited_reflectance(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.Nod
         (changed.outputs["Value"], recolour.inputs[3]),
         (inputs["Hue"], recolour.inputs["Hue"]),
         (inputs["Saturation"], recolour.inputs["Saturation"]),
-        (inputs["Reflectance"], recolour.inputs["Color"]),
+        (inputs["Base Color"], recolour.inputs["Color"]),
         (recolour.outputs["Color"], scaled.inputs[0]),
         (
-            _product(group, inputs["Diffuse Gain"], inputs["Value"], (-450, 150)),
+            _product(group, inputs["Photo Highlights"], inputs["Specular Share"], (-650, -20)),
+            taken.inputs[1],
+        ),
+        (
+            _product(
+                group,
+                _product(group, inputs["Diffuse Gain"], inputs["Value"], (-450, 150)),
+                taken.outputs["Value"],
+                (-280, 120),
+            ),
             scaled.inputs["Scale"],
         ),
     )

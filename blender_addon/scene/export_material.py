@@ -1,5 +1,5 @@
-"""A plain material in place of the group "ISC Dichromatic", for export to programs without node
-groups.
+"""A plain material in place of the group "ISC Dichromatic" of files from earlier versions, whose
+group was the whole surface, for export to programs without node groups.
 
 Equation: base colour = min(1, g v rotated(rho; hue, saturation)), as the group computes it:
 `rotated` is Blender's Hue/Saturation, v the value, g the diffuse gain. It is baked into an 8-bit
@@ -22,13 +22,12 @@ import bpy
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 
-from .material import dichromatic_node, shows_highlights
+from .images import SRGB, new_texture
+from .material import shows_highlights
+from .material_edits import dichromatic_node, linear_colors, recolour_reflectance
 from .nodes import node_tree
 from .provenance import SPECULAR_LEVEL
-
-_UNCHANGED = 1e-6  # as in the group
 
 
 @contextmanager
@@ -64,40 +63,6 @@ def export_material(
         bpy.data.materials.remove(plain)
         for image in images:
             bpy.data.images.remove(image)
-
-
-def recolour_reflectance(
-    reflectance: np.ndarray, hue: float, saturation: float, gain: float
-) -> np.ndarray:
-    """Apply the group's colour edits.
-
-    Parameters
-    ----------
-    reflectance : (..., 3) ndarray
-        Linear Rec.709, 0 or more.
-    hue : float
-        Rotation of the hue; 0.5 changes nothing.
-    saturation : float
-        Factor of the saturation; 1 changes nothing.
-    gain : float
-        Factor of all channels.
-
-    Returns
-    -------
-    (..., 3) ndarray
-        Linear Rec.709, not clipped at 1.
-    """
-    if abs(hue - 0.5) <= _UNCHANGED and abs(saturation - 1) <= _UNCHANGED:
-        return gain * reflectance
-    value, low = reflectance.max(-1), reflectance.min(-1)
-    spread = np.where(value > low, value - low, 1.0)
-    red, green, blue = np.moveaxis(reflectance, -1, 0)
-    sector = np.where(green == value, 2 + (blue - red) / spread, 4 + (red - green) / spread)
-    sector = np.where(red == value, (green - blue) / spread, sector) + 6 * (hue + 0.5)
-    share = np.clip(saturation * (value - low) / np.where(value > 0, value, 1.0), 0, 1)
-    place = (np.array([5.0, 3.0, 1.0]) + sector[..., None]) % 6
-    removed = (value * share)[..., None] * np.clip(np.minimum(place, 4 - place), 0, 1)
-    return np.asarray(gain * (value[..., None] - removed))
 
 
 @contextmanager
@@ -172,17 +137,5 @@ def _fill(plain: bpy.types.Material, obj: bpy.types.Object, material: bpy.types.
 
 def _bake(image: bpy.types.Image, hue: float, saturation: float, gain: float) -> bpy.types.Image:
     """The edited reflectance, 8 bits, sRGB."""
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    colors = pixels.reshape(-1, 4)[:, :3].astype(float)
-    # Blender returns the codes of such an image, and linear values of others.
-    if not image.is_float and image.colorspace_settings.name == "sRGB":
-        colors = srgb_to_linear(colors)
-    baked = bpy.data.images.new("base color", width, height, alpha=False, float_buffer=False)
-    baked.colorspace_settings.name = "sRGB"
-    coded = np.ones((width * height, 4), np.float32)
-    edited = recolour_reflectance(colors, hue, saturation, gain)
-    coded[:, :3] = linear_to_srgb(np.clip(edited, 0, 1))
-    baked.pixels.foreach_set(coded.ravel())
-    return baked
+    edited = recolour_reflectance(linear_colors(image), hue, saturation, gain)
+    return new_texture("plain", "base_color", edited, SRGB)

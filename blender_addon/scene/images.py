@@ -1,19 +1,30 @@
-"""Maps as Blender images: float32, packed into the file, in the right colour space.
+"""Maps and textures as Blender images, packed into the file, in the right colour space.
 
-Blender counts rows from below, the maps from above. Colours are "Linear Rec.709", everything else
-"Non-Color": the values are used unchanged. A packed image is a 32-bit OpenEXR, so saving the file
-loses nothing.
+Blender counts rows from below, the maps from above. Maps are float32: colours "Linear Rec.709",
+everything else "Non-Color", so that the values are used unchanged; packed, they are 32-bit OpenEXR,
+and saving the file loses nothing. Textures are what other programs read: PNG of 8 bits, colours
+coded as sRGB, everything else "Non-Color". Their file names are those that exporters write.
 """
+
+import re
 
 import bpy
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
 
 from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 
-COLOR, DATA = "Linear Rec.709", "Non-Color"
+COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
+# Names of the textures in files, by role.
+TEXTURE_NAMES = {
+    "base_color": "basecolor",
+    "edited_base_color": "basecolor_edited",
+    "normal_map": "normal",
+    "specular_variation": "specular",
+}
 MAPS = {
     **dict.fromkeys(("diffuse", "specular", "residual", "reflectance", "shading", "lobe"), COLOR),
     **dict.fromkeys(("normal", "height", "confidence", "mask"), DATA),
@@ -85,6 +96,66 @@ def ensure_image(
     if old is not None:
         _replace(old, image)
     return tag(image, key, role)
+
+
+def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
+    """Create a texture, or replace the one of that role everywhere it is used.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    role : str
+        One of `TEXTURE_NAMES`.
+    values : (H, W) or (H, W, 3) ndarray
+        Pixels in [0, 1], row 0 at the top; others are clipped. Colours are linear Rec.709.
+    space : str
+        `SRGB` for colours, else `DATA`.
+
+    Returns
+    -------
+    bpy.types.Image
+        The packed image.
+    """
+    old = find_tagged(bpy.data.images, key, role)
+    image = tag(new_texture(key, role, values[::-1], space), key, role)
+    if old is not None:
+        _replace(old, image)
+    return image
+
+
+def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
+    """Create a packed texture of 8 bits.
+
+    Parameters
+    ----------
+    key, role, space : str
+        As of `ensure_texture`.
+    values : (H, W) or (H, W, 3) ndarray
+        As of `ensure_texture`, but row 0 at the bottom. A map of single values is stored in alpha,
+        too, where glTF has the specular level.
+
+    Returns
+    -------
+    bpy.types.Image
+        The image, without a tag.
+    """
+    rows, columns = values.shape[:2]
+    name = TEXTURE_NAMES[role]
+    image = bpy.data.images.new(datablock_name(key, name), columns, rows, alpha=values.ndim == 2)
+    image.colorspace_settings.name = space
+    shares = np.clip(values, 0, 1)
+    pixels = np.ones((rows, columns, 4), np.float32)
+    if values.ndim == 2:
+        pixels[:] = shares[..., None]
+        image.alpha_mode = "CHANNEL_PACKED"
+    else:
+        pixels[..., :3] = linear_to_srgb(shares) if space == SRGB else shares
+    image.pixels.foreach_set(pixels.ravel())
+    image.filepath_raw = f"//{re.sub(r'[^0-9A-Za-z._-]', '_', key)}_{name}.png"
+    image.file_format = "PNG"
+    image.pack()
+    return image
 
 
 def ensure_maps(key: str, result: ResultArrays) -> dict[str, bpy.types.Image]:

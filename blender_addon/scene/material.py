@@ -1,7 +1,8 @@
-"""The object's material: the group "ISC Dichromatic" with the recovered maps, ready to be edited.
+"""The object's material: one Principled BSDF with the recovered textures, ready to be edited.
 
-The group's node has the group's name. When the object is built again, gains and colour edits on the
-node are kept; maps, roughness and level follow the result.
+The node of the group "ISC Dichromatic" holds the edits; `material_edits` writes them into the BSDF
+and its textures. When the object is built again, gains and colour edits are kept; textures,
+roughness and level follow the result.
 """
 
 from dataclasses import dataclass
@@ -9,12 +10,22 @@ from typing import Literal
 
 import bpy
 
-from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group, highlights_group
+from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
+from .material_edits import (
+    BASE_COLOR,
+    LEVEL_FACTOR,
+    SURFACE,
+    bake_edits,
+    dichromatic_node,
+    forget_edits,
+)
 from .mesh import UV
-from .nodes import add_node, node_tree
+from .nodes import add_node, connect, node_tree
+from .photo_highlights import show_highlights
 from .provenance import datablock_name, find_tagged, tag
 
 SpecularSource = Literal["lobe", "image", "none"]
+_EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")
 
 
 @dataclass(frozen=True)
@@ -24,7 +35,7 @@ class MaterialMaps:
     Attributes
     ----------
     base_color : bpy.types.Image
-        Reflectance.
+        Base colour.
     specular : bpy.types.Image or None
         The photo's highlights.
     variation : bpy.types.Image or None
@@ -50,12 +61,15 @@ class SpecularSettings:
     roughness : float
         Roughness of the lobe, in [0, 1].
     source : str
-        "lobe", "image" or "none".
+        "lobe", "image" (the photo's highlights until light, camera or pose change) or "none".
+    share : float
+        Share of the diffuse light for which the base colour is compensated.
     """
 
     level: float
     roughness: float
     source: SpecularSource
+    share: float = 0.0
 
 
 def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) -> bpy.types.Material:
@@ -80,54 +94,28 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     )
     kept = _edited_values(material)
     tree = node_tree(material)
+    forget_edits(material)
     tree.nodes.clear()
-    group = add_node(
-        tree, "Group", (0, 200), name=DICHROMATIC, width=220, node_tree=dichromatic_group()
-    )
-    output = add_node(tree, "OutputMaterial", (600, 200))
     if hasattr(material, "cycles"):
         # The photo's highlights emit no light: rays toward them would only add noise.
         material.cycles.emission_sampling = "NONE"
-    _add_texture(tree, maps.base_color, group.inputs["Reflectance"], (-500, 400))
-    surface = group.outputs["Surface"]
-    if specular.source == "image" and maps.specular is not None:
-        surface = _add_highlights(tree, surface, maps.specular)
-    if specular.source == "lobe" and maps.variation is not None:
-        _add_texture(tree, maps.variation, group.inputs["Specular Image"], (-500, 100))
-    if maps.normal is not None:
-        normal_map = add_node(tree, "NormalMap", (-200, -200), uv_map=UV)
-        _add_texture(tree, maps.normal, normal_map.inputs["Color"], (-500, -200))
-        tree.links.new(normal_map.outputs["Normal"], group.inputs["Normal"])
-    tree.links.new(surface, output.inputs["Surface"])
+    group = _add_surface(tree, maps, with_variation=specular.source != "none")
     for name, value in kept.items():
         group.inputs[name].default_value = value
-    level = specular.level if specular.source == "lobe" else 0.0
+    level = specular.level if specular.source != "none" else 0.0
     group.inputs["Specular Level"].default_value = level
     group.inputs["Roughness"].default_value = specular.roughness
-    set_specular_gain(material, group.inputs["Specular Gain"].default_value)
+    group.inputs["Specular Share"].default_value = specular.share
+    if maps.specular is not None:
+        material["isc_highlights"] = maps.specular
+    if specular.source == "image":
+        show_highlights(material)
+    bake_edits(material)
     return material
 
 
-def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Find the node of the group "ISC Dichromatic" in a material.
-
-    Parameters
-    ----------
-    material : bpy.types.Material
-        The material.
-
-    Returns
-    -------
-    bpy.types.Node or None
-        The node.
-    """
-    nodes = material.node_tree.nodes if material.node_tree else ()
-    groups = (node for node in nodes if node.type == "GROUP" and node.node_tree)
-    return next((node for node in groups if node.node_tree.get("isc_group") == DICHROMATIC), None)
-
-
 def shows_highlights(material: bpy.types.Material) -> bool:
-    """Return whether a material shows the photo's own highlights instead of the lobe.
+    """Return whether a material shows the photo's own highlights instead of its own.
 
     Parameters
     ----------
@@ -146,7 +134,7 @@ def shows_highlights(material: bpy.types.Material) -> bool:
 
 
 def set_specular_gain(material: bpy.types.Material, gain: float) -> None:
-    """Set the gain of the lobe and of the photo's highlights.
+    """Set the gain of the highlights, of the surface's and of the photo's.
 
     Parameters
     ----------
@@ -165,28 +153,76 @@ def _edited_values(material: bpy.types.Material) -> dict[str, float]:
     node = dichromatic_node(material)
     if node is None:
         return {}
-    names = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value")
-    return {name: node.inputs[name].default_value for name in names if name in node.inputs}
+    return {name: node.inputs[name].default_value for name in _EDITED if name in node.inputs}
+
+
+def _add_surface(
+    tree: bpy.types.NodeTree, maps: MaterialMaps, *, with_variation: bool
+) -> bpy.types.Node:
+    """Add the nodes, framed; returns that of the edits."""
+    textures, edits, surface = (
+        add_node(tree, "NodeFrame", (0, 0), label=label, name=label)
+        for label in ("Textures", "Edits", "Surface")
+    )
+    base_color = _add_texture(tree, maps.base_color, BASE_COLOR, (-900, 400), textures)
+    group = add_node(
+        tree,
+        "Group",
+        (-500, 420),
+        name=DICHROMATIC,
+        width=240,
+        node_tree=dichromatic_group(),
+        parent=edits,
+    )
+    bsdf = add_node(tree, "BsdfPrincipled", (50, 420), name=SURFACE, parent=surface)
+    output = add_node(tree, "OutputMaterial", (400, 420), parent=surface)
+    connect(
+        tree,
+        (base_color.outputs["Color"], group.inputs["Base Color"]),
+        (base_color.outputs["Color"], bsdf.inputs["Base Color"]),
+        (bsdf.outputs["BSDF"], output.inputs["Surface"]),
+    )
+    if with_variation and maps.variation is not None:
+        variation = _add_texture(tree, maps.variation, "Specular", (-900, 80), textures)
+        factor = add_node(
+            tree,
+            "Math",
+            (-200, 80),
+            name=LEVEL_FACTOR,
+            label="Specular Level",
+            operation="MULTIPLY",
+            parent=surface,
+        )
+        connect(
+            tree,
+            (variation.outputs["Color"], factor.inputs[0]),
+            (factor.outputs["Value"], bsdf.inputs["Specular IOR Level"]),
+        )
+    if maps.normal is not None:
+        normal = _add_texture(tree, maps.normal, "Normal", (-900, -240), textures)
+        normal_map = add_node(tree, "NormalMap", (-200, -240), uv_map=UV, parent=surface)
+        connect(
+            tree,
+            (normal.outputs["Color"], normal_map.inputs["Color"]),
+            (normal_map.outputs["Normal"], bsdf.inputs["Normal"]),
+        )
+    return group
 
 
 def _add_texture(
     tree: bpy.types.NodeTree,
     image: bpy.types.Image,
-    target: bpy.types.NodeSocket,
+    name: str,
     location: tuple[float, float],
-) -> None:
-    node = add_node(tree, "TexImage", location, image=image, extension="EXTEND")
-    tree.links.new(node.outputs["Color"], target)
-
-
-def _add_highlights(
-    tree: bpy.types.NodeTree, surface: bpy.types.NodeSocket, image: bpy.types.Image
-) -> bpy.types.NodeSocket:
-    highlights = add_node(
-        tree, "Group", (0, -50), name=HIGHLIGHTS, width=220, node_tree=highlights_group()
+    frame: bpy.types.Node,
+) -> bpy.types.Node:
+    return add_node(
+        tree,
+        "TexImage",
+        location,
+        name=name,
+        label=name,
+        image=image,
+        extension="EXTEND",
+        parent=frame,
     )
-    total = add_node(tree, "AddShader", (350, 200))
-    _add_texture(tree, image, highlights.inputs["Specular Image"], (-500, 100))
-    tree.links.new(surface, total.inputs[0])
-    tree.links.new(highlights.outputs["Surface"], total.inputs[1])
-    return total.outputs["Shader"]

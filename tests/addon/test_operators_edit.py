@@ -20,8 +20,8 @@ from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # 
 from blender_addon.operators.export import export_object  # noqa: E402
 from blender_addon.scene.build import BuildOptions, BuiltObject, build_object, find_built  # noqa: E402
 from blender_addon.scene.copies import objects_sharing_material  # noqa: E402
-from blender_addon.scene.export_material import recolour_reflectance  # noqa: E402
-from blender_addon.scene.material import dichromatic_node, set_specular_gain  # noqa: E402
+from blender_addon.scene.material import set_specular_gain  # noqa: E402
+from blender_addon.scene.material_edits import dichromatic_node, recolour_reflectance  # noqa: E402
 from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 
@@ -258,7 +258,7 @@ def test_a_copy_is_exported_as_it_is(addon: Any, built: BuiltObject, tmp_path: P
     built.scene.view_layers[0].objects.active = built.object
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
     mine, original = (
-        texture(tmp_path / name / "mesh.glb")[20, 38] for name in ("bump.001", "bump")
+        texture(tmp_path / name / f"{name}.glb")[20, 38] for name in ("bump.001", "bump")
     )
     assert (mine < 0.8 * original).all()
 
@@ -285,33 +285,6 @@ def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject
 # --- files ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_files_of_the_result_folder_are_copied(addon: Any, tmp_path: Path) -> None:
-    from isc_core.result_files.arrays_file import write_arrays
-    from isc_core.result_files.mesh import build_mesh
-    from isc_core.result_files.result_folder import load, save
-    from tests.addon.scene_fixture import bump
-
-    d = bump()
-    save(d, tmp_path / "result")
-    write_arrays(
-        d,
-        tmp_path / "result" / "arrays.npz",
-        build_mesh(d.height, d.normal, d.mask, d.reflectance, None),
-    )
-    addon.ops.isc.import_result(directory=str(tmp_path / "result"))
-    assert addon.ops.isc.export(directory=str(tmp_path / "out")) == {"FINISHED"}
-    copy = tmp_path / "out" / "bump"
-    assert sorted(path.name for path in copy.iterdir()) == [
-        "decomposition.json",
-        "maps.exr",
-        "mesh.glb",
-        "preview.png",
-    ]
-    np.testing.assert_array_equal(load(copy).height, d.height)
-    assert (copy / "mesh.glb").read_bytes() == (tmp_path / "result" / "mesh.glb").read_bytes()
-
-
 def test_the_scene_is_exported_without_a_result_folder(
     addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
 ) -> None:
@@ -321,13 +294,15 @@ def test_the_scene_is_exported_without_a_result_folder(
 
     addon.ops.isc.relight(light="OPTIMAL")
     material = built.object.data.materials[0]
-    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    assert addon.ops.isc.export(directory=str(tmp_path), maps=True) == {"FINISHED"}
     result = read_result(bump_folder)
-    channels = read_channels(tmp_path / "bump" / "reflectance.exr")
+    names = {path.name for path in (tmp_path / "bump").glob("*.exr")}
+    assert not names & {"lobe.exr", "residual.exr"} and "specular_fit.exr" in names
+    channels = read_channels(tmp_path / "bump" / "albedo.exr")
     np.testing.assert_array_equal(
         np.stack([channels[letter] for letter in "RGB"], -1), result.reflectance
     )
-    mesh = trimesh.load(tmp_path / "bump" / "mesh.glb", force="mesh")
+    mesh = trimesh.load(tmp_path / "bump" / "bump.glb", force="mesh")
     np.testing.assert_allclose(
         np.ptp(mesh.vertices, axis=0), np.ptp(places(built), axis=0)[[0, 2, 1]], rtol=1e-4
     )
@@ -381,10 +356,8 @@ def test_the_edited_reflectance_is_exported(
     assert node is not None
     for name, value in edit.items():
         node.inputs[name].default_value = value
-    images = set(addon.data.images)
-    assert addon.ops.isc.export(directory=str(tmp_path), from_scene=True) == {"FINISHED"}
-    assert set(addon.data.images) == images and "plain" not in addon.data.materials
-    codes, inside = texture(tmp_path / "bump" / "mesh.glb"), result.mask & (result.confidence > 0.8)
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    codes, inside = texture(tmp_path / "bump" / "bump.glb"), result.mask & (result.confidence > 0.8)
     if not edit:
         np.testing.assert_allclose(
             codes, 255 * linear_to_srgb(np.clip(result.base_color, 0, 1)), atol=0.51
@@ -416,8 +389,8 @@ def test_the_fitted_level_is_exported_unless_highlights_are_off(
     fitted = replace(read_result(bump_folder), specular_level=0.6, roughness=0.35)
     thing = build_object(fitted, BuildOptions(specular_from=source, own_scene=False))
     set_specular_gain(thing.material, 0.5)
-    export_object(thing, tmp_path, from_scene=True)
-    path = tmp_path / "bump" / "mesh.glb"
+    export_object(thing, tmp_path)
+    path = tmp_path / "bump" / "bump.glb"
     assert specular_factor(path) == pytest.approx(level)
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
 
@@ -430,9 +403,8 @@ def test_an_unknown_specular_level_is_not_exported(
             read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)
         ),
         tmp_path,
-        from_scene=True,
     )
-    assert specular_factor(tmp_path / "bump" / "mesh.glb") == 0
+    assert specular_factor(tmp_path / "bump" / "bump.glb") == 0
 
 
 def test_a_constant_reflectance_is_exported_and_other_nodes_are_refused(
@@ -440,15 +412,13 @@ def test_a_constant_reflectance_is_exported_and_other_nodes_are_refused(
 ) -> None:
     tree, node = built.material.node_tree, dichromatic_node(built.material)
     assert node is not None
-    tree.links.remove(node.inputs["Reflectance"].links[0])
-    node.inputs["Reflectance"].default_value = (0.2, 0.4, 0.1, 1)
+    tree.links.remove(node.inputs["Base Color"].links[0])
+    node.inputs["Base Color"].default_value = (0.2, 0.4, 0.1, 1)
     node.inputs["Value"].default_value = 0.5
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
-    factor = surface(tmp_path / "bump" / "mesh.glb")["pbrMetallicRoughness"]["baseColorFactor"]
+    factor = surface(tmp_path / "bump" / "bump.glb")["pbrMetallicRoughness"]["baseColorFactor"]
     assert factor == pytest.approx([0.1, 0.2, 0.05, 1])
-    tree.links.new(
-        tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"]
-    )
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Base Color"])
     assert "is not an image: connect an image texture" in error_of(
         addon.ops.isc.export, directory=str(tmp_path)
     )
@@ -460,7 +430,7 @@ def test_an_object_without_material_slots_is_exported(
 ) -> None:
     built.object.data.materials.clear()
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
-    assert texture(tmp_path / "bump" / "mesh.glb").shape == (64, 88, 3)
+    assert texture(tmp_path / "bump" / "bump.glb").shape == (64, 88, 3)
     assert not built.object.material_slots
 
 
@@ -474,7 +444,7 @@ def test_every_slot_of_the_material_is_exported(
     for face in built.object.data.polygons:
         face.material_index = 1
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
-    assert texture(tmp_path / "bump" / "mesh.glb").shape == (64, 88, 3)
+    assert texture(tmp_path / "bump" / "bump.glb").shape == (64, 88, 3)
     assert list(built.object.data.materials) == [mine, built.material]
 
 

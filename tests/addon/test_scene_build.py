@@ -12,6 +12,7 @@ import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
 from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels
 
@@ -321,9 +322,10 @@ def check_loaded(bpy: Any, thing: Any, result: ResultArrays) -> None:
     material = mesh.materials[0]
     group = next(node for node in material.node_tree.nodes if node.type == "GROUP")
     assert group.node_tree["isc_group"] == "ISC Dichromatic"
-    base = group.inputs["Reflectance"].links[0].from_node.image
-    assert base.colorspace_settings.name == "Linear Rec.709" and base.packed_file
-    np.testing.assert_array_equal(pixels(base)[..., :3], result.base_color)
+    base = group.inputs["Base Color"].links[0].from_node.image
+    assert base.colorspace_settings.name == "sRGB" and base.packed_file
+    codes = np.rint(255 * linear_to_srgb(np.clip(result.base_color, 0, 1)))
+    np.testing.assert_array_equal(np.rint(255 * pixels(base)[..., :3]), codes)
     for name in ("diffuse", "reflectance", "shading", "normal"):
         np.testing.assert_array_equal(
             pixels(thing[f"isc_map_{name}"])[..., :3], getattr(result, name)

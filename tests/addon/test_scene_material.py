@@ -1,4 +1,4 @@
-"""The material: exact reflectance, an added specular lobe, and documented inputs."""
+"""The material: one Principled BSDF that renders the recovered light, and documented inputs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,21 +8,23 @@ import numpy as np
 import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.addon.scene_render import pixels, render
 
 SOCKETS = {
-    "Reflectance",
+    "Base Color",
     "Diffuse Gain",
     "Hue",
     "Saturation",
     "Value",
-    "Specular Image",
     "Specular Level",
-    "Roughness",
     "Specular Gain",
-    "Normal",
+    "Roughness",
+    "Gloss Gain",
+    "Specular Share",
+    "Photo Highlights",
 }
 
 
@@ -33,9 +35,24 @@ def build(result: ResultArrays, **options: Any) -> Any:
 
 
 def group_node(built: Any) -> Any:
-    from blender_addon.scene.material import dichromatic_node
+    from blender_addon.scene.material_edits import dichromatic_node
 
     return dichromatic_node(built.material)
+
+
+def surface(built: Any) -> Any:
+    from blender_addon.scene.material_edits import surface_node
+
+    return surface_node(built.material)
+
+
+def edit(built: Any, **values: float) -> None:
+    """Set inputs of the node (`_` for spaces), and write them as a slider does."""
+    from blender_addon.scene.material_edits import bake_edits
+
+    for name, value in values.items():
+        group_node(built).inputs[name.replace("_", " ")].default_value = value
+    bake_edits(built.material)
 
 
 def inside(result: ResultArrays, rings: int = 2) -> np.ndarray:
@@ -65,18 +82,23 @@ def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: ResultArra
         "Value",
         "Specular Level",
         "Roughness",
+        "Gloss Gain",
     ):
-        assert inputs[name].min_value == 0 and 1 <= inputs[name].max_value <= 25, name
+        assert inputs[name].min_value < 0.11 and 1 <= inputs[name].max_value <= 25, name
 
 
-def test_the_diffuse_color_is_the_base_color_to_float32(
+def test_the_diffuse_color_is_the_base_color_to_8_bits(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     built = build(result)
     paint = render(built.scene, tmp_path)["Diffuse Color"]
     here = inside(result)
-    np.testing.assert_allclose(paint[here], result.base_color[here], rtol=2.5e-7)
+    codes, wanted = (255 * linear_to_srgb(one[here]) for one in (paint, result.base_color))
+    np.testing.assert_allclose(codes, wanted, atol=0.51)
     assert not built.material.node_tree.nodes.get("ISC Photo Highlights")
+    assert {link.from_node.type for link in surface(built).inputs["Base Color"].links} == {
+        "TEX_IMAGE"
+    }, "exporters read an image on the BSDF, and no group"
 
 
 def test_images_have_the_right_colour_space_and_are_packed(
@@ -86,22 +108,25 @@ def test_images_have_the_right_colour_space_and_are_packed(
     spaces = {image["isc_role"]: image.colorspace_settings.name for image in blender.data.images}
     data = {"normal", "height", "confidence", "mask", "specular_variation"}
     assert {role for role, space in spaces.items() if space == "Non-Color"} == data
-    assert {space for role, space in spaces.items() if role not in data} == {"Linear Rec.709"}
-    assert all(image.packed_file and image.is_float for image in blender.data.images)
+    rest = {role: space for role, space in spaces.items() if role not in data}
+    assert rest.pop("base_color") == "sRGB" and set(rest.values()) == {"Linear Rec.709"}
+    for image in blender.data.images:
+        texture = image["isc_role"] in ("base_color", "specular_variation")
+        assert image.packed_file and image.is_float != texture
+        assert not texture or image.packed_file.data[:4] == b"\x89PNG"
     np.testing.assert_array_equal(pixels(built.object["isc_map_height"])[..., 0], result.height)
 
 
 def test_recolouring_turns_the_hue(blender: Any, result: ResultArrays, tmp_path: Path) -> None:
     built = build(result)
-    node, here = group_node(built), inside(result)
-    node.inputs["Hue"].default_value = 0.5 + 1 / 3
-    node.inputs["Value"].default_value = 0.5
+    here = inside(result)
+    edit(built, Hue=0.5 + 1 / 3, Value=0.5)
     turned = render(built.scene, tmp_path)["Diffuse Color"]
     # A third of the circle brings each channel to the next one.
     np.testing.assert_allclose(
-        turned[here], 0.5 * np.roll(result.base_color[here], 1, axis=-1), rtol=1e-4
+        turned[here], 0.5 * np.roll(result.base_color[here], 1, axis=-1), rtol=0.02
     )
-    node.inputs["Saturation"].default_value = 0
+    edit(built, Saturation=0)
     grey = render(built.scene, tmp_path)["Diffuse Color"][here]
     assert np.ptp(grey, axis=-1).max() < 1e-6
 
@@ -115,22 +140,21 @@ def lamp(built: Any, direction: np.ndarray) -> None:
     ensure_sun(built.object["isc_key"], built.collection, direction, np.ones(3)).data.angle = 0
 
 
-def test_the_specular_lobe_is_added_to_the_diffuse(
+def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
-    """The specular lobe does not attenuate the diffuse one, and scales with its gain."""
-    built = build(result)
+    """The lobe is that of the fit; of the diffuse light it takes a share that grows sideways."""
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
+    built = build(replace(result, specular_level=1.0, roughness=0.45))
     lamp(built, direction)
-    node, here = group_node(built), inside(result)
-    node.inputs["Roughness"].default_value = 0.45
-    matt = render(built.scene, tmp_path)["Combined"][..., :3][here]
+    here = inside(result)
+    layers = render(built.scene, tmp_path, samples=16)
     lambert = (
         result.base_color[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
     )
-    np.testing.assert_allclose(matt, lambert, rtol=1e-3)
-    node.inputs["Specular Level"].default_value = 1
-    gloss = render(built.scene, tmp_path)["Combined"][..., :3][here] - matt
+    matt = (layers["Diffuse Direct"] * layers["Diffuse Color"])[here]
+    np.testing.assert_allclose(matt, lambert, rtol=0.05)
+    assert matt.sum() == pytest.approx(lambert.sum(), rel=0.01)
     model = radiance(
         Ggx(0.45**2, 0.04),
         result.normal[here].astype(float),
@@ -138,19 +162,88 @@ def test_the_specular_lobe_is_added_to_the_diffuse(
         directional(direction, 1.0),
     )
     bright = model[:, 0] > 0.1 * model.max()
+    gloss = (layers["Glossy Direct"] * layers["Glossy Color"])[here]
     np.testing.assert_allclose(gloss[bright], model[bright], rtol=0.06)
-    node.inputs["Specular Gain"].default_value = 3
-    node.inputs["Diffuse Gain"].default_value = 0.5
-    edited = render(built.scene, tmp_path)["Combined"][..., :3][here]
-    np.testing.assert_allclose(edited, 0.5 * matt + 3 * gloss, rtol=0.002, atol=1e-5)
+    edit(built, Diffuse_Gain=0.5, Specular_Gain=0.5)
+    edited = render(built.scene, tmp_path, samples=16)
+    half = (edited["Glossy Direct"] * edited["Glossy Color"])[here][bright]
+    np.testing.assert_allclose(half, 0.5 * gloss[bright], rtol=0.05)
+
+
+@pytest.mark.parametrize(("level", "roughness"), [(0.3, 0.2), (1.0, 0.4), (2.0, 0.3)])
+def test_the_object_is_as_bright_as_without_a_specular_layer(
+    blender: Any, result: ResultArrays, tmp_path: Path, level: float, roughness: float
+) -> None:
+    """The BSDF takes from the diffuse light what it mirrors; the base colour makes up for it."""
+    here = inside(result)
+
+    def diffuse(**options: Any) -> np.ndarray:
+        fitted = replace(result, specular_level=level, roughness=roughness)
+        layers = render(build(fitted, **options).scene, tmp_path, samples=16)
+        seen: np.ndarray = (layers["Diffuse Direct"] * layers["Diffuse Color"])[here]
+        return seen
+
+    plain, layered = diffuse(specular_from="none", name="a"), diffuse(name="b")
+    assert layered.sum() == pytest.approx(plain.sum(), rel=0.01)
+    assert np.sqrt(np.square(layered / plain - 1).mean()) < 0.06
+
+
+def test_gloss_and_gains_are_numbers_on_the_surface(blender: Any, result: ResultArrays) -> None:
+    built = build(replace(result, specular_level=0.8, roughness=0.4))
+    inputs = surface(built).inputs
+
+    def numbers() -> list[float]:
+        assert not inputs["Roughness"].is_linked and not inputs["Specular IOR Level"].is_linked
+        return [inputs[name].default_value for name in ("Specular IOR Level", "Roughness")]
+
+    assert numbers() == pytest.approx([0.4, 0.4])
+    edit(built, Specular_Gain=2.0, Gloss_Gain=2.0)
+    assert numbers() == pytest.approx([0.8, 0.2])
+    inputs["Roughness"].default_value = 0.7
+    edit(built, Hue=0.3)
+    assert numbers() == pytest.approx([0.8, 0.7]), "an edit of the BSDF itself is kept"
+    edit(built, Gloss_Gain=0.1)
+    assert numbers() == pytest.approx([0.8, 1.0])
+
+
+def test_an_edited_color_is_an_image_and_an_unedited_one_the_original(
+    blender: Any, result: ResultArrays
+) -> None:
+    from blender_addon.scene.material_edits import EDITED, apply_edits
+
+    built = build(result)
+    color = surface(built).inputs["Base Color"]
+    original = color.links[0].from_node.image
+    group_node(built).inputs["Value"].default_value = 0.5
+    assert apply_edits(built.material) and color.links[0].from_node == group_node(built), (
+        "while a slider moves, the group is seen"
+    )
+    edit(built)
+    edited = color.links[0].from_node.image
+    assert edited != original and edited.packed_file.data[:4] == b"\x89PNG"
+    edit(built, Saturation=0)
+    assert [image.get("isc_role") for image in blender.data.images].count("edited_base_color") == 1
+    edit(built, Saturation=1, Value=1)
+    assert color.links[0].from_node.image == original
+    assert not built.material.node_tree.nodes.get(EDITED)
+    assert "edited_base_color" not in [image.get("isc_role") for image in blender.data.images]
+
+
+def test_own_nodes_and_animated_edits_are_left_alone(blender: Any, result: ResultArrays) -> None:
+    built = build(result)
+    color, tree = surface(built).inputs["Base Color"], built.material.node_tree
+    group_node(built).inputs["Hue"].keyframe_insert("default_value", frame=1)
+    edit(built, Value=0.5)
+    assert color.links[0].from_node == group_node(built), "it follows the keyframes"
+    mine = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(mine.outputs["Color"], color)
+    edit(built, Value=0.7)
+    assert color.links[0].from_node == mine
 
 
 @pytest.fixture
 def mirror(blender: Any) -> Any:
-    """A plane of black paint, to be seen at an angle under an even sky of radiance 1: what is seen
-    is the share that it mirrors.
-    """
-    from blender_addon.scene.dichromatic import dichromatic_group
+    """A plane, to be seen at an angle under an even sky of radiance 1."""
     from blender_addon.scene.nodes import node_tree
 
     scene, world = blender.context.scene, blender.data.worlds.new("even")
@@ -165,85 +258,40 @@ def mirror(blender: Any) -> Any:
     ].default_value = (1, 1, 1, 1)
     mesh = blender.data.meshes.new("plane")
     mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
-    material = blender.data.materials.new("black")
+    material = blender.data.materials.new("white")
     tree = node_tree(material)
     tree.nodes.clear()
-    group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
-    group.node_tree = dichromatic_group()
-    tree.links.new(group.outputs["Surface"], output.inputs["Surface"])
-    group.inputs["Reflectance"].default_value, group.inputs["Roughness"].default_value = (
-        (0, 0, 0, 1),
-        0,
+    surface, output = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("BsdfPrincipled", "OutputMaterial")
     )
+    tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+    surface.inputs["Base Color"].default_value = (1, 1, 1, 1)
     mesh.materials.append(material)
     camera = blender.data.objects.new("camera", blender.data.cameras.new("camera"))
     camera.data.type, camera.data.ortho_scale, scene.camera = "ORTHO", 0.1, camera
     for thing in (camera, blender.data.objects.new("plane", mesh)):
         scene.collection.objects.link(thing)
-    return group.inputs
+    return surface.inputs
 
 
-def mirrored(blender: Any, folder: Path, degrees: float) -> np.ndarray:
-    """The share (3,) that the plane mirrors toward a viewer so many degrees off its normal."""
-    angle = np.radians(degrees)
+@pytest.mark.parametrize(("level", "roughness"), [(0.2, 0.2), (1.0, 0.4), (3.0, 0.6)])
+def test_the_share_is_that_of_blenders_layers(
+    blender: Any, mirror: Any, tmp_path: Path, level: float, roughness: float
+) -> None:
+    from blender_addon.scene.specular_share import specular_share
+
+    mirror["Specular IOR Level"].default_value = 0.5 * level
+    mirror["Roughness"].default_value = roughness
     camera = blender.context.scene.camera
-    camera.location, camera.rotation_euler = (
-        (0, -5 * np.sin(angle), 5 * np.cos(angle)),
-        (angle, 0, 0),
-    )
-    seen: np.ndarray = render(blender.context.scene, folder, samples=4)["Combined"][..., :3].mean(
-        (0, 1)
-    )
-    return seen
-
-
-def fresnel(degrees: float, f0: float = 0.04) -> float:
-    """Fresnel reflectance of a dielectric of that f0 for unpolarised light."""
-    index = (1 + f0**0.5) / (1 - f0**0.5)
-    cosine = np.cos(np.radians(degrees))
-    inner = np.sqrt(1 - np.sin(np.radians(degrees)) ** 2 / index**2)
-    across, along = (
-        (cosine - index * inner) / (cosine + index * inner),
-        (inner - index * cosine) / (inner + index * cosine),
-    )
-    return float((across**2 + along**2) / 2)
-
-
-@pytest.mark.parametrize("degrees", [0, 60, 85])
-def test_the_level_scales_the_whole_lobe_at_grazing_angles_too(
-    blender: Any, mirror: Any, tmp_path: Path, degrees: float
-) -> None:
-    """As in the fit: a weak lobe with bright grazing angles would veil the object."""
-    plastic = fresnel(degrees)
-    for level, gain in ((0.0, 1.0), (0.38, 1.0), (0.8, 0.25), (1.0, 1.0)):
-        mirror["Specular Level"].default_value, mirror["Specular Gain"].default_value = level, gain
-        np.testing.assert_allclose(
-            mirrored(blender, tmp_path, degrees), level * gain * plastic, rtol=0.01, atol=1e-5
-        )
-
-
-def test_a_level_above_plastic_reflects_at_most_all_light(
-    blender: Any, mirror: Any, tmp_path: Path
-) -> None:
-    mirror["Specular Level"].default_value = 3.0
-    np.testing.assert_allclose(mirrored(blender, tmp_path, 0), 0.12, rtol=0.01)
-    steep = mirrored(blender, tmp_path, 85)
-    assert (fresnel(85) < steep).all() and (steep < 1).all()
-
-
-def test_a_specular_image_is_a_factor_of_the_level(
-    blender: Any, mirror: Any, tmp_path: Path
-) -> None:
-    """A grey image scales the lobe; a coloured one tints the reflection along the normal."""
-    mirror["Specular Level"].default_value = 0.8
-    mirror["Specular Image"].default_value = (0.5, 0.5, 0.5, 1)
-    np.testing.assert_allclose(mirrored(blender, tmp_path, 85), 0.4 * fresnel(85), rtol=0.01)
-    mirror["Specular Image"].default_value = (0.9, 0.5, 0.1, 1)
-    np.testing.assert_allclose(
-        mirrored(blender, tmp_path, 0), 0.04 * 0.8 * np.array([0.9, 0.5, 0.1]), rtol=0.01
-    )
-    mirror["Specular Image"].default_value = (0, 0, 0, 1)
-    assert mirrored(blender, tmp_path, 85).max() == 0
+    for degrees in (0, 45, 70):
+        angle = np.radians(degrees)
+        camera.location = 0, -5 * np.sin(angle), 5 * np.cos(angle)
+        camera.rotation_euler = angle, 0, 0
+        layers = render(blender.context.scene, tmp_path, samples=64)
+        taken = 1 - (layers["Diffuse Direct"] * layers["Diffuse Color"]).mean()
+        share = specular_share(level, roughness, np.array([np.cos(angle)]))
+        assert share == pytest.approx(taken, abs=0.02)
+    assert specular_share(0.0, roughness, np.ones(1)) == 0
 
 
 def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: ResultArrays) -> None:
@@ -253,13 +301,12 @@ def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result
     node = group_node(build(fitted))
     assert node.inputs["Roughness"].default_value == pytest.approx(0.3)
     assert node.inputs["Specular Level"].default_value == pytest.approx(1.7)
-    (link,) = node.inputs["Specular Image"].links
-    assert link.from_node.image["isc_role"] == "specular_variation"
-    node = group_node(build(fitted, specular_from="none"))
-    assert (
-        node.inputs["Specular Level"].default_value == 0
-        and not node.inputs["Specular Image"].is_linked
-    )
+    (link,) = surface(build(fitted)).inputs["Specular IOR Level"].links
+    factor, role = link.from_node, link.from_node.inputs[0].links[0].from_node.image["isc_role"]
+    assert role == "specular_variation" and factor.inputs[1].default_value == pytest.approx(0.85)
+    built = build(fitted, specular_from="none")
+    assert group_node(built).inputs["Specular Level"].default_value == 0
+    assert not surface(built).inputs["Specular IOR Level"].is_linked
     assert group_node(build(result)).inputs["Specular Level"].default_value == 0, (
         "gloss that was not fitted"
     )
@@ -282,6 +329,7 @@ def test_the_photos_highlights_are_visible_and_emit_no_light(
     ]
     sources = {link.from_socket.name for link in strength.links[0].from_node.inputs[0].links}
     assert sources == {"Is Camera Ray"}
+    assert surface(built).inputs["Specular IOR Level"].default_value == 0, "not both at once"
     build(result)
     kinds = {
         node.type
@@ -341,18 +389,20 @@ def test_an_edited_group_is_kept_and_a_broken_one_replaced(
     tree.nodes.new("ShaderNodeMath").name = "mine"
     assert "mine" in group_node(build(result, name="two")).node_tree.nodes
     tree.interface.remove(
-        next(item for item in tree.interface.items_tree if item.name == "Roughness")
+        next(
+            item
+            for item in tree.interface.items_tree
+            if item.name == "Roughness" and item.in_out == "INPUT"
+        )
     )
     assert group_node(build(result, name="three")).node_tree != tree
 
 
 def test_a_flat_normal_map_is_left_out(blender: Any, result: ResultArrays) -> None:
-    node = group_node(build(result))
-    assert not node.inputs["Normal"].is_linked
+    assert not surface(build(result)).inputs["Normal"].is_linked
     tilted = result.normal_map.copy()
     tilted[..., 0] = 0.6
-    node = group_node(build(replace(result, normal_map=tilted)))
-    (link,) = node.inputs["Normal"].links
+    (link,) = surface(build(replace(result, normal_map=tilted))).inputs["Normal"].links
     assert link.from_node.type == "NORMAL_MAP" and link.from_node.uv_map == "UVMap"
     (link,) = link.from_node.inputs["Color"].links
     assert link.from_node.image.colorspace_settings.name == "Non-Color"

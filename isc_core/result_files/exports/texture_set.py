@@ -34,7 +34,6 @@ object, textures hold the mean colour or a flat surface.
 """
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -51,41 +50,10 @@ from ...progress import Monitor
 from ...scene.decomposition import Decomposition
 from ...shading.ambient_occlusion import ambient_occlusion
 from ..mesh import MeshResult, color_codes, nearest_inside, vector_codes
+from .targets import TARGETS
 from .textures import PLASTIC, share_codes
 
 _COMPRESSION = 2  # of 9: a third of the time of the usual 6
-_SEPARATE = ("basecolor", "normal", "mesh_normal", "roughness", "specular", "height", "ao")
-
-
-@dataclass(frozen=True)
-class TextureTarget:
-    """What a program expects.
-
-    Attributes
-    ----------
-    textures : tuple of str
-        Their names; `height` is written as PNG and as EXR.
-    green_down : bool
-        Normal maps are DirectX's.
-    """
-
-    textures: tuple[str, ...]
-    green_down: bool = False
-
-
-TARGETS: Mapping[str, TextureTarget] = {
-    "generic": TextureTarget(_SEPARATE),
-    "blender": TextureTarget(_SEPARATE),
-    "unity": TextureTarget(
-        (
-            *("basecolor", "normal", "mesh_normal", "metallic_smoothness", "mask_map"),
-            *("height", "ao"),
-        )
-    ),
-    "unreal": TextureTarget(
-        ("basecolor", "normal", "mesh_normal", "orm", "specular", "height"), green_down=True
-    ),
-}
 
 
 def texture_files(name: str) -> tuple[str, ...]:

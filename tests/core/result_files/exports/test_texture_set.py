@@ -166,8 +166,8 @@ def test_no_roughness_is_one_line_and_no_folder(tmp_path: Path) -> None:
 
 
 def test_an_unknown_target_and_a_foreign_folder_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match='unknown target "godot": choose generic, blender'):
-        written("godot", tmp_path / "set")
+    with pytest.raises(InputError, match='unknown target "maya": choose generic, blender'):
+        written("maya", tmp_path / "set")
     (tmp_path / "set").mkdir()
     (tmp_path / "set" / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="not empty"):

@@ -1,0 +1,175 @@
+"""The photo's own highlights as a layer on the material: what the photo's camera saw.
+
+The layer is emission that only the camera sees, so it is exact from the photo's view and in the
+photo's light, and wrong elsewhere: highlights would stand still under a moving lamp. It therefore
+turns itself off as soon as the light, the camera or the object's place differ from those that it
+was first seen with. While it is on, the BSDF's own highlights are off.
+"""
+
+import hashlib
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import bpy
+
+from .dichromatic import HIGHLIGHTS, highlights_group
+from .material_edits import dichromatic_node, surface_node
+from .nodes import add_node, connect
+
+IMAGE, _SEEN = "isc_highlights", "isc_highlights_seen"
+_SUM, _TEXTURE = "Photo Highlights", "Highlights of the Photo"
+_DIGITS = 5
+
+
+def can_show_highlights(material: bpy.types.Material) -> bool:
+    """Return whether a material has an image of the photo's highlights.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        The material.
+
+    Returns
+    -------
+    bool
+    """
+    return surface_node(material) is not None and material.get(IMAGE) is not None
+
+
+def show_highlights(material: bpy.types.Material) -> None:
+    """Add the layer; nothing changes where it exists, or without an image.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    """
+    tree, surface, group = material.node_tree, surface_node(material), dichromatic_node(material)
+    if surface is None or group is None or not can_show_highlights(material):
+        return
+    output = _output(surface)
+    if output is None or tree.nodes.get(_SUM) is not None:
+        return
+    x, y = surface.location
+    texture = add_node(tree, "TexImage", (x - 700, y - 700), name=_TEXTURE, label=_TEXTURE)
+    texture.image, texture.extension = material[IMAGE], "EXTEND"
+    layer = add_node(tree, "Group", (x - 300, y - 700), name=HIGHLIGHTS, width=220)
+    layer.node_tree = highlights_group()
+    layer.inputs["Specular Gain"].default_value = group.inputs["Specular Gain"].default_value
+    total = add_node(tree, "AddShader", (x + 250, y - 500), name=_SUM, label=_SUM)
+    connect(
+        tree,
+        (texture.outputs["Color"], layer.inputs["Specular Image"]),
+        (surface.outputs["BSDF"], total.inputs[0]),
+        (layer.outputs["Surface"], total.inputs[1]),
+        (total.outputs["Shader"], output.inputs["Surface"]),
+    )
+    group.inputs["Photo Highlights"].default_value = 1.0
+    forget_view(material)
+
+
+def hide_highlights(material: bpy.types.Material) -> None:
+    """Remove the layer, and give the BSDF its highlights back.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    """
+    tree, surface, group = material.node_tree, surface_node(material), dichromatic_node(material)
+    forget_view(material)
+    if surface is None or group is None:
+        return
+    output = _output(surface)
+    group.inputs["Photo Highlights"].default_value = 0.0
+    for name in (_TEXTURE, HIGHLIGHTS, _SUM):
+        if (node := tree.nodes.get(name)) is not None:
+            tree.nodes.remove(node)
+    if output is not None:
+        tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
+
+
+def forget_view(material: bpy.types.Material) -> None:
+    """Let the layer be right for what is seen next.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    """
+    if _SEEN in material:
+        del material[_SEEN]
+
+
+def has_moved(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
+    """Return whether light, camera or pose differ from those that the layer was first seen with.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A material with the layer; stores what it is seen with for the first time.
+    scene : bpy.types.Scene
+        The evaluated scene.
+
+    Returns
+    -------
+    bool
+        False where no object of the scene has the material.
+    """
+    objects = [
+        obj
+        for obj in scene.objects
+        if obj.type == "MESH" and any(slot.material == material for slot in obj.material_slots)
+    ]
+    if not objects:
+        return False
+    seen, known = _fingerprint(scene, objects), dict(material.get(_SEEN, {}))
+    if scene.name not in known:
+        material[_SEEN] = known | {scene.name: seen}
+        return False
+    return bool(known[scene.name] != seen)
+
+
+def _output(surface: bpy.types.Node) -> bpy.types.Node | None:
+    """The output that the surface reaches, through the layer or directly."""
+    for link in surface.outputs["BSDF"].links:
+        node = link.to_node
+        if node.type == "OUTPUT_MATERIAL":
+            return node
+        if node.name == _SUM:
+            following = (one.to_node for one in node.outputs["Shader"].links)
+            return next((one for one in following if one.type == "OUTPUT_MATERIAL"), None)
+    return None
+
+
+def _fingerprint(scene: bpy.types.Scene, objects: list[Any]) -> str:
+    camera, world = scene.camera, scene.world
+    parts: list[Any] = [_matrix(obj) for obj in objects]
+    if camera is not None:
+        lens = camera.data
+        parts += [_matrix(camera), lens.type, lens.lens, lens.ortho_scale]
+        parts += [lens.shift_x, lens.shift_y]
+    for lamp in (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render):
+        light = lamp.data
+        parts += [_matrix(lamp), light.type, light.energy, list(light.color)]
+    if world is not None and world.node_tree is not None:
+        parts += [world.name, *_world_values(world.node_tree)]
+    text = json.dumps(parts, default=lambda value: list(value))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _matrix(obj: Any) -> list[float]:
+    return [round(value, _DIGITS) for row in obj.matrix_world for value in row]
+
+
+def _world_values(tree: bpy.types.NodeTree) -> Iterator[Any]:
+    for link in tree.links:
+        yield [link.from_node.name, link.from_socket.name, link.to_node.name, link.to_socket.name]
+    for node in tree.nodes:
+        if node.type in ("TEX_ENVIRONMENT", "TEX_IMAGE"):
+            yield node.image.name if node.image is not None else ""
+        for socket in node.inputs:
+            if not socket.is_linked and socket.type in ("VALUE", "VECTOR", "RGBA"):
+                value = socket.default_value
+                yield value if isinstance(value, float) else list(value)

@@ -1,0 +1,195 @@
+"""Export by Blender's own exporters: what is read back is the object, edits included."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+from benchmarks.blender.read_back import READERS, read_back, shown  # noqa: E402
+from blender_addon.files.result_arrays import read_result  # noqa: E402
+from blender_addon.operators.export import export_object  # noqa: E402
+from blender_addon.scene.build import BuildOptions, BuiltObject, build_object  # noqa: E402
+from blender_addon.scene.material import shows_highlights  # noqa: E402
+from blender_addon.scene.material_edits import dichromatic_node  # noqa: E402
+from isc_core.evaluation.metrics import psnr  # noqa: E402
+
+EDITS = {
+    "unedited": {},
+    "edited": {"Hue": 0.7, "Value": 0.8, "Specular Gain": 2.0, "Gloss Gain": 1.5},
+}
+
+
+@pytest.fixture
+def enabled(blender: Any) -> Iterator[Any]:
+    """Blender with the add-on enabled in its preferences, so that exporters ask it."""
+    import addon_utils
+
+    addon_utils.enable("blender_addon", default_set=True)
+    yield blender
+    addon_utils.disable("blender_addon", default_set=True)
+
+
+@pytest.fixture
+def built(enabled: Any, bump_folder: Path) -> BuiltObject:
+    """The bump, glossy."""
+    result = replace(read_result(bump_folder), specular_level=0.8, roughness=0.35)
+    thing = build_object(result, BuildOptions(own_scene=False, set_camera=True, set_world=True))
+    thing.object.select_set(True)
+    bpy.context.view_layer.objects.active = thing.object
+    return thing
+
+
+def edit(built: BuiltObject, values: dict[str, float]) -> None:
+    node = dichromatic_node(built.material)
+    assert node is not None
+    for name, value in values.items():
+        node.inputs[name].default_value = value
+
+
+def standard_export(kind: str, path: Path) -> None:
+    """What File > Export calls."""
+    if kind == "GLB":
+        bpy.ops.export_scene.gltf(filepath=str(path), use_selection=True)
+    elif kind == "USD":
+        bpy.ops.wm.usd_export(filepath=str(path), selected_objects_only=True)
+    elif kind == "FBX":
+        bpy.ops.export_scene.fbx(
+            filepath=str(path), use_selection=True, path_mode="COPY", embed_textures=True
+        )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edits", EDITS)
+@pytest.mark.parametrize("kind", ["GLB", "USD", "FBX", "OBJ"])
+def test_the_exported_object_looks_as_in_the_scene(
+    built: BuiltObject, tmp_path: Path, kind: str, edits: str
+) -> None:
+    edit(built, EDITS[edits])
+    names = export_object(built, tmp_path, kind)
+    wanted, mask = shown(built, 16)
+    found, _ = read_back(built, tmp_path / "bump" / names[0], 16)
+    assert psnr(wanted, found, mask, peak=float(wanted[mask].max())) > 30
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("edits", EDITS)
+@pytest.mark.parametrize("kind", ["GLB", "USD", "FBX"])
+def test_blenders_own_exporters_give_the_edited_object(
+    built: BuiltObject, tmp_path: Path, kind: str, edits: str
+) -> None:
+    """Without a call of ours: a slider has moved, then File > Export."""
+    edit(built, EDITS[edits])
+    path = tmp_path / f"object.{READERS[kind][0]}"
+    standard_export(kind, path)
+    wanted, mask = shown(built, 16)
+    found, _ = read_back(built, path, 16)
+    assert psnr(wanted, found, mask, peak=float(wanted[mask].max())) > 30
+
+
+def test_the_layer_of_highlights_is_not_exported_as_light(
+    enabled: Any, bump_folder: Path, tmp_path: Path
+) -> None:
+    import trimesh
+
+    result = replace(read_result(bump_folder), specular_level=0.8, roughness=0.35)
+    thing = build_object(result, BuildOptions(own_scene=False, specular_from="image"))
+    thing.object.select_set(True)
+    standard_export("GLB", tmp_path / "a.glb")
+    material = trimesh.load(tmp_path / "a.glb", force="mesh").visual.material
+    assert material.emissiveTexture is None and material.emissiveFactor is None
+    assert material.baseColorTexture.size == thing.object["isc_map_mask"].size[:]
+    assert shows_highlights(thing.material), "it is there again"
+
+
+def test_usd_has_a_preview_surface_with_the_index_of_the_level(
+    built: BuiltObject, tmp_path: Path
+) -> None:
+    pxr = pytest.importorskip("pxr", reason="needs the extra `usd`")
+    from pxr import Usd, UsdShade
+
+    assert pxr
+    standard_export("USD", tmp_path / "a.usda")
+    stage = Usd.Stage.Open(str(tmp_path / "a.usda"))
+    (shader,) = (
+        UsdShade.Shader(prim)
+        for prim in stage.Traverse()
+        if UsdShade.Shader(prim) and UsdShade.Shader(prim).GetShaderId() == "UsdPreviewSurface"
+    )
+    amplitude = (0.04 * 0.8) ** 0.5
+    assert shader.GetInput("ior").Get() == pytest.approx((1 + amplitude) / (1 - amplitude))
+    assert shader.GetInput("roughness").Get() == pytest.approx(0.35)
+    assert shader.GetInput("diffuseColor").HasConnectedSource()
+
+
+def test_obj_comes_with_its_textures(built: BuiltObject, tmp_path: Path) -> None:
+    export_object(built, tmp_path, "OBJ")
+    text = (tmp_path / "bump" / "bump.mtl").read_text()
+    assert "map_Kd bump_basecolor.png" in text and "Pr 0.35" in text
+    assert (tmp_path / "bump" / "bump_basecolor.png").read_bytes()[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize("file_format", ["PNG8", "PNG16", "EXR"])
+def test_texture_sets_have_the_edits(built: BuiltObject, tmp_path: Path, file_format: str) -> None:
+    from isc_core.io.decoders import read_raster
+    from isc_core.io.exr import read_channels
+
+    edit(built, {"Saturation": 0.0, "Gloss Gain": 2.0})
+    assert bpy.ops.isc.export_textures(directory=str(tmp_path), file_format=file_format) == {
+        "FINISHED"
+    }
+    suffix = "exr" if file_format == "EXR" else "png"
+    names = {path.name for path in (tmp_path / "bump").iterdir()}
+    wanted = ("basecolor", "normal", "roughness", "specular", "height", "ao")
+    assert names == {f"bump_{one}.{suffix}" for one in wanted}
+
+    def values(name: str) -> np.ndarray:
+        path = tmp_path / "bump" / f"bump_{name}.{suffix}"
+        if suffix == "exr":
+            channels = read_channels(path)
+            return np.stack([channels[letter] for letter in "RGB"], -1)
+        codes = read_raster(path).values
+        assert codes.dtype == (np.uint16 if file_format == "PNG16" else np.uint8)
+        return codes.reshape(*codes.shape[:2], -1) / np.iinfo(codes.dtype).max
+
+    paint = values("basecolor")[20, 38, :3]
+    assert np.ptp(paint) < 0.01 and paint[0] > 0.05, "gray, as edited"
+    assert values("roughness")[0, 0, 0] == pytest.approx(0.175, abs=0.003)
+    assert values("specular")[0, 0, 0] == pytest.approx(0.4, abs=0.003)
+    height = values("height")[..., 0]
+    assert height[27, 38] > 0.99 and height[0, 0] == 0
+
+
+def test_packed_textures_have_each_value_in_its_channel(built: BuiltObject, tmp_path: Path) -> None:
+    from isc_core.io.decoders import read_raster
+
+    bpy.ops.isc.export_textures(directory=str(tmp_path), program="unreal")
+    orm = read_raster(tmp_path / "bump" / "bump_orm.png").values
+    assert orm[0, 0, 1] == round(255 * 0.35) and orm[0, 0, 2] == 0 and orm[0, 0, 0] == 255
+    bpy.ops.isc.export_textures(directory=str(tmp_path), program="unity")
+    assert read_raster(tmp_path / "bump" / "bump_mask_map.png").values[0, 0, 3] == round(255 * 0.65)
+
+
+def test_the_direction_of_green_is_the_programs_or_the_chosen(
+    enabled: Any, bump_folder: Path, tmp_path: Path
+) -> None:
+    from isc_core.io.decoders import read_raster
+
+    result = read_result(bump_folder)
+    tilted = result.normal_map.copy()
+    tilted[..., 1] = 0.75
+    build_object(replace(result, normal_map=tilted), BuildOptions(own_scene=False))
+    bpy.context.view_layer.objects.active = bpy.data.objects["bump"]
+    for program, normals, green in (
+        ("generic", "TARGET", 191),
+        ("unreal", "TARGET", 64),
+        ("unreal", "OPENGL", 191),
+        ("generic", "DIRECTX", 64),
+    ):
+        bpy.ops.isc.export_textures(directory=str(tmp_path), program=program, normals=normals)
+        codes = read_raster(tmp_path / "bump" / "bump_normal.png").values
+        assert abs(int(codes[5, 5, 1]) - green) <= 1, (program, normals)
