@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import gpu  # type: ignore[import-not-found]
+import numpy as np
 from bpy.props import StringProperty
 from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
@@ -18,14 +19,21 @@ from isc_core.errors import InputError
 
 from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from ..worker.commands import Box, WorkerEnvironment
+from ..worker.commands import Box, WorkerEnvironment, overlay_of
 from .messages import busy_message
 from .modal import WorkerOperator
 from .request import find_by_full_name
 from .run_steps import mask_steps
-from .worker_run import RunSteps, WorkerRun, active_run, remove_folder, require_no_active_run
+from .worker_run import (
+    RunOutput,
+    RunSteps,
+    WorkerRun,
+    active_run,
+    remove_folder,
+    require_no_active_run,
+)
 
-_MASK_OF = "isc_mask_of"
+_MASK_OF, _SHOWN_ON = "isc_mask_of", "isc_shown_on"
 _MIN_SIDE = 8
 
 
@@ -112,11 +120,11 @@ def mask_run(
     photo, scene = inspect_image(context.scene.isc.image), context.scene.name_full
     folder = create_run_folder(None, "mask")
 
-    def finish(context: Any, path: Path) -> str:
+    def finish(context: Any, output: RunOutput) -> str:
         del context
-        load_mask(path, photo.name, scene)
+        load_mask(output.path, photo.name, scene)
         remove_folder(folder)
-        return "the mask is ready: check its outline before you decompose the photo"
+        return "mask found: check it, then press Create Object"
 
     environment = worker_environment(read_preferences(context))
     return WorkerRun(title, steps(photo, folder, environment), finish, folder)
@@ -159,6 +167,8 @@ class ISC_OT_take_mask(bpy.types.Operator):
         name = "mask" if photo is None else f"{photo.name} mask"
         mask.colorspace_settings.name = "Non-Color"
         _replace_mask(mask, name)
+        if photo is not None:
+            _set_overlay(mask, photo, overlay_of(Path(self.filepath)))
         scene.isc.mask, scene.isc.mask_source = mask, "IMAGE"
         return {"FINISHED"}
 
@@ -201,7 +211,7 @@ class ISC_OT_draw_box(bpy.types.Operator):
     """Draw a box around the object with the mouse, and cut the object out."""
 
     bl_idname = "isc.draw_box"
-    bl_label = "Draw Box"
+    bl_label = "Select Box"
     bl_description = "Cut the object out of a box drawn around it with some background"
 
     _start: tuple[int, int] | None = None
@@ -365,6 +375,37 @@ def _small_box_message() -> str:
         f"the box is less than {_MIN_SIDE} pixels wide or high: "
         "draw it around the object in the image editor"
     )
+
+
+def _set_overlay(mask: Any, photo: Any, path: Path) -> None:
+    """Make the picture of the mask on its photo the preview of the mask."""
+    if not path.is_file():
+        return
+    picture = bpy.data.images.load(str(path))
+    width, height = picture.size
+    pixels = np.empty(4 * width * height, np.float32)
+    picture.pixels.foreach_get(pixels)
+    bpy.data.images.remove(picture)
+    preview = mask.preview_ensure()
+    preview.image_size = width, height
+    preview.image_pixels_float.foreach_set(pixels)
+    mask[_SHOWN_ON] = photo
+
+
+def mask_shown_on(mask: Any) -> Any:
+    """Return the photo on which the preview of a mask shows it.
+
+    Parameters
+    ----------
+    mask : bpy.types.Image
+        The mask.
+
+    Returns
+    -------
+    bpy.types.Image or None
+        None where the preview shows something else, as after the mask was painted on.
+    """
+    return None if mask.is_dirty else mask.get(_SHOWN_ON)
 
 
 def load_mask(path: Path, image: str, scene: str) -> None:
