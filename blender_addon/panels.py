@@ -82,10 +82,9 @@ class _Mask(_Panel):
         """Draw the buttons for finding a mask, for painting it and for cutting it out of a box."""
         settings = context.scene.isc
         self.layout.operator("isc.auto_mask", icon="VIEWZOOM")
-        if context.area.type == "IMAGE_EDITOR":
-            row = self.layout.row(align=True)
-            row.operator("isc.mark_point", text="Add Point", icon="ADD").background = False
-            row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
+        row = self.layout.row(align=True)
+        row.operator("isc.mark_point", text="Add Point", icon="ADD").background = False
+        row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
         column = self.property_column()
         column.prop(settings, "points")
         column.prop(settings, "other_points")

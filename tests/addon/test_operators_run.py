@@ -20,6 +20,7 @@ from blender_addon.operators.request import MethodSettings  # noqa: E402
 from blender_addon.operators.run_steps import ResultPlace, decompose_steps, mask_steps  # noqa: E402
 from blender_addon.operators.worker_run import (  # noqa: E402
     RunOutput,
+    RunSteps,
     WorkerFailed,
     WorkerRun,
     active_run,
@@ -253,6 +254,11 @@ def photo_file(tmp_path: Path) -> ImageSource:
     return ImageSource("cup", path=tmp_path / "cup.png")
 
 
+def steps_of(photo: ImageSource, folder: Path, environment: WorkerEnvironment) -> RunSteps:
+    place = ResultPlace(folder)
+    return decompose_steps(photo, None, None, MethodSettings(), place, 0, environment)
+
+
 def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -265,7 +271,9 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     monkeypatch.setattr(run_steps, "start_decompose", started)
     run = WorkerRun(
         "Decompose cup",
-        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment),
+        decompose_steps(
+            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
+        ),
         take,
         folder,
     )
@@ -291,7 +299,9 @@ def test_a_starting_worker_is_ended_too(
     monkeypatch.setattr(run_steps, "start_decompose", slow_start)
     run = WorkerRun(
         "Decompose cup",
-        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment),
+        decompose_steps(
+            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
+        ),
         take,
         folder,
     )
@@ -338,7 +348,9 @@ sys.exit(2)
     )
     run = WorkerRun("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
-    assert run.status.message == "cup: choose a mask image, or make one with Auto Mask or Select Box"
+    assert (
+        run.status.message == "cup: choose a mask image, or make one with Auto Mask or Select Box"
+    )
 
 
 def test_following_ends_the_worker_when_it_is_closed() -> None:
