@@ -216,6 +216,11 @@ def _draw_thumbnail(layout: Any, settings: Any) -> None:
         image = mask
     if image is not None:
         layout.template_icon(icon_value=layout.icon(image), scale=_THUMBNAIL_SCALE)
+    if mask is not None and image == mask:
+        row = layout.row(align=True)
+        row.operator("isc.mark_point", text="Add", icon="ADD").background = False
+        row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
+        row.operator("isc.draw_box", text="Box", icon="SELECT_SET")
 
 
 def _draw_outcome(layout: Any, context: Any) -> None:

@@ -125,7 +125,7 @@ def mask_run(
         del context
         load_mask(output.path, photo.name, scene)
         remove_folder(folder)
-        return "mask found: check it, then press Create Object"
+        return "Mask found: check it, then press Create Object"
 
     environment = worker_environment(read_preferences(context))
     return WorkerRun(title, steps(photo, folder, environment), finish, folder)

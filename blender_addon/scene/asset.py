@@ -114,6 +114,7 @@ def _pack_images(obj: bpy.types.Object) -> None:
 
 def _set_preview(built: BuiltObject) -> None:
     """Render the object along the photo's view into the previews of object and material."""
+    before = set(bpy.data.images)
     with _preview_scene(built) as scene:
         path = Path(bpy.app.tempdir) / "isc_preview.png"
         scene.render.filepath = str(path)
@@ -123,6 +124,8 @@ def _set_preview(built: BuiltObject) -> None:
     picture.pixels.foreach_get(pixels)
     bpy.data.images.remove(picture)
     path.unlink(missing_ok=True)
+    for image in set(bpy.data.images) - before:  # Blender's render result, if it had none
+        bpy.data.images.remove(image)
     for block in (built.object, built.material):
         preview = block.preview_ensure()
         preview.image_size = _SIZE, _SIZE
