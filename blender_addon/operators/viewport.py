@@ -1,12 +1,21 @@
-"""Show a new object where the user works: selected, active, framed, in Material Preview."""
+"""Show a new object where the user works: selected, active, framed, in Material Preview.
 
+A photo shows one side. A view that looks at the object from elsewhere turns to that side, as seen
+from a little to the right and above, so that the form is seen, too.
+"""
+
+from math import cos, radians
 from typing import Any
 
 import bpy
+from mathutils import Euler, Quaternion, Vector
 
 from ..scene.build import BuiltObject
 
 _PLAIN = {"WIREFRAME", "SOLID"}
+_FRONT = Vector((0, -1, 0))  # of an object, in its own axes
+_MOST_ASIDE = radians(35)
+_RIGHT, _ABOVE = radians(20), radians(12)
 
 
 def started_in(context: Any) -> int:
@@ -74,7 +83,7 @@ def show(context: Any, built: BuiltObject, own_scene: bool, address: int = 0) ->
     """Show an object in a 3D view: in Material Preview, and framed.
 
     Its own scene is seen through the photo's camera, in the scene's light. In another scene, the
-    view turns to the object and keeps its direction.
+    view turns to the object's front.
 
     Parameters
     ----------
@@ -97,8 +106,32 @@ def show(context: Any, built: BuiltObject, own_scene: bool, address: int = 0) ->
     if own_scene:
         space.shading.use_scene_world = space.shading.use_scene_lights = True
         space.region_3d.view_perspective = "CAMERA"
-    elif space.region_3d.view_perspective != "CAMERA" or space.lock_camera is False:
+    elif space.region_3d.view_perspective != "CAMERA" or not space.lock_camera:
+        space.region_3d.view_rotation = front_view(
+            space.region_3d.view_rotation, built.object.matrix_world.to_quaternion()
+        )
         _frame(context, window, area)
+
+
+def front_view(view: Quaternion, rotation: Quaternion) -> Quaternion:
+    """Return the rotation of a view that shows the front of an object.
+
+    Parameters
+    ----------
+    view : Quaternion
+        Rotation of the view so far; kept if it shows the front.
+    rotation : Quaternion
+        Rotation of the object.
+
+    Returns
+    -------
+    Quaternion
+        The rotation.
+    """
+    toward_viewer = view @ Vector((0, 0, 1))
+    if toward_viewer.dot(rotation @ _FRONT) >= cos(_MOST_ASIDE):
+        return view.copy()
+    return rotation @ Euler((radians(90) - _ABOVE, 0, _RIGHT)).to_quaternion()
 
 
 def _frame(context: Any, window: Any, area: Any) -> None:

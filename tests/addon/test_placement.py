@@ -8,10 +8,10 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from mathutils import Vector  # noqa: E402 (after the skip)
+from mathutils import Euler, Vector  # noqa: E402 (after the skip)
 
 from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
-from blender_addon.operators.viewport import find_view, show  # noqa: E402
+from blender_addon.operators.viewport import find_view, front_view, show  # noqa: E402
 from blender_addon.scene.build import BuildOptions, build_object, find_built  # noqa: E402
 from blender_addon.scene.hand_edits import is_edited_by_hand  # noqa: E402
 
@@ -147,6 +147,22 @@ def test_the_object_is_shown_in_the_largest_view(blender: Any, bump_folder: Path
     space.shading.type = "RENDERED"
     show(blender.context, built, own_scene=True, address=view.as_pointer())
     assert space.shading.type == "RENDERED" and space.region_3d.view_perspective == "CAMERA"
+
+
+def test_a_view_turns_to_the_front_of_an_object() -> None:
+    for turned in (0.0, 1.0, 4.0):
+        rotation = Euler((0, 0, turned)).to_quaternion()
+        front = rotation @ Vector((0, -1, 0))
+        for view in (
+            Euler((1.1, 0, 0.8 + turned)),
+            Euler((0, 0, 0)),
+            Euler((1.5, 0, 3.1 + turned)),
+        ):
+            toward_viewer = front_view(view.to_quaternion(), rotation) @ Vector((0, 0, 1))
+            assert toward_viewer.angle(front) == pytest.approx(0.405, abs=0.02)
+            assert toward_viewer.z > 0.15, "from above"
+        kept = Euler((1.5, 0, turned + 0.2)).to_quaternion()
+        assert front_view(kept, rotation) == kept
 
 
 def test_two_objects_of_one_photo_share_the_material_of_the_original(
