@@ -122,7 +122,7 @@ class _Output(_Panel):
         settings, column = context.scene.isc, self.property_column()
         column.prop(settings, "size_metres")
         column.prop(settings, "specular_from")
-        for name in ("shadows", "sun", "displacement", "closed_back"):
+        for name in ("shadows", "sun", "displacement", "closed_back", "all_maps"):
             column.prop(settings, name)
         column.separator()
         column.prop(settings, "own_scene")

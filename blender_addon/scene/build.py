@@ -85,6 +85,8 @@ class BuildOptions:
         Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
         already contains those of the photo, so the object looks as in the photo without them. None
         enables them for a new object in a shared scene, and keeps those of an existing object.
+    all_maps : bool
+        Whether the file also holds the layers and maps that neither material nor exports use.
     name : str
         Name of the object; "" for the result's own.
     """
@@ -102,6 +104,7 @@ class BuildOptions:
     closed_back: bool = False
     specular_from: SpecularSource = "lobe"
     own_shadows: bool | None = None
+    all_maps: bool = True
     name: str = ""
 
 
@@ -171,7 +174,7 @@ def build_object(
     _require_ready(key, options, scene or bpy.context.scene)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
-    maps = ensure_maps(key, result)
+    maps = ensure_maps(key, result, options.all_maps)
     specular = _specular_settings(result, options)
     material = ensure_material(key, _material_maps(key, result, maps), specular)
     is_new = find_tagged(bpy.data.objects, key, OBJECT) is None

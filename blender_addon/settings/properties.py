@@ -333,6 +333,14 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     closed_back: BoolProperty(
         name="Closed Back", description="Close the mesh with a flat back", default=False
     )
+    all_maps: BoolProperty(
+        name="All Maps",
+        description=(
+            "Also pack the layers and maps that the material does not use into the file, such as "
+            "normals, shading and diffuse light, for compositing"
+        ),
+        default=False,
+    )
     shadows: EnumProperty(
         name="Self-Shadowing",
         description="Whether the object casts shadows and diffuse light, also on itself, in Cycles",

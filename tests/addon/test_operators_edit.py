@@ -29,7 +29,8 @@ from tests.addon.scene_render import render  # noqa: E402
 @pytest.fixture
 def built(addon: Any, bump_folder: Path) -> BuiltObject:
     """The bump in its own scene, active, with the fitted lobe."""
-    addon.context.scene.isc.own_scene, addon.context.scene.isc.specular_from = True, "lobe"
+    settings = addon.context.scene.isc
+    settings.own_scene, settings.specular_from, settings.all_maps = True, "lobe", True
     addon.ops.isc.import_result(directory=str(bump_folder))
     found = find_built(addon.context.object)
     assert found is not None

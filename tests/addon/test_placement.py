@@ -121,6 +121,16 @@ def test_a_new_scene_previews_quickly(result: ResultArrays) -> None:
     assert scene.cycles.preview_samples == 32 and scene.cycles.use_preview_denoising
 
 
+def test_maps_that_nothing_uses_are_left_out(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    assert "isc_map_shading" in obj
+    images = len(bpy.data.images)
+    build_object(result, BuildOptions(own_scene=False, all_maps=False))
+    left = sorted(name for name in obj.keys() if name.startswith("isc_map_"))  # noqa: SIM118
+    assert left == ["isc_map_height", "isc_map_mask", "isc_map_specular"]
+    assert len(bpy.data.images) == images - 7, "no map of an earlier result stays"
+
+
 def test_hand_edits_are_noticed(result: ResultArrays) -> None:
     obj = build_object(result, SHARED).object
     assert not is_edited_by_hand(obj)
