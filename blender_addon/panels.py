@@ -241,7 +241,7 @@ def _draw_outcome(layout: Any, context: Any) -> None:
         )
     if shown.state == RunState.FAILED and is_about_mask(shown.message):
         fixes = layout.row(align=True)
-        fixes.operator("isc.auto_mask", icon="VIEWZOOM")
+        fixes.operator("isc.mark_point", icon="ADD").background = False
         fixes.operator("isc.draw_box", icon="SELECT_SET")
     if notes:
         header, body = layout.panel("ISC_details", default_closed=True)

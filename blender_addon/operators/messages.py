@@ -27,7 +27,7 @@ _FIELDS = {
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
 _MOST_SECONDS = 90  # more are shown in minutes
-_MASK_ADVICE = "choose a mask image, or make one with Auto Mask or Select Box"
+_MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 
 
 def translate_message(message: str, names: Mapping[str, str]) -> str:

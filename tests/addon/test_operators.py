@@ -284,7 +284,7 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
         (
             lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200),
-            "choose a mask image, or make one with Auto Mask or Select Box",
+            "choose a mask image, or make one with Add Point or Select Box",
         ),
     ],
 )
@@ -505,7 +505,7 @@ def test_messages_name_images_and_panel_fields() -> None:
         "give another --mask",
     ):
         assert translate_message(f"/t/a.npy: no object: {advice}", {"/t/a.npy": "cup"}) == (
-            "cup: no object: choose a mask image, or make one with Auto Mask or Select Box"
+            "cup: no object: choose a mask image, or make one with Add Point or Select Box"
         )
 
 

@@ -349,7 +349,7 @@ sys.exit(2)
     run = WorkerRun("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
     assert (
-        run.status.message == "cup: choose a mask image, or make one with Auto Mask or Select Box"
+        run.status.message == "cup: choose a mask image, or make one with Add Point or Select Box"
     )
 
 
