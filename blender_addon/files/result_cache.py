@@ -1,8 +1,8 @@
 """Results of earlier runs, found again by what they were made of.
 
 A result is kept in a folder whose name is a SHA-256 of everything that it depends on: the content
-and the name of the photo, the content of the mask, the settings, and the files of `isc_core`. What
-is built of it in Blender does not count.
+of photo and mask, the settings, and the files of `isc_core`. What is built of it in Blender does
+not count, nor do names and places of files: Blender packs them.
 
 The worker writes a result under its final name complete or not at all. One that cannot be read is
 removed, and made again. When the folder grows above its limit, the results that were not used for
@@ -109,7 +109,7 @@ def content_key(files: Sequence[Path | None], settings: Iterable[object], core: 
     Parameters
     ----------
     files : sequence of Path or None
-        Photo and mask. The name of the first counts, too: the result holds it.
+        Photo and mask.
     settings : iterable of object
         Settings, in a fixed order.
     core : Path
@@ -125,7 +125,7 @@ def content_key(files: Sequence[Path | None], settings: Iterable[object], core: 
     OSError
         If a file cannot be read.
     """
-    digest = hashlib.sha256(repr((files[0] and files[0].name, *settings)).encode())
+    digest = hashlib.sha256(repr(tuple(settings)).encode())
     for file in files:
         digest.update(b"\0none" if file is None else _file_digest(file))
     for path in sorted(core.rglob("*")):

@@ -2,6 +2,7 @@
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -291,6 +292,10 @@ def _panel_request(scene: Any) -> DecomposeRequest:
 def _complete(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:
     """Store what the panels need later; the object's own scene also gets the settings."""
     store_request(built.object, request)
+    photo = find_by_full_name(bpy.data.images, request.image)
+    if photo is not None and photo.packed_file is None and not photo.is_dirty:
+        with suppress(RuntimeError):  # its file is gone
+            photo.pack()
     if request.build.own_scene:
         if built.scene.render.engine == "CYCLES":
             built.scene.cycles.samples = request.method.samples

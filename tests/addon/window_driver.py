@@ -1,6 +1,7 @@
 """Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
-automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color, a second
-run, undo, redo, Esc, the Cancel button, an asset, save, load during a run.
+automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color, a
+second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a run, a new
+scene.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
     blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
