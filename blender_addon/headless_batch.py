@@ -18,9 +18,11 @@ from isc_core.progress import Monitor
 
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
+from .operators.messages import join_notes
 from .operators.request import DecomposeRequest, MethodSettings
 from .operators.result import build_as_undo_step
 from .operators.run_steps import result_notes
+from .operators.worker_run import RunOutput
 from .registration import register
 from .scene.build import BuildOptions
 from .scene.provenance import find_tagged
@@ -102,7 +104,7 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
             try:
                 folder = _make_result(plan.source, results, options, part.part(0.0, 0.9))
-                if notes := result_notes(folder):
+                if notes := join_notes(result_notes(folder)):
                     report.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
                     new_file_needed = previous is None or plan.blend != previous
@@ -206,7 +208,7 @@ def _write_outputs(
     name = plan.source.name
     monitor.report(f"building {name}", 0.0)
     empty_scenes = open_empty_file() if new_file_needed else []
-    build_as_undo_step(bpy.context, folder, _create_request(plan.source, options))
+    build_as_undo_step(bpy.context, RunOutput(folder), _create_request(plan.source, options))
     scene = find_tagged(bpy.data.scenes, name, "scene")
     for other in empty_scenes:
         bpy.data.scenes.remove(other)

@@ -9,10 +9,15 @@ from typing import Any
 
 import bpy
 
+from .operators.mask import mask_shown_on
+from .operators.messages import NOTE, is_about_mask
+from .operators.result import scene_before
 from .operators.worker_run import RunState, active_run
-from .scene.build import BuiltObject, find_built
+from .scene.build import LIGHT_AND_CAMERA, BuiltObject, find_built
+from .scene.collection import find_layer_collection
 from .scene.copies import objects_sharing_material
 from .scene.material_edits import dichromatic_node
+from .scene.provenance import KEY, find_tagged
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")
@@ -21,6 +26,7 @@ _STATE_ICONS = {
     RunState.FAILED: "ERROR",
     RunState.CANCELLED: "CANCEL",
 }
+_THUMBNAIL_SCALE = 7.0
 _LINE_LENGTH = 34  # characters that fit into a sidebar of default width
 
 
@@ -39,15 +45,19 @@ class _Panel:
 
 
 class _Main(_Panel):
-    bl_label = "Photo to Object"
+    bl_label = "Photo as 3D Object"
 
     def draw(self, context: Any) -> None:
         """Draw photo, mask, preset and button; during a run its progress."""
         settings, running = context.scene.isc, active_run() is not None
+        if scene_before(context.scene) is not None:
+            name = scene_before(context.scene).name
+            self.layout.operator("isc.return_to_scene", text=f"Back to {name}", icon="LOOP_BACK")
         photo = self.layout.column()
         photo.enabled = not running
         photo.label(text="Photo")
-        photo.template_ID(settings, "image", new="image.new", open="image.open")
+        photo.template_ID(settings, "image", open="image.open")
+        _draw_thumbnail(photo, settings)
         column = self.property_column()
         column.enabled = not running
         column.prop(settings, "mask_source")
@@ -60,7 +70,7 @@ class _Main(_Panel):
         else:
             button = self.layout.row()
             button.scale_y = 1.5
-            button.operator("isc.decompose", icon="SHADING_TEXTURE")
+            button.operator("isc.decompose", icon="MESH_MONKEY")
             _draw_outcome(self.layout, context)
 
 
@@ -72,18 +82,16 @@ class _Mask(_Panel):
         """Draw the buttons for finding a mask, for painting it and for cutting it out of a box."""
         settings = context.scene.isc
         self.layout.operator("isc.auto_mask", icon="VIEWZOOM")
-        if context.area.type == "IMAGE_EDITOR":
-            row = self.layout.row(align=True)
-            row.operator("isc.mark_point", text="Add Point", icon="ADD").background = False
-            row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
+        row = self.layout.row(align=True)
+        row.operator("isc.mark_point", text="Add Point", icon="ADD").background = False
+        row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
         column = self.property_column()
         column.prop(settings, "points")
         column.prop(settings, "other_points")
         if settings.points or settings.other_points:
             self.layout.operator("isc.clear_points", icon="X")
         self.layout.operator("isc.new_mask", icon="BRUSH_DATA")
-        if context.area.type == "IMAGE_EDITOR":
-            self.layout.operator("isc.draw_box", icon="SELECT_SET")
+        self.layout.operator("isc.draw_box", icon="SELECT_SET")
         column = self.property_column()
         for index, name in enumerate(("Box Left", "Top", "Width", "Height")):
             column.prop(settings, "box", index=index, text=name)
@@ -95,7 +103,7 @@ class _Method(_Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the settings of the decomposition."""
+        """Draw the settings of how the object is recovered."""
         settings, column = context.scene.isc, self.property_column()
         for name in ("model", "separator", "illumination", "camera"):
             column.prop(settings, name)
@@ -105,20 +113,21 @@ class _Method(_Panel):
             column.prop(settings, name)
 
 
-class _Build(_Panel):
-    bl_label = "Scene"
+class _Output(_Panel):
+    bl_label = "Output"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw what is built, and what of a shared scene may change."""
+        """Draw what is created, and what of the scene may change."""
         settings, column = context.scene.isc, self.property_column()
         column.prop(settings, "size_metres")
         column.prop(settings, "specular_from")
-        for name in ("shadows", "sun", "displacement", "closed_back"):
+        for name in ("shadows", "sun", "displacement", "closed_back", "all_maps"):
             column.prop(settings, name)
         column.separator()
         column.prop(settings, "own_scene")
         if not settings.own_scene:
+            column.prop(settings, "light_and_camera")
             changes = column.column(heading="Replace")
             for name in ("set_world", "set_camera", "set_resolution", "set_view_transform"):
                 changes.prop(settings, name)
@@ -139,19 +148,29 @@ class _Edit(_Panel):
         if built is None:
             return
         self._draw_material(built)
-        column = self.layout.column(align=True)
-        column.label(text="Light", icon="LIGHT_SUN")
-        for light, text in (
-            ("OPTIMAL", "Sun, Dominant Direction"),
-            ("CHOSEN", "Sun from the Side"),
-            ("RECOVERED", "Recovered Light"),
-        ):
-            column.operator("isc.relight", text=text).light = light
+        self._draw_light(context, built)
         column = self.property_column()
         column.prop(context.scene.isc, "max_size")
         self.layout.operator("isc.redo", icon="FILE_REFRESH").max_size = context.scene.isc.max_size
+        self.layout.operator("isc.save_asset", icon="ASSET_MANAGER")
         self.layout.operator("isc.export", icon="EXPORT")
         self.layout.operator("isc.export_textures", icon="TEXTURE")
+
+    def _draw_light(self, context: Any, built: BuiltObject) -> None:
+        column = self.layout.column(align=True)
+        column.label(text="Light", icon="LIGHT_SUN")
+        for light, text in (("OPTIMAL", "Estimated Sun"), ("CHOSEN", "Sun from the Side")):
+            column.operator("isc.relight", text=text).light = light
+        # Elsewhere than in the world of the photo, all that this can do is to take the sun away.
+        recovered = built.world is not None and context.scene.world == built.world
+        text = "Recovered Light" if recovered else "Remove Sun"
+        column.operator("isc.relight", text=text).light = "RECOVERED"
+        part = find_tagged(bpy.data.collections, built.object[KEY], LIGHT_AND_CAMERA)
+        entry = part and find_layer_collection(context.view_layer.layer_collection, part)
+        if entry:
+            self.layout.prop(
+                entry, "exclude", text="Photo's Light and Camera", invert_checkbox=True
+            )
 
     def _draw_material(self, built: BuiltObject) -> None:
         node = dichromatic_node(built.material)
@@ -190,15 +209,49 @@ def draw_progress(layout: Any, context: Any) -> None:
     column.operator("isc.cancel", icon="X")
 
 
+def _draw_thumbnail(layout: Any, settings: Any) -> None:
+    """Draw the photo, or the photo with its mask over it."""
+    image = settings.image
+    mask = settings.mask if settings.mask_source == "IMAGE" else None
+    if mask is not None and mask_shown_on(mask) == image:
+        image = mask
+    if image is not None:
+        layout.template_icon(icon_value=layout.icon(image), scale=_THUMBNAIL_SCALE)
+    if mask is not None and image == mask:
+        row = layout.row(align=True)
+        row.operator("isc.mark_point", text="Add", icon="ADD").background = False
+        row.operator("isc.mark_point", text="Exclude", icon="REMOVE").background = True
+        row.operator("isc.draw_box", text="Box", icon="SELECT_SET")
+
+
 def _draw_outcome(layout: Any, context: Any) -> None:
-    """Draw the outcome of the last run in lines that fit."""
+    """Draw the outcome of the last run: a line, what helps, and the details folded."""
     shown = context.window_manager.isc
     icons = {str(state): icon for state, icon in _STATE_ICONS.items()}
     if shown.state not in icons or not shown.message:
         return
-    column = layout.column(align=True)
+    notes = shown.notes.splitlines()
+    row = layout.row()
+    column = row.column(align=True)
     for number, line in enumerate(wrap_text(shown.message, _LINE_LENGTH)):
         column.label(text=line, icon="BLANK1" if number else icons[shown.state])
+    advice = [note.removeprefix(NOTE) for note in notes if note.startswith(NOTE)]
+    if advice:
+        row.operator("isc.show_notes", text="", icon="ERROR", emboss=False).notes = "\n".join(
+            advice
+        )
+    if shown.state == RunState.FAILED and is_about_mask(shown.message):
+        fixes = layout.row(align=True)
+        fixes.operator("isc.mark_point", icon="ADD").background = False
+        fixes.operator("isc.draw_box", icon="SELECT_SET")
+    if notes:
+        header, body = layout.panel("ISC_details", default_closed=True)
+        header.label(text="Details")
+        if body is not None:
+            lines = body.column(align=True)
+            for note in notes:
+                for line in wrap_text(note, _LINE_LENGTH):
+                    lines.label(text=line)
 
 
 def wrap_text(text: str, width: int) -> list[str]:
@@ -234,7 +287,7 @@ def _create_class(panel: Any, order: int, editor: str) -> type:
     )
 
 
-_PANELS = (_Main, _Mask, _Method, _Build)
+_PANELS = (_Main, _Mask, _Method, _Output)
 CLASSES = (
     *(
         _create_class(panel, order, editor)

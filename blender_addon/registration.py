@@ -6,7 +6,7 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import operators, panels
+from . import menus, operators, panels
 from .operators.live_edits import add_handlers, remove_handlers
 from .operators.modal import update_display
 from .operators.worker_run import active_run, cancel_active_run
@@ -17,6 +17,7 @@ _CLASSES = (
     *properties.CLASSES,
     *operators.CLASSES,
     *panels.CLASSES,
+    *menus.CLASSES,
 )
 
 
@@ -25,6 +26,7 @@ def register() -> None:
     for kind in _CLASSES:
         bpy.utils.register_class(kind)
     properties.add_properties()
+    menus.add_entries()
     bpy.app.handlers.load_pre.append(_cancel_before_loading)
     add_handlers()
     # Blender exits without notifying add-ons. The worker would stop by itself, but leave its files.
@@ -37,6 +39,7 @@ def unregister() -> None:
     atexit.unregister(cancel_active_run)
     remove_handlers()
     bpy.app.handlers.load_pre.remove(_cancel_before_loading)
+    menus.remove_entries()
     properties.remove_properties()
     for kind in reversed(_CLASSES):
         bpy.utils.unregister_class(kind)

@@ -26,7 +26,14 @@ PACKAGES = ("isc_core", "synth", "blender_addon", "training", "benchmarks")
 IMAGE_LIBRARIES = {
     *("cv2", "PIL", "OpenEXR", "trimesh", "imageio", "skimage", "png", "pillow_heif", "rawpy"),
 }
-EDGES = ("io/exr.py", "io/decoders/", "photo/masks.py", "photo/grabcut.py", "result_files/")
+EDGES = (
+    "io/exr.py",
+    "io/decoders/",
+    "photo/masks.py",
+    "photo/mask_overlay.py",
+    "photo/grabcut.py",
+    "result_files/",
+)
 RENDERERS = {"mitsuba", "drjit"}
 BLENDER = {"bpy", "mathutils", "bmesh"}
 FORBIDDEN = {

@@ -1,17 +1,29 @@
 """Operators of the panels; `CLASSES` lists them for registration."""
 
-from .decompose import ISC_OT_decompose, ISC_OT_redo
+from .asset import ISC_OT_save_asset
+from .decompose import ISC_OT_confirm_overwrite, ISC_OT_decompose, ISC_OT_redo
 from .edit import ISC_OT_dichromatic, ISC_OT_own_material, ISC_OT_recolour, ISC_OT_relight
 from .export import ISC_OT_export, ISC_OT_export_textures
 from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
 from .mask_points import ISC_OT_auto_mask, ISC_OT_clear_points, ISC_OT_mark_point
 from .modal import ISC_OT_cancel
-from .result import ISC_OT_build_result, ISC_OT_complete_result, ISC_OT_import_result
+from .notes import ISC_OT_show_notes
+from .photo_import import HANDLERS, ISC_OT_photo_as_object
+from .result import (
+    ISC_OT_build_result,
+    ISC_OT_complete_result,
+    ISC_OT_import_result,
+    ISC_OT_return_to_scene,
+)
 
 CLASSES = (
+    ISC_OT_photo_as_object,
+    *HANDLERS,
     ISC_OT_decompose,
     ISC_OT_redo,
+    ISC_OT_confirm_overwrite,
     ISC_OT_cancel,
+    ISC_OT_show_notes,
     ISC_OT_cut_mask,
     ISC_OT_take_mask,
     ISC_OT_new_mask,
@@ -22,6 +34,8 @@ CLASSES = (
     ISC_OT_build_result,
     ISC_OT_import_result,
     ISC_OT_complete_result,
+    ISC_OT_return_to_scene,
+    ISC_OT_save_asset,
     ISC_OT_recolour,
     ISC_OT_dichromatic,
     ISC_OT_own_material,

@@ -1,29 +1,37 @@
-"""Decompose the photo of the panel, or the photo of an object again at another size."""
+"""Create the object of the panel's photo, or create an object again at another size."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
-from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import IntProperty
+from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
 from ..files.result_arrays import ARRAYS
 from ..scene.build import find_built
-from ..scene.copies import find_original, is_copy
+from ..scene.copies import OBJECT, find_original, is_copy
+from ..scene.hand_edits import is_edited_by_hand
+from ..scene.provenance import find_tagged
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .messages import busy_message
 from .modal import WorkerOperator
 from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
 from .result import build_as_undo_step
-from .run_steps import decompose_steps
-from .worker_run import WorkerRun, active_run, require_no_active_run
+from .run_steps import ResultPlace, decompose_steps
+from .viewport import started_in
+from .worker_run import (
+    RunOutput,
+    WorkerRun,
+    active_run,
+    remove_folder,
+    require_no_active_run,
+)
 
 
 def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
-    """Create the run that decomposes a photo and builds the result.
+    """Create the run that recovers the object of a photo and builds it.
 
     Parameters
     ----------
@@ -47,48 +55,89 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     preferences = read_preferences(context)
     environment = worker_environment(preferences)
     folder = create_run_folder(preferences.results, request.build.name)
+    place = ResultPlace(folder, preferences.earlier, preferences.results is not None)
     steps = decompose_steps(
-        photo, mask, mask_size, request.method, folder, preferences.threads, environment
+        photo, mask, mask_size, request.method, place, preferences.threads, environment
     )
+    view = started_in(context)
 
-    def finish(context: Any, result: Path) -> str:
-        message = build_as_undo_step(context, result, request)
-        # By far the largest file; the scene holds its content now.
-        (result / ARRAYS).unlink(missing_ok=True)
+    def finish(context: Any, output: RunOutput) -> str:
+        message = build_as_undo_step(context, output, request, view)
+        if output.path.is_relative_to(folder):
+            # By far the largest file; the scene holds its content now.
+            (output.path / ARRAYS).unlink(missing_ok=True)
+        else:
+            remove_folder(folder)
         return message
 
-    return WorkerRun(f"Decompose {request.build.name}", steps, finish, folder)
+    return WorkerRun(f"Create {request.build.name}", steps, finish, folder)
 
 
-class ISC_OT_decompose(WorkerOperator, bpy.types.Operator):
-    """Decompose the photo of the panel."""
+class _Overwrites(WorkerOperator):
+    """What the operators share that replace the mesh of an object: they ask before they overwrite
+    one that was edited by hand.
+    """
 
-    bl_idname = "isc.decompose"
-    bl_label = "Decompose"
-    bl_description = (
-        "Recover shape, light and material of the object in the photo and build it, "
-        "in the background"
+    bl_idname: str
+
+    overwrite: BoolProperty(
+        name="Overwrite Edits",
+        description="Replace the mesh even if it was edited by hand",
+        default=False,
+        options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether no run is active.
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Start the run, or ask first; see `WorkerOperator`.
 
         Parameters
         ----------
         context : bpy.types.Context
-            Blender's context; not used.
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator.
 
         Returns
         -------
-        bool
-            False while a run is active; the tooltip then names it.
+        set of str
+            {"CANCELLED"} where a dialog asks; it starts the operator again.
         """
-        del context
-        return _is_idle(cls)
+        try:
+            edited = None if self.overwrite else _edited_object(self.request(context))
+        except InputError as error:
+            self.report({"ERROR"}, str(error))
+            return {"CANCELLED"}
+        if edited is None or bpy.app.background or context.window is None:
+            return super().invoke(context, event)
+        bpy.ops.isc.confirm_overwrite(
+            "INVOKE_DEFAULT",
+            again=self.bl_idname,
+            edited=edited.name,
+        )
+        return {"CANCELLED"}
+
+    def request(self, context: Any) -> DecomposeRequest:
+        """Return what is created.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        DecomposeRequest
+            The request.
+
+        Raises
+        ------
+        InputError
+            If there is nothing to create.
+        """
+        raise NotImplementedError
 
     def prepare(self, context: Any) -> WorkerRun:
-        """Create the run of the scene's panel; see `WorkerOperator`.
+        """Create the run; see `WorkerOperator`.
 
         Parameters
         ----------
@@ -103,27 +152,145 @@ class ISC_OT_decompose(WorkerOperator, bpy.types.Operator):
         Raises
         ------
         InputError
-            If the panel's settings are incomplete, the request cannot be fulfilled, or a run is
-            active.
+            If the settings are incomplete, the request cannot be fulfilled, the mesh was edited by
+            hand, or a run is active.
         """
-        return create_decompose_run(context, request_from_settings(context.scene))
+        request = self.request(context)
+        edited = _edited_object(request)
+        if edited is not None and not self.overwrite:
+            raise InputError(
+                f"the mesh of {edited.name} was edited by hand: enable Overwrite Edits, or "
+                "duplicate the object and delete this one"
+            )
+        return create_decompose_run(context, request)
 
 
-class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
-    """Decompose an object's photo again at another size, and update the object."""
+def _edited_object(request: DecomposeRequest) -> Any:
+    """The object that a request would update, if its mesh was edited by hand; else None."""
+    obj = find_tagged(bpy.data.objects, request.build.name, OBJECT)
+    return obj if obj is not None and is_edited_by_hand(obj) else None
+
+
+class ISC_OT_confirm_overwrite(bpy.types.Operator):
+    """Ask before an edited mesh is replaced."""
+
+    bl_idname = "isc.confirm_overwrite"
+    bl_label = "Overwrite"
+    bl_description = "Replace the edited mesh by the one that is created from the photo"
+    bl_options = {"INTERNAL"}
+
+    again: StringProperty(name="Operator", description="Operator to start on confirmation")
+    edited: StringProperty(name="Object", description="Name of the edited object")
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Ask.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator.
+
+        Returns
+        -------
+        set of str
+            As Blender's dialog, which calls `execute` on confirmation.
+        """
+        return set(
+            context.window_manager.invoke_confirm(
+                self,
+                event,
+                title="Overwrite Edited Mesh?",
+                message=f"The mesh of {self.edited} was edited by hand. Its edits will be lost.",
+                confirm_text="Overwrite",
+                icon="WARNING",
+            )
+        )
+
+    def execute(self, context: Any) -> set[str]:
+        """Start the operator again.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context; not used.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}.
+        """
+        del context
+        again = {"isc.redo": bpy.ops.isc.redo}.get(self.again, bpy.ops.isc.decompose)
+        again("INVOKE_DEFAULT", overwrite=True)
+        return {"FINISHED"}
+
+
+class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
+    """Create the object of the panel's photo."""
+
+    bl_idname = "isc.decompose"
+    bl_label = "Create Object"
+    bl_description = (
+        "Recover shape, material and light of the object in the photo and add it to the scene, "
+        "in the background"
+    )
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether there is a photo and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
+        if context.scene.isc.image is None:
+            cls.poll_message_set("Open a photo first")
+            return False
+        return _is_idle(cls)
+
+    def request(self, context: Any) -> DecomposeRequest:
+        """Return the request of the scene's panel; see `_Overwrites`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        DecomposeRequest
+            The request.
+
+        Raises
+        ------
+        InputError
+            If the panel's settings are incomplete.
+        """
+        return request_from_settings(context.scene)
+
+
+class ISC_OT_redo(_Overwrites, bpy.types.Operator):
+    """Create an object again from its photo, at another size."""
 
     bl_idname = "isc.redo"
-    bl_label = "Decompose Again"
+    bl_label = "Update Object"
     bl_description = (
-        "Decompose the photo of the active object at another size and update the object, "
-        "color edits are kept"
+        "Create the active object again from its photo, at another size, color edits are kept"
     )
     bl_options = {"REGISTER"}
 
     max_size: IntProperty(
         name="Size",
         description=(
-            "Longer side of the object in pixels, in maps and mesh, 0 keeps the photo's resolution"
+            "Longer side of the object in its textures, in pixels, 0 keeps the photo's resolution"
         ),
         default=512,
         min=0,
@@ -149,8 +316,8 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
             return False
         return _is_idle(cls)
 
-    def prepare(self, context: Any) -> WorkerRun:
-        """Create the run; see `WorkerOperator`.
+    def request(self, context: Any) -> DecomposeRequest:
+        """Return the request that made the active object; see `_Overwrites`.
 
         Parameters
         ----------
@@ -159,27 +326,24 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
 
         Returns
         -------
-        WorkerRun
-            The run, not started.
+        DecomposeRequest
+            The request.
 
         Raises
         ------
         InputError
-            If no ISC object is active, the active one is a copy, the request cannot be fulfilled,
-            or a run is active.
+            If no ISC object is active, the active one is a copy, or it stores no request.
         """
         built = find_built(context.object)
         if built is None:
             raise InputError("no object made by ISC is active: select one")
         if is_copy(built.object):
             original = find_original(built.object)
-            instead = "press Decompose" if original is None else f"select {original.name}"
+            instead = "press Create Object" if original is None else f"select {original.name}"
             raise InputError(
                 f"{built.object.name} is a copy, and only the original is updated: {instead}"
             )
-        return create_decompose_run(
-            context, stored_request(built.object, built.scene, self.max_size)
-        )
+        return stored_request(built.object, built.scene, self.max_size)
 
 
 def _is_idle(operator: Any) -> bool:

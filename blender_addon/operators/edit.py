@@ -26,7 +26,7 @@ from .live_edits import settle_edits
 _LIGHTS = (
     (
         "OPTIMAL",
-        "Dominant Direction",
+        "Estimated Sun",
         "One sun along the direction that best explains the photo's shading, and uniform light",
     ),
     ("CHOSEN", "Custom Direction", "The same sun from another direction"),
@@ -246,7 +246,7 @@ class ISC_OT_own_material(EditOperator, bpy.types.Operator):
     """Give the object a material that no copy shares."""
 
     bl_idname = "isc.own_material"
-    bl_label = "Make Material Single User"
+    bl_label = "Make Material Single-User"
     bl_description = "Give the object its own material, so that edits do not change its copies"
 
     def edit(self, built: BuiltObject) -> None:
@@ -349,9 +349,7 @@ def dichromatic_inputs(built: BuiltObject | None) -> Any:
         If the node is missing, or the material is linked from another file.
     """
     if built is None or (node := dichromatic_node(built.material)) is None:
-        raise InputError(
-            "the material has no node group ISC Dichromatic: decompose the photo again"
-        )
+        raise InputError("the material has no node group ISC Dichromatic: create the object again")
     if built.material.library is not None:
         raise InputError(
             f"{built.material.name} is linked from another file: "

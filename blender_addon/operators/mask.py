@@ -1,5 +1,5 @@
-"""Masks: segmented inside a box that is drawn in the image editor or typed, or painted on a black
-image of the photo's size.
+"""Masks: segmented inside a box that is drawn on the photo or typed, or painted on a black image of
+the photo's size.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
@@ -11,6 +11,7 @@ from typing import Any
 
 import bpy
 import gpu  # type: ignore[import-not-found]
+import numpy as np
 from bpy.props import StringProperty
 from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
@@ -18,14 +19,22 @@ from isc_core.errors import InputError
 
 from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from ..worker.commands import Box, WorkerEnvironment
+from ..worker.commands import Box, WorkerEnvironment, overlay_of
 from .messages import busy_message
 from .modal import WorkerOperator
+from .photo_canvas import PhotoCanvas, shown_photo
 from .request import find_by_full_name
 from .run_steps import mask_steps
-from .worker_run import RunSteps, WorkerRun, active_run, remove_folder, require_no_active_run
+from .worker_run import (
+    RunOutput,
+    RunSteps,
+    WorkerRun,
+    active_run,
+    remove_folder,
+    require_no_active_run,
+)
 
-_MASK_OF = "isc_mask_of"
+_MASK_OF, _SHOWN_ON = "isc_mask_of", "isc_shown_on"
 _MIN_SIDE = 8
 
 
@@ -112,11 +121,11 @@ def mask_run(
     photo, scene = inspect_image(context.scene.isc.image), context.scene.name_full
     folder = create_run_folder(None, "mask")
 
-    def finish(context: Any, path: Path) -> str:
+    def finish(context: Any, output: RunOutput) -> str:
         del context
-        load_mask(path, photo.name, scene)
+        load_mask(output.path, photo.name, scene)
         remove_folder(folder)
-        return "the mask is ready: check its outline before you decompose the photo"
+        return "Mask found: check it, then press Create Object"
 
     environment = worker_environment(read_preferences(context))
     return WorkerRun(title, steps(photo, folder, environment), finish, folder)
@@ -159,6 +168,8 @@ class ISC_OT_take_mask(bpy.types.Operator):
         name = "mask" if photo is None else f"{photo.name} mask"
         mask.colorspace_settings.name = "Non-Color"
         _replace_mask(mask, name)
+        if photo is not None:
+            _set_overlay(mask, photo, overlay_of(Path(self.filepath)))
         scene.isc.mask, scene.isc.mask_source = mask, "IMAGE"
         return {"FINISHED"}
 
@@ -201,16 +212,17 @@ class ISC_OT_draw_box(bpy.types.Operator):
     """Draw a box around the object with the mouse, and cut the object out."""
 
     bl_idname = "isc.draw_box"
-    bl_label = "Draw Box"
+    bl_label = "Select Box"
     bl_description = "Cut the object out of a box drawn around it with some background"
 
     _start: tuple[int, int] | None = None
     _end: tuple[int, int] = (0, 0)
-    _handler: Any = None
+    _size: tuple[int, ...] = (0, 0)
+    _canvas: PhotoCanvas | None = None
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Return whether an image editor shows the photo and no run is active.
+        """Return whether there is a photo to draw on and no run is active.
 
         Parameters
         ----------
@@ -220,14 +232,10 @@ class ISC_OT_draw_box(bpy.types.Operator):
         Returns
         -------
         bool
-            Where False for want of the editor or its image, the tooltip gives the reason.
+            Where False for want of a photo, the tooltip gives the reason.
         """
-        if (
-            context.area is None
-            or context.area.type != "IMAGE_EDITOR"
-            or context.space_data.image is None
-        ):
-            cls.poll_message_set("Show the photo in an image editor")
+        if shown_photo(context) is None:
+            cls.poll_message_set("Open a photo first")
             return False
         return active_run() is None
 
@@ -247,14 +255,15 @@ class ISC_OT_draw_box(bpy.types.Operator):
             {"RUNNING_MODAL"}.
         """
         del event
-        context.scene.isc.image = context.space_data.image
+        settings, photo = context.scene.isc, shown_photo(context)
+        if photo not in (settings.image, settings.mask):
+            settings.image = photo
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(
             "Draw a box around the object, Esc or right mouse button to cancel"
         )
-        self._handler = bpy.types.SpaceImageEditor.draw_handler_add(
-            self._draw, (), "WINDOW", "POST_PIXEL"
-        )
+        self._size = tuple(photo.size)
+        self._canvas = PhotoCanvas(context, photo, self._draw)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -274,18 +283,19 @@ class ISC_OT_draw_box(bpy.types.Operator):
             {"RUNNING_MODAL"} or {"PASS_THROUGH"} while drawing; {"FINISHED"} with a box;
             {"CANCELLED"} on Esc, the right mouse button or too small a box.
         """
-        region = canvas(context)
-        position = (event.mouse_x - region.x, event.mouse_y - region.y)
+        if self._canvas is None:
+            return {"CANCELLED"}
+        position = self._canvas.position(event)
         if event.type in {"ESC", "RIGHTMOUSE"}:
             return self._leave(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self._start = self._end = position
         elif event.type == "MOUSEMOVE" and self._start is not None:
             self._end = position
-            region.tag_redraw()
+            self._canvas.region.tag_redraw()
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._start is not None:
             self._end = position
-            return self._finish(context, region)
+            return self._finish(context, self._canvas)
         elif self._start is None:
             return {"PASS_THROUGH"}  # so that the view can still be moved
         return {"RUNNING_MODAL"}
@@ -300,12 +310,9 @@ class ISC_OT_draw_box(bpy.types.Operator):
         """
         self._leave(context, set())
 
-    def _finish(self, context: Any, region: Any) -> set[str]:
-        corners = [
-            region.view2d.region_to_view(*corner)
-            for corner in (self._start or self._end, self._end)
-        ]
-        box = box_from_corners(corners[0], corners[1], tuple(context.space_data.image.size))
+    def _finish(self, context: Any, canvas: PhotoCanvas) -> set[str]:
+        first, second = (canvas.place(corner) for corner in (self._start or self._end, self._end))
+        box = box_from_corners(first, second, self._size)
         self._leave(context, set())
         if box is None:
             self.report({"WARNING"}, _small_box_message())
@@ -315,12 +322,11 @@ class ISC_OT_draw_box(bpy.types.Operator):
         return {"FINISHED"}
 
     def _leave(self, context: Any, result: set[str]) -> set[str]:
-        if self._handler is not None:
-            bpy.types.SpaceImageEditor.draw_handler_remove(self._handler, "WINDOW")
-            self._handler = None
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
             context.window.cursor_modal_restore()
             context.workspace.status_text_set(None)
-            canvas(context).tag_redraw()
         return result
 
     def _draw(self) -> None:
@@ -361,10 +367,38 @@ def box_from_corners(
 
 
 def _small_box_message() -> str:
-    return (
-        f"the box is less than {_MIN_SIDE} pixels wide or high: "
-        "draw it around the object in the image editor"
-    )
+    return f"the box is less than {_MIN_SIDE} pixels wide or high: draw it around the object"
+
+
+def _set_overlay(mask: Any, photo: Any, path: Path) -> None:
+    """Make the picture of the mask on its photo the preview of the mask."""
+    if not path.is_file():
+        return
+    picture = bpy.data.images.load(str(path))
+    width, height = picture.size
+    pixels = np.empty(4 * width * height, np.float32)
+    picture.pixels.foreach_get(pixels)
+    bpy.data.images.remove(picture)
+    preview = mask.preview_ensure()
+    preview.image_size = width, height
+    preview.image_pixels_float.foreach_set(pixels)
+    mask[_SHOWN_ON] = photo
+
+
+def mask_shown_on(mask: Any) -> Any:
+    """Return the photo on which the preview of a mask shows it.
+
+    Parameters
+    ----------
+    mask : bpy.types.Image
+        The mask.
+
+    Returns
+    -------
+    bpy.types.Image or None
+        None where the preview shows something else, as after the mask was painted on.
+    """
+    return None if mask.is_dirty else mask.get(_SHOWN_ON)
 
 
 def load_mask(path: Path, image: str, scene: str) -> None:
@@ -425,18 +459,3 @@ def can_cut(operator: Any, context: Any) -> bool:
     if present is not None:
         operator.poll_message_set(busy_message(present.title))
     return present is None
-
-
-def canvas(context: Any) -> Any:
-    """Return the region that shows the image; the button may be in the sidebar.
-
-    Parameters
-    ----------
-    context : bpy.types.Context
-        Blender's context.
-
-    Returns
-    -------
-    bpy.types.Region
-    """
-    return next(region for region in context.area.regions if region.type == "WINDOW")

@@ -1,4 +1,4 @@
-"""Masks found by the looks of the photo; clicks in the image editor say what is meant."""
+"""Masks found by the looks of the photo; clicks on the photo say what is meant."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
@@ -10,8 +10,9 @@ from bpy.props import BoolProperty
 
 from isc_core.errors import InputError
 
-from .mask import can_cut, canvas, mask_run
+from .mask import can_cut, mask_run
 from .modal import WorkerOperator
+from .photo_canvas import PhotoCanvas, shown_photo
 from .run_steps import auto_mask_steps
 from .worker_run import WorkerRun, active_run, require_no_active_run
 
@@ -82,9 +83,12 @@ class ISC_OT_mark_point(bpy.types.Operator):
         name="Background", description="The point does not belong to the object"
     )
 
+    _size: tuple[int, ...] = (0, 0)
+    _canvas: PhotoCanvas | None = None
+
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Return whether an image editor shows the photo and no run is active.
+        """Return whether there is a photo to click on and no run is active.
 
         Parameters
         ----------
@@ -94,14 +98,10 @@ class ISC_OT_mark_point(bpy.types.Operator):
         Returns
         -------
         bool
-            Where False for want of the editor or its image, the tooltip gives the reason.
+            Where False for want of a photo, the tooltip gives the reason.
         """
-        if (
-            context.area is None
-            or context.area.type != "IMAGE_EDITOR"
-            or context.space_data.image is None
-        ):
-            cls.poll_message_set("Show the photo in an image editor")
+        if shown_photo(context) is None:
+            cls.poll_message_set("Open a photo first")
             return False
         return active_run() is None
 
@@ -121,13 +121,15 @@ class ISC_OT_mark_point(bpy.types.Operator):
             {"RUNNING_MODAL"}.
         """
         del event
-        settings, shown = context.scene.isc, context.space_data.image
+        settings, shown = context.scene.isc, shown_photo(context)
         if shown not in (settings.image, settings.mask):
             settings.image = shown
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(
             "Click on the background" if self.background else "Click on the object"
         )
+        self._size = tuple(shown.size)
+        self._canvas = PhotoCanvas(context, shown)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -149,11 +151,9 @@ class ISC_OT_mark_point(bpy.types.Operator):
         """
         if event.type in {"ESC", "RIGHTMOUSE"}:
             return self._leave(context, {"CANCELLED"})
-        if event.type != "LEFTMOUSE" or event.value != "PRESS":
+        if event.type != "LEFTMOUSE" or event.value != "PRESS" or self._canvas is None:
             return {"PASS_THROUGH"}
-        region = canvas(context)
-        place = region.view2d.region_to_view(event.mouse_x - region.x, event.mouse_y - region.y)
-        point = point_at(place, tuple(context.space_data.image.size))
+        point = point_at(self._canvas.place(self._canvas.position(event)), self._size)
         self._leave(context, set())
         if point is None:
             self.report({"WARNING"}, "the point lies outside of the photo: click on the photo")
@@ -175,6 +175,9 @@ class ISC_OT_mark_point(bpy.types.Operator):
         self._leave(context, set())
 
     def _leave(self, context: Any, result: set[str]) -> set[str]:
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
         context.window.cursor_modal_restore()
         context.workspace.status_text_set(None)
         return result

@@ -11,6 +11,7 @@ from typing import Any
 import bpy
 
 REPORT = "ISC Report"
+NOTE = "note: "  # begins notes that advise something
 _FIELDS = {
     "--max-size": "Size",
     "--illumination": "Light",
@@ -25,7 +26,8 @@ _FIELDS = {
 }
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
-_MASK_ADVICE = "choose a mask image, or make one with Add Point or Draw Box"
+_MOST_SECONDS = 90  # more are shown in minutes
+_MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 
 
 def translate_message(message: str, names: Mapping[str, str]) -> str:
@@ -51,6 +53,21 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
     for option, field in _FIELDS.items():
         message = re.sub(rf"{option}(?![\w-])=?", field, message)
     return message
+
+
+def is_about_mask(message: str) -> bool:
+    """Return whether a message advises to make a mask.
+
+    Parameters
+    ----------
+    message : str
+        A message of the window.
+
+    Returns
+    -------
+    bool
+    """
+    return _MASK_ADVICE in message
 
 
 def join_notes(lines: Iterable[str]) -> str:
@@ -103,6 +120,28 @@ def progress_message(title: str, stage: str, fraction: float) -> str:
         Title, stage and percentage, and that Esc cancels.
     """
     return f"{title}: {stage} ({100 * fraction:.0f} %), Esc to cancel"
+
+
+def stage_text(stage: str, seconds_left: float | None) -> str:
+    """Return the name of a stage with the time that is left.
+
+    Parameters
+    ----------
+    stage : str
+        The stage.
+    seconds_left : float or None
+        Estimate of the time until the end of the run; None if unknown.
+
+    Returns
+    -------
+    str
+        For example "shape and light, about 20 s left".
+    """
+    if seconds_left is None:
+        return stage
+    if seconds_left < _MOST_SECONDS:
+        return f"{stage}, about {max(5 * round(seconds_left / 5), 5)} s left"
+    return f"{stage}, about {round(seconds_left / 60)} min left"
 
 
 def write_report(title: str, message: str, log: str) -> Any:

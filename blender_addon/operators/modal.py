@@ -14,7 +14,7 @@ import bpy
 
 from isc_core.errors import InputError
 
-from .messages import progress_message, write_report
+from .messages import progress_message, stage_text, write_report
 from .worker_run import RunState, WorkerRun, active_run, begin_run, cancel_active_run
 
 POLL_SECONDS = 0.1
@@ -207,13 +207,14 @@ def update_display(context: Any, run: WorkerRun, remark: str = "") -> None:
         Text to show instead of the stage.
     """
     shown, status = context.window_manager.isc, run.status
-    stage = remark or status.stage
+    stage = remark or stage_text(status.stage, status.seconds_left)
     shown.longest_call_ms, shown.import_ms = run.longest_call_ms, run.import_ms
     # Redraw only when something visible has changed, not ten times a second.
     now = (run.title, str(status.state), stage, round(status.fraction, 2), status.message)
     if now == (shown.title, shown.state, shown.stage, round(shown.fraction, 2), shown.message):
         return
     shown.title, shown.state, shown.stage, shown.fraction, shown.message = now
+    shown.notes = "\n".join(status.notes)
     text = None if run.ended else progress_message(run.title, stage, status.fraction)
     _set_status_text(context, text)
     redraw_panels(context)

@@ -43,14 +43,14 @@ class MethodSettings:
     model: str = "joint"
     separator: str = "isc"
     illumination: str = "photo"
-    max_size: int = 256
+    max_size: int = 512
     samples: int = 64
     camera: str = "auto"
 
 
 @dataclass(frozen=True)
 class DecomposeRequest:
-    """One decomposition and what to build of its result.
+    """One photo to decompose, and what to build of its result.
 
     Images and scenes are given by their full names: undo replaces the datablocks themselves. The
     field names are part of the JSON text that files store.
@@ -110,7 +110,7 @@ def request_from_json(text: str) -> DecomposeRequest:
         return _from_known_fields(DecomposeRequest, {**stored, **parts})
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
-            "the object does not store how it was made: decompose its photo again"
+            "the object does not store how it was made: create it from its photo again"
         ) from error
 
 
@@ -138,12 +138,12 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
     masked = settings.mask_source == "IMAGE"
     if masked and settings.mask is None:
         raise InputError(
-            "no mask image is selected: choose one, cut one out with Draw Box, "
-            "or set Mask to From Photo"
+            "no mask image is selected: choose one, cut one out with Select Box, "
+            "or set Mask to Automatic"
         )
     if masked and settings.mask == settings.image:
         raise InputError(
-            "the mask is the photo itself: choose another image, or set Mask to From Photo"
+            "the mask is the photo itself: choose another image, or set Mask to Automatic"
         )
     return DecomposeRequest(
         image=settings.image.name_full,
@@ -190,7 +190,9 @@ def build_options(settings: Any, name: str) -> BuildOptions:
         if part.name in offered
     }
     own_shadows = OWN_SHADOWS[settings.shadows]
-    return BuildOptions(**{**chosen, "own_shadows": own_shadows, "name": name})
+    return BuildOptions(
+        **{**chosen, "own_shadows": own_shadows, "photo_resolution": True, "name": name}
+    )
 
 
 def inspect_images(
@@ -323,7 +325,7 @@ def stored_request(obj: Any, scene: Any, max_size: int) -> DecomposeRequest:
         if (name or role == _IMAGE) and obj.get(role) is None:
             what = "photo" if role == _IMAGE else "mask"
             raise InputError(
-                f"the {what} of {obj.name} is not in this file: open it, and press Decompose"
+                f"the {what} of {obj.name} is not in this file: open it, and press Create Object"
             )
     return replace(
         request,

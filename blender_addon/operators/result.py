@@ -2,6 +2,7 @@
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import ARRAYS, DESCRIPTION, read_result
+from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_result
 from ..scene.build import BuiltObject, build_object, find_built
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .modal import WorkerOperator
@@ -22,20 +23,29 @@ from .request import (
     store_request,
 )
 from .run_steps import arrays_steps
-from .worker_run import WorkerRun, require_no_active_run
+from .viewport import activate, show, started_in
+from .worker_run import RunOutput, WorkerRun, require_no_active_run
+
+# Results that a run has read in a thread, until they are built: operators take plain values only.
+_read: dict[str, ResultArrays] = {}
+_CAME_FROM = "isc_came_from"
 
 
-def build_as_undo_step(context: Any, folder: Path, request: DecomposeRequest | None = None) -> str:
-    """Build the result of a folder as one undo step.
+def build_as_undo_step(
+    context: Any, output: RunOutput, request: DecomposeRequest | None = None, view: int = 0
+) -> str:
+    """Build the result of a folder as one undo step, and show it.
 
     Parameters
     ----------
     context : bpy.types.Context
         Ignored: building changes the scene and the object that are active.
-    folder : Path
+    output : RunOutput
         Result folder with arrays.
     request : DecomposeRequest, optional
         What to build; None uses the panel's settings.
+    view : int, optional
+        The 3D view to show it in, see `viewport.started_in`.
 
     Returns
     -------
@@ -48,23 +58,33 @@ def build_as_undo_step(context: Any, folder: Path, request: DecomposeRequest | N
         If the result cannot be built.
     """
     del context
-    text = "" if request is None else request.to_json()
+    request = request or _panel_request(bpy.context.scene)
+    before = set(bpy.data.objects)
+    folder = str(output.path)
+    if output.result is not None:
+        _read[folder] = output.result
     try:
         # From Python, an operator pushes an undo step only if told to.
-        bpy.ops.isc.build_result("EXEC_DEFAULT", True, directory=str(folder), request=text)
+        bpy.ops.isc.build_result("EXEC_DEFAULT", True, directory=folder, request=request.to_json())
     except RuntimeError as error:
         raise InputError(str(error).strip().splitlines()[0].removeprefix("Error: ")) from error
+    finally:
+        _read.pop(folder, None)
     built = find_built(bpy.context.object)
     if built is None:
-        return "the result is in the scene"
-    return f"{built.object.name}: built in the scene {built.scene.name}"
+        return "the object is in the scene"
+    if built.object in before:
+        return f"{built.object.name} updated"
+    show(bpy.context, built, request.build.own_scene, view)
+    where = f"in the scene {built.scene.name}" if request.build.own_scene else "at the 3D cursor"
+    return f"{built.object.name} created {where}"
 
 
 class ISC_OT_build_result(bpy.types.Operator):
     """Build the object of a result folder."""
 
     bl_idname = "isc.build_result"
-    bl_label = "Build Result"
+    bl_label = "Create Object of Result"
     bl_description = (
         "Build the object of a result folder, or update the object built from the same photo"
     )
@@ -94,7 +114,7 @@ class ISC_OT_build_result(bpy.types.Operator):
             request = (
                 request_from_json(self.request) if self.request else _panel_request(context.scene)
             )
-            result = read_result(Path(self.directory))
+            result = _read.get(self.directory) or read_result(Path(self.directory))
             scene = find_by_full_name(bpy.data.scenes, request.scene) or context.scene
             photo = find_by_full_name(bpy.data.images, request.image)
             built = build_object(result, request.build, scene=scene, photo=photo)
@@ -102,7 +122,7 @@ class ISC_OT_build_result(bpy.types.Operator):
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         _complete(built, request, scene)
-        _activate(context, built)
+        activate(context, built)
         return {"FINISHED"}
 
 
@@ -161,7 +181,8 @@ class ISC_OT_import_result(bpy.types.Operator):
         if not (folder / ARRAYS).is_file():
             return set(bpy.ops.isc.complete_result("INVOKE_DEFAULT", directory=str(folder)))
         try:
-            self.report({"INFO"}, build_as_undo_step(context, folder))
+            view = started_in(context)
+            self.report({"INFO"}, build_as_undo_step(context, RunOutput(folder), view=view))
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -199,12 +220,69 @@ class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
         require_no_active_run()
         folder = Path(self.directory)
         environment = worker_environment(read_preferences(context))
+        view = started_in(context)
         return WorkerRun(
             f"Import {folder.name}",
             arrays_steps(folder, environment),
-            build_as_undo_step,
+            lambda context, output: build_as_undo_step(context, output, view=view),
             create_run_folder(None, "import"),
         )
+
+
+class ISC_OT_return_to_scene(bpy.types.Operator):
+    """Show the scene again that an object's own scene was created from."""
+
+    bl_idname = "isc.return_to_scene"
+    bl_label = "Back to Scene"
+    bl_description = "Show the scene again in which Create Object was pressed, this one is kept"
+    bl_options = {"UNDO"}
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether the scene is an object's own and the other one still exists.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+        """
+        return context.window is not None and scene_before(context.scene) is not None
+
+    def execute(self, context: Any) -> set[str]:
+        """Show the other scene.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}.
+        """
+        context.window.scene = scene_before(context.scene)
+        return {"FINISHED"}
+
+
+def scene_before(scene: Any) -> Any:
+    """Return the scene from which an object's own scene was created.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        Any scene.
+
+    Returns
+    -------
+    bpy.types.Scene or None
+        None for other scenes, and where it was deleted.
+    """
+    return scene.get(_CAME_FROM)
 
 
 def _panel_request(scene: Any) -> DecomposeRequest:
@@ -214,10 +292,15 @@ def _panel_request(scene: Any) -> DecomposeRequest:
 def _complete(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:
     """Store what the panels need later; the object's own scene also gets the settings."""
     store_request(built.object, request)
+    photo = find_by_full_name(bpy.data.images, request.image)
+    if photo is not None and photo.packed_file is None and not photo.is_dirty:
+        with suppress(RuntimeError):  # its file is gone
+            photo.pack()
     if request.build.own_scene:
         if built.scene.render.engine == "CYCLES":
             built.scene.cycles.samples = request.method.samples
         if built.scene != scene:
+            built.scene[_CAME_FROM] = scene
             _copy_settings(scene.isc, built.scene.isc)
 
 
@@ -225,20 +308,3 @@ def _copy_settings(source: Any, target: Any) -> None:
     for name, prop in source.bl_rna.properties.items():
         if name not in {"rna_type", "name", "preset"} and not prop.is_readonly:
             setattr(target, name, getattr(source, name))
-
-
-def _activate(context: Any, built: BuiltObject) -> None:
-    """Make the object active; its own scene is shown through the photo's camera."""
-    if context.window is not None and context.window.scene != built.scene:
-        context.window.scene = built.scene
-        for area in context.window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.spaces.active.region_3d.view_perspective = "CAMERA"
-    layer = built.scene.view_layers[0] if context.window is None else context.window.view_layer
-    layer.update()  # so that it includes what was linked a moment ago
-    if built.object.name not in layer.objects:
-        return
-    for other in list(layer.objects.selected):
-        other.select_set(False, view_layer=layer)
-    built.object.select_set(True, view_layer=layer)
-    layer.objects.active = built.object

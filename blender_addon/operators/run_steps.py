@@ -2,17 +2,23 @@
 the arrays of a result.
 """
 
+import shutil
+import time
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
+from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 from isc_core.result_files.diagnostics_text import status_lines
 from isc_core.result_files.reading_notes_text import stored_note_lines
 
 from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
-from ..files.result_arrays import ARRAYS, DESCRIPTION, read_description
+from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
+from ..files.result_cache import ResultCache, content_key
 from ..worker.commands import (
     Box,
     DecomposeJob,
@@ -23,13 +29,37 @@ from ..worker.commands import (
     start_box_mask,
     start_decompose,
 )
+from ..worker.pace import Pace
 from ..worker.process import WorkerProcess, WorkerUpdate
-from .messages import join_notes, translate_message
+from .messages import translate_message
 from .request import MethodSettings
 from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
 
-_EXPORTING, _STARTING = "exporting the photo", "starting the worker"
+_EXPORTING = "exporting the photo"
+_STARTING = WorkerUpdate("starting the worker")
+_LOOKING = WorkerUpdate("looking for an earlier result")
+_READING = WorkerUpdate("reading the result", 1.0)
 RESULT = "result"
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class ResultPlace:
+    """Where the result of a run goes.
+
+    Attributes
+    ----------
+    folder : Path
+        The run's own folder; the result is written to `RESULT` in it, unless it is cached.
+    cache : ResultCache or None
+        Earlier results, to which this one is added; None to use none.
+    keep : bool
+        Whether a copy of a cached result is kept in the run's folder, without the arrays.
+    """
+
+    folder: Path
+    cache: ResultCache | None = None
+    keep: bool = False
 
 
 def decompose_steps(
@@ -37,7 +67,7 @@ def decompose_steps(
     mask: ImageSource | None,
     mask_size: tuple[int, int] | None,
     method: MethodSettings,
-    folder: Path,
+    place: ResultPlace,
     threads: int,
     environment: WorkerEnvironment,
 ) -> RunSteps:
@@ -53,8 +83,8 @@ def decompose_steps(
         Width and height to scale the mask to.
     method : MethodSettings
         How to decompose.
-    folder : Path
-        The run's folder; the result is written to `RESULT` in it.
+    place : ResultPlace
+        Where the result goes.
     threads : int
         Number of threads; 0 uses one per core.
     environment : WorkerEnvironment
@@ -63,8 +93,9 @@ def decompose_steps(
     Returns
     -------
     RunOutput
-        The result folder, with arrays.
+        The result folder, and the result as it was read from there.
     """
+    folder = place.folder
     photo_path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
     mask_path = None
     if mask is not None:
@@ -82,13 +113,67 @@ def decompose_steps(
         camera=method.camera,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
-    yield from _run_worker(lambda: start_decompose(job, environment), names)
+    result = yield from _cached_result(job, place, names, environment)
     for exported in (photo_path, mask_path):
         # Exported copies are no longer needed; the user's own files are not in the run's folder.
         if exported is not None and exported.parent == folder:
             exported.unlink(missing_ok=True)
-    notes = translate_message(result_notes(folder / RESULT), {})
-    return RunOutput(folder / RESULT, notes)
+    notes = tuple(translate_message(note, {}) for note in result_notes(result.folder))
+    return RunOutput(result.folder, notes, result)
+
+
+def _cached_result(
+    job: DecomposeJob,
+    place: ResultPlace,
+    names: Mapping[str, str],
+    environment: WorkerEnvironment,
+) -> Generator[WorkerUpdate, None, ResultArrays]:
+    """The result of a job: an earlier one of the same content, or a worker's."""
+    cache, key, result = place.cache, "", None
+    if cache is not None:
+        key = yield from _in_thread(partial(_job_key, job, environment), _LOOKING)
+    if cache is not None and key:
+        job = replace(job, output=cache.place(key))
+        result = yield from _in_thread(partial(cache.read, key), _LOOKING)
+    if result is None:
+        worker = _run_worker(lambda: start_decompose(job, environment), names)
+        yield from _in_time(worker, Pace(job.max_size))
+        result = yield from _in_thread(partial(read_result, job.output), _READING)
+    if cache is not None and key:
+        yield from _in_thread(partial(cache.trim, key), _READING)
+        if place.keep:
+            kept = place.folder / RESULT
+            yield from _in_thread(partial(_copy_result, job.output, kept), _READING)
+            result = replace(result, folder=kept)
+    return result
+
+
+def _job_key(job: DecomposeJob, environment: WorkerEnvironment) -> str:
+    """The key of a job in the cache; "" if there can be none."""
+    settings = astuple(replace(job, photo=Path(), output=Path(), mask=None, threads=0))
+    with suppress(OSError):
+        job_files = (job.photo, job.mask)
+        return content_key(job_files, map(str, settings), environment.search[0] / "isc_core")
+    return ""
+
+
+def _copy_result(source: Path, target: Path) -> None:
+    shutil.copytree(source, target, ignore=shutil.ignore_patterns(ARRAYS))
+
+
+def _in_time(
+    updates: Generator[WorkerUpdate, None, WorkerUpdate], pace: Pace
+) -> Generator[WorkerUpdate, None, WorkerUpdate]:
+    """Progress that grows with the time, and the time left."""
+    began = time.monotonic()
+    try:
+        while True:
+            yield pace.at(next(updates), time.monotonic() - began)
+    except StopIteration as stop:
+        last: WorkerUpdate = stop.value
+        return last
+    finally:
+        updates.close()
 
 
 def mask_steps(
@@ -190,8 +275,8 @@ def arrays_steps(result: Path, environment: WorkerEnvironment) -> RunSteps:
     return RunOutput(result)
 
 
-def result_notes(result: Path) -> str:
-    """Return the notes on a result in one line, "" if there are none.
+def result_notes(result: Path) -> list[str]:
+    """Return the notes on a result.
 
     Parameters
     ----------
@@ -200,8 +285,9 @@ def result_notes(result: Path) -> str:
 
     Returns
     -------
-    str
-        For example why the solver stopped early, or which assumptions do not hold.
+    list of str
+        For example why the solver stopped early, or which assumptions do not hold. Those that
+        advise something begin with "note: ".
 
     Raises
     ------
@@ -211,37 +297,39 @@ def result_notes(result: Path) -> str:
     description = read_description(result / DESCRIPTION)
     source = description.get("input")
     stored = source.get("reading_notes") if isinstance(source, dict) else None
-    return join_notes([*stored_note_lines(stored), *status_lines(description.get("status", {}))])
+    return [*stored_note_lines(stored), *status_lines(description.get("status", {}))]
 
 
 def _run_worker(
     start: Callable[[], WorkerProcess], names: Mapping[str, str]
 ) -> Generator[WorkerUpdate, None, WorkerUpdate]:
     """Start a worker and follow it; `names` are those of images by path, for its messages."""
-    worker = yield from _start_in_thread(start)
+    worker = yield from _in_thread(start, _STARTING, _kill_started)
     try:
         return (yield from follow_worker(worker))
     except WorkerFailed as failure:
         raise WorkerFailed(translate_message(str(failure), names), failure.log) from failure
 
 
-def _start_in_thread(
-    start: Callable[[], WorkerProcess],
-) -> Generator[WorkerUpdate, None, WorkerProcess]:
-    """On a busy machine, starting a process of a large program may block the window too long."""
+def _in_thread(
+    work: Callable[[], T],
+    shown: WorkerUpdate,
+    undo: Callable[[Future[T]], None] | None = None,
+) -> Generator[WorkerUpdate, None, T]:
+    """Work that may block the window too long; even starting a process may, on a busy machine."""
     pool = ThreadPoolExecutor(1)
-    starting = pool.submit(start)
+    working = pool.submit(work)
     pool.shutdown(wait=False)
     returned = False
     try:
-        yield WorkerUpdate(_STARTING)
-        while not starting.done():
-            yield WorkerUpdate(_STARTING)
+        yield shown
+        while not working.done():
+            yield shown
         returned = True
-        return starting.result()
+        return working.result()
     finally:
-        if not returned:  # cancelled in the meantime
-            starting.add_done_callback(_kill_started)
+        if not returned and undo is not None:  # cancelled in the meantime
+            working.add_done_callback(undo)
 
 
 def _kill_started(started: Future[WorkerProcess]) -> None:

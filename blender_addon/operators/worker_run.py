@@ -20,6 +20,7 @@ from typing import Any
 
 from isc_core.errors import InputError
 
+from ..files.result_arrays import ResultArrays
 from ..worker.process import WorkerProcess, WorkerState, WorkerUpdate
 from .messages import busy_message
 
@@ -32,12 +33,15 @@ class RunOutput:
     ----------
     path : Path
         File or folder.
-    notes : str
-        Notes on the result, one line or empty.
+    notes : tuple of str
+        Notes on the result; those that advise something begin with "note: ".
+    result : ResultArrays or None
+        What was read from the folder, if it was read.
     """
 
     path: Path
-    notes: str = ""
+    notes: tuple[str, ...] = ()
+    result: ResultArrays | None = None
 
 
 RunSteps = Generator[WorkerUpdate, None, RunOutput]
@@ -70,15 +74,21 @@ class RunStatus:
         Share of the work that is done, in [0, 1].
     message : str
         The outcome, one line.
+    notes : tuple of str
+        Notes on the result; those that advise something begin with "note: ".
     log : str
         Last part of the worker's log, if it failed.
+    seconds_left : float or None
+        Estimate of the time until the end.
     """
 
     state: RunState = RunState.RUNNING
     stage: str = "starting"
     fraction: float = 0.0
     message: str = ""
+    notes: tuple[str, ...] = ()
     log: str = ""
+    seconds_left: float | None = None
 
 
 class WorkerFailed(Exception):
@@ -107,8 +117,8 @@ class WorkerRun:
     steps : RunSteps
         The work.
     finish : callable
-        Called with Blender's context and the output path; imports the result and returns one line
-        on it. It decides what is kept of the folder.
+        Called with Blender's context and the output; imports the result and returns one line on
+        it. It decides what is kept of the folder.
     folder : Path
         The run's own folder, deleted unless the run succeeds.
 
@@ -127,7 +137,7 @@ class WorkerRun:
     """
 
     def __init__(
-        self, title: str, steps: RunSteps, finish: Callable[[Any, Path], str], folder: Path
+        self, title: str, steps: RunSteps, finish: Callable[[Any, RunOutput], str], folder: Path
     ) -> None:
         self.title = title
         self.folder = folder
@@ -186,8 +196,9 @@ class WorkerRun:
             return self.status
         began = time.perf_counter()
         with self._ended_by_errors():
-            outcome, notes = self._finish(context, self._output.path), self._output.notes
-            self._end(RunState.DONE, f"{outcome}; {notes}" if notes else outcome)
+            outcome = self._finish(context, self._output)
+            self.status = replace(self.status, notes=self._output.notes)
+            self._end(RunState.DONE, outcome)
         self.import_ms = 1e3 * (time.perf_counter() - began)
         return self.status
 
@@ -209,7 +220,12 @@ class WorkerRun:
         with self._ended_by_errors():
             try:
                 update = next(self._steps)
-                self.status = RunStatus(RunState.RUNNING, update.stage, update.fraction)
+                self.status = RunStatus(
+                    RunState.RUNNING,
+                    update.stage,
+                    update.fraction,
+                    seconds_left=update.seconds_left,
+                )
             except StopIteration as stop:
                 self._output = stop.value
                 self.status = RunStatus(RunState.READY, "building the scene", 1.0)

@@ -182,6 +182,7 @@ def select_photo(photo: Any) -> None:
         The photo; the longer side of its object is set to 64 pixels.
     """
     settings = bpy.context.scene.isc
+    settings.own_scene = True
     settings.image, settings.max_size = photo, 64
 
 

@@ -14,9 +14,16 @@ from ..files.result_arrays import ResultArrays
 from .camera import ensure_camera, eye_of, set_render_size
 from .camera_background import set_background_photo
 from .closed_back import close_back
-from .collection import ensure_collection, ensure_scene, link_object, use_standard_view
+from .collection import (
+    ensure_collection,
+    ensure_optional_part,
+    ensure_scene,
+    link_object,
+    use_standard_view,
+)
 from .copies import COPY, OBJECT, find_material
 from .displacement import add_displacement, flatten, remove_displacement
+from .hand_edits import remember_mesh
 from .images import (
     COLOR,
     DATA,
@@ -30,6 +37,7 @@ from .images import (
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
 from .mesh import fill_mesh, front_geometry
 from .photo_highlights import forget_view
+from .placement import free_place
 from .provenance import (
     KEY,
     PHOTO_HASH,
@@ -44,11 +52,12 @@ from .provenance import (
     write_provenance,
 )
 from .specular_share import specular_share
-from .sun import relight
+from .sun import ensure_sun, relight
 from .world import ensure_world
 
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
+LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 _DEFAULT_ROUGHNESS = 0.5
 # Distance of the back from the furthest point of the front, relative to the size.
 _BACK_DISTANCE = 0.02
@@ -65,10 +74,16 @@ class BuildOptions:
     size_metres : float
         Longer side of the object.
     own_scene : bool
-        Whether to build in a new scene. In a shared scene, world, active camera, resolution and
-        view transform change only with the next four options.
+        Whether to build in a new scene. In a shared scene, a new object stands at the 3D cursor,
+        and world, active camera, resolution and view transform change only with the next four
+        options.
     set_world, set_camera, set_resolution, set_view_transform : bool
         What of a shared scene may change.
+    light_and_camera : bool
+        Whether the photo's camera and the estimated sun come along into a shared scene, in a
+        collection of their own that is unchecked at first. A new scene always has the camera.
+    photo_resolution : bool
+        Whether renders have the photo's resolution instead of that of the maps.
     sun : bool
         Whether to use a sun and uniform light instead of the environment map.
     displacement : bool
@@ -82,6 +97,8 @@ class BuildOptions:
         Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
         already contains those of the photo, so the object looks as in the photo without them. None
         enables them for a new object in a shared scene, and keeps those of an existing object.
+    all_maps : bool
+        Whether the file also holds the layers and maps that neither material nor exports use.
     name : str
         Name of the object; "" for the result's own.
     """
@@ -92,11 +109,14 @@ class BuildOptions:
     set_camera: bool = False
     set_resolution: bool = False
     set_view_transform: bool = False
+    light_and_camera: bool = True
+    photo_resolution: bool = False
     sun: bool = False
     displacement: bool = False
     closed_back: bool = False
     specular_from: SpecularSource = "lobe"
     own_shadows: bool | None = None
+    all_maps: bool = True
     name: str = ""
 
 
@@ -110,7 +130,7 @@ class BuiltObject:
         Collection of everything built of the photo.
     object : bpy.types.Object
         The object.
-    camera : bpy.types.Object
+    camera : bpy.types.Object or None
         The photo's camera.
     world : bpy.types.World
         The recovered light; a shared scene uses it only if requested.
@@ -122,7 +142,7 @@ class BuiltObject:
 
     collection: bpy.types.Collection
     object: bpy.types.Object
-    camera: bpy.types.Object
+    camera: bpy.types.Object | None
     world: bpy.types.World
     scene: bpy.types.Scene
     material: bpy.types.Material
@@ -166,16 +186,17 @@ def build_object(
     _require_ready(key, options, scene or bpy.context.scene)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
-    maps = ensure_maps(key, result)
+    maps = ensure_maps(key, result, options.all_maps)
     specular = _specular_settings(result, options)
     material = ensure_material(key, _material_maps(key, result, maps, specular.share), specular)
+    is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
     obj = _ensure_object(key, collection, result, options, material)
+    if is_new and not options.own_scene:
+        obj.location = free_place(obj, scene)
     attach_maps(obj, maps)
-    camera = ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
     if photo is None:
         alpha = result.mask.astype(np.float32)
         photo = ensure_image(key, "photo", result.image, COLOR, alpha)
-    set_background_photo(camera, photo)
     environment_map = ensure_image(key, "environment_map", result.environment_map, COLOR)
     world = ensure_world(key, environment_map, result.sun_ambient, options.sun)
     # Saves and appends the light with the object, whether or not a scene uses it.
@@ -183,6 +204,9 @@ def build_object(
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))
     relight(obj, options.sun)
+    camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
+    if camera is not None:
+        set_background_photo(camera, photo)
     built = BuiltObject(collection, obj, camera, world, scene, material)
     _set_scene(built, options, result)
     forget_view(material)  # the layer of highlights belongs to what is seen now
@@ -254,7 +278,7 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
     if not options.own_scene and scene.library is not None:
         raise InputError(
             f"the scene {scene.name} is linked from another file and cannot be changed: "
-            "enable Own Scene"
+            "enable New Scene"
         )
     if options.displacement and options.closed_back:
         raise InputError("a displaced grid has no back: choose Displacement or Closed Back")
@@ -291,9 +315,29 @@ def _ensure_object(
             geometry = close_back(geometry, _BACK_DISTANCE * options.size_metres, eye)
         fill_mesh(obj.data, geometry)
         remove_displacement(key, obj)
+    remember_mesh(obj.data)
     if not obj.data.materials:
         obj.data.materials.append(material)
     return obj
+
+
+def _ensure_camera_and_light(
+    key: str,
+    collection: bpy.types.Collection,
+    obj: bpy.types.Object,
+    result: ResultArrays,
+    options: BuildOptions,
+    scene: bpy.types.Scene,
+) -> bpy.types.Object | None:
+    """The photo's camera; in a shared scene in a part of its own, with a sun, if wanted at all."""
+    if not options.own_scene and not (options.light_and_camera or options.set_camera):
+        return find_tagged(bpy.data.objects, key, "camera")
+    if not options.own_scene:
+        shown = options.set_camera or options.sun
+        collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
+        if options.light_and_camera and not options.sun:
+            ensure_sun(key, collection, result.sun_direction, result.sun_strength)
+    return ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
 
 
 def _material_maps(
@@ -337,6 +381,7 @@ def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) 
     if options.set_camera:
         built.scene.camera = built.camera
     if options.set_resolution:
-        set_render_size(built.scene, result.size)
+        width, height = map(int, result.photo_size)
+        set_render_size(built.scene, (width, height) if options.photo_resolution else result.size)
     if options.set_view_transform:
         use_standard_view(built.scene)

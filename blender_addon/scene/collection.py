@@ -6,6 +6,8 @@ import bpy
 
 from .provenance import datablock_name, find_tagged, tag
 
+_PREVIEW_SAMPLES = 32
+
 
 def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
     """Find or create the collection of a photo, and link it to a scene.
@@ -48,11 +50,76 @@ def ensure_scene(key: str) -> bpy.types.Scene:
         scene = tag(bpy.data.scenes.new(datablock_name(key)), key, "scene")
         if hasattr(scene, "cycles"):  # an add-on, which may be disabled
             scene.render.engine, scene.cycles.samples = "CYCLES", 64
+            scene.cycles.preview_samples, scene.cycles.use_preview_denoising = (
+                _PREVIEW_SAMPLES,
+                True,
+            )
             # The photo's camera has already smoothed the texture: Blender's default pixel filter
             # would smooth it once more.
             scene.cycles.filter_width = 0.5
         scene.render.film_transparent = True
+        scene.eevee.taa_samples = _PREVIEW_SAMPLES
     return scene
+
+
+def ensure_optional_part(
+    key: str, collection: bpy.types.Collection, scene: bpy.types.Scene, role: str, shown: bool
+) -> bpy.types.Collection:
+    """Find or create a part of a photo's collection that a scene may leave unused.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    collection : bpy.types.Collection
+        The photo's collection, linked to the scene.
+    scene : bpy.types.Scene
+        The scene.
+    role : str
+        Purpose of the part.
+    shown : bool
+        Whether the scene uses the part. Otherwise a new part is unchecked in the Outliner: its
+        lights shine neither in the viewport nor in renders. The user's choice is kept.
+
+    Returns
+    -------
+    bpy.types.Collection
+        The part.
+    """
+    part = find_tagged(bpy.data.collections, key, role)
+    is_new = part is None
+    if is_new:
+        part = tag(bpy.data.collections.new(datablock_name(key, role)), key, role)
+        collection.children.link(part)
+    if is_new or shown:
+        for layer in scene.view_layers:
+            entry = find_layer_collection(layer.layer_collection, part)
+            if entry is not None:
+                entry.exclude = not shown
+    return part
+
+
+def find_layer_collection(
+    entry: bpy.types.LayerCollection, collection: bpy.types.Collection
+) -> bpy.types.LayerCollection | None:
+    """Find the entry of a collection in a view layer, which says whether the layer uses it.
+
+    Parameters
+    ----------
+    entry : bpy.types.LayerCollection
+        Where to begin; the view layer's own for all of it.
+    collection : bpy.types.Collection
+        The collection.
+
+    Returns
+    -------
+    bpy.types.LayerCollection or None
+        None where the view layer does not have it.
+    """
+    if entry.collection == collection:
+        return entry
+    below = (find_layer_collection(child, collection) for child in entry.children)
+    return next((found for found in below if found is not None), None)
 
 
 def link_object(obj: bpy.types.Object, collection: bpy.types.Collection) -> None:

@@ -31,6 +31,10 @@ MAPS = {
 }
 
 
+# What materials and exports need; the others are for those who want them.
+USED_MAPS = ("specular", "height", "mask")
+
+
 def require_color_spaces(*names: str) -> None:
     """Check that Blender knows some colour spaces.
 
@@ -158,8 +162,8 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
     return image
 
 
-def ensure_maps(key: str, result: ResultArrays) -> dict[str, bpy.types.Image]:
-    """Create or replace the images of all maps.
+def ensure_maps(key: str, result: ResultArrays, every: bool = True) -> dict[str, bpy.types.Image]:
+    """Create or replace the images of maps.
 
     Parameters
     ----------
@@ -167,15 +171,21 @@ def ensure_maps(key: str, result: ResultArrays) -> dict[str, bpy.types.Image]:
         Name of the photo.
     result : ResultArrays
         The result.
+    every : bool, optional
+        Whether all of `MAPS` are created, or those of `USED_MAPS`; the others are then removed.
 
     Returns
     -------
     dict of str to bpy.types.Image
         The images by map name.
     """
-    return {
-        name: ensure_image(key, name, getattr(result, name), space) for name, space in MAPS.items()
-    }
+    maps = {}
+    for name, space in MAPS.items():
+        if every or name in USED_MAPS:
+            maps[name] = ensure_image(key, name, getattr(result, name), space)
+        elif (old := find_tagged(bpy.data.images, key, name)) is not None:
+            bpy.data.images.remove(old)  # of an earlier result
+    return maps
 
 
 def attach_maps(obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
@@ -184,12 +194,15 @@ def attach_maps(obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None
     Parameters
     ----------
     obj : bpy.types.Object
-        The object; gets the properties `isc_map_...`.
+        The object; gets the properties `isc_map_...`, and loses those of other maps.
     maps : dict of str to bpy.types.Image
         The images by map name.
     """
-    for name, image in maps.items():
-        obj[f"isc_map_{name}"] = image
+    for name in MAPS:
+        if name in maps:
+            obj[f"isc_map_{name}"] = maps[name]
+        elif f"isc_map_{name}" in obj:
+            del obj[f"isc_map_{name}"]
 
 
 def _replace(old: bpy.types.Image, new: bpy.types.Image) -> None:

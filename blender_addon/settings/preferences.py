@@ -1,4 +1,6 @@
-"""The add-on's preferences: number of threads, folders of compiled kernels and of results."""
+"""The add-on's preferences: number of threads, folders of compiled kernels and of results, and how
+many results are kept for the next run.
+"""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 
 import importlib.util
@@ -13,8 +15,10 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..files.result_cache import ResultCache
 from ..worker.commands import WorkerEnvironment
 
+_GIGABYTE, _USUAL_GIGABYTES = 1 << 30, 4
 _ROOT = Path(__file__).resolve().parents[1]
 # The package that Blender registers is the parent of this one.
 ADDON = (__package__ or "").rpartition(".")[0]
@@ -32,11 +36,14 @@ class PreferenceValues:
         Folder of compiled kernels.
     results : Path or None
         Folder of results to keep; None keeps none.
+    earlier : ResultCache or None
+        Results of earlier runs; None to use none.
     """
 
     threads: int
     cache: Path
     results: Path | None
+    earlier: ResultCache | None = None
 
 
 class ISC_AP_preferences(bpy.types.AddonPreferences):
@@ -54,10 +61,20 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
     cache_folder: StringProperty(
         name="Cache Folder",
         description=(
-            "Folder for compiled kernels and kept results, empty uses the extension's own folder"
+            "Folder for compiled kernels and results, empty uses the extension's own folder"
         ),
         subtype="DIR_PATH",
         default="",
+    )
+    cache_limit: IntProperty(
+        name="Cache Limit",
+        description=(
+            "Size in gigabytes of the results that are kept so that the same photo with the same "
+            "settings is ready at once, the oldest are removed first, 0 keeps none"
+        ),
+        default=_USUAL_GIGABYTES,
+        min=0,
+        max=1000,
     )
     keep_results: BoolProperty(
         name="Keep Result Folders",
@@ -81,6 +98,7 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
         layout.use_property_split = True
         layout.prop(self, "threads")
         layout.prop(self, "cache_folder")
+        layout.prop(self, "cache_limit")
         layout.prop(self, "keep_results")
         if self.keep_results:
             folder = _base_folder(self.cache_folder) / "results"
@@ -103,10 +121,17 @@ def read_preferences(context: Any) -> PreferenceValues:
     addon = context.preferences.addons.get(ADDON)
     stored = None if addon is None else addon.preferences
     if stored is None:
-        return PreferenceValues(0, _base_folder("") / "kernels", None)
+        # Not installed: results are kept for as long as this Blender runs.
+        earlier = ResultCache(Path(bpy.app.tempdir) / "earlier", _USUAL_GIGABYTES * _GIGABYTE)
+        return PreferenceValues(0, _base_folder("") / "kernels", None, earlier)
     base = _base_folder(stored.cache_folder)
     return PreferenceValues(
-        stored.threads, base / "kernels", base / "results" if stored.keep_results else None
+        stored.threads,
+        base / "kernels",
+        base / "results" if stored.keep_results else None,
+        ResultCache(base / "earlier", stored.cache_limit * _GIGABYTE)
+        if stored.cache_limit
+        else None,
     )
 
 

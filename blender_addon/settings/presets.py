@@ -1,4 +1,8 @@
-"""Presets of resolution, model and samples, from fast to detailed."""
+"""Presets of size, model and samples, from fast to detailed.
+
+The overall shape is solved at 256 pixels in all of them: the presets differ in the textures, in the
+fine relief, and in the time. Times are of photos of 2,400 pixels on two cores.
+"""
 
 from dataclasses import dataclass
 
@@ -29,9 +33,18 @@ class Preset:
 
 
 PRESETS = {
-    "DRAFT": Preset("Draft", "Coarse shape within seconds", 128, "joint", 16),
-    "STANDARD": Preset("Standard", "Good balance for most objects", 256, "joint", 64),
-    "FULL": Preset("Full", "Most detailed textures, in a minute or more", 512, "joint", 256),
+    "DRAFT": Preset(
+        "Draft", "Textures of 256 pixels, in about 10 s on two cores", 256, "joint", 16
+    ),
+    "STANDARD": Preset(
+        "Standard", "Textures of 512 pixels, in about 10 s on two cores", 512, "joint", 64
+    ),
+    "HIGH": Preset(
+        "High", "Textures of 1024 pixels, in about 20 s on two cores", 1024, "joint", 128
+    ),
+    "ULTRA": Preset(
+        "Ultra", "Textures of 2048 pixels, in about 40 s on two cores", 2048, "joint", 256
+    ),
 }
 CUSTOM = "CUSTOM"
 

@@ -106,8 +106,8 @@ CAMERAS = _numbered(
 MASK_SOURCES = _numbered(
     (
         "ALPHA",
-        "From Photo",
-        "Use the photo's transparency, or its black background, or find the object that stands out",
+        "Automatic",
+        "Use the photo's transparency, or its black background, else find the object",
     ),
     (
         "IMAGE",
@@ -118,17 +118,17 @@ MASK_SOURCES = _numbered(
 SPECULAR_SOURCES = _numbered(
     (
         "lobe",
-        "Fitted Lobe",
-        "Use the fitted roughness and specular level, highlights move with light and view",
+        "Material",
+        "Use the recovered roughness and specular level, highlights move with light and view",
     ),
-    ("image", "Image", "Use the separated highlights, fixed to the surface as in the photo"),
-    ("none", "None", "Build a diffuse object"),
+    ("image", "Photo", "Use the photo's own highlights, fixed to the surface"),
+    ("none", "None", "Create an object without highlights"),
 )
 OWN_SHADOWS_ITEMS = _numbered(
     (
         "auto",
-        "Automatic",
-        "On in a shared scene, off in the object's own scene, unchanged for an object that is "
+        "Auto",
+        "On in a scene with other objects, off in a new scene, unchanged for an object that is "
         "updated",
     ),
     (
@@ -142,7 +142,7 @@ OWN_SHADOWS_ITEMS = _numbered(
 _PRESET_NAMES = (*PRESETS, CUSTOM)
 _PRESET_ITEMS = _numbered(
     *((name, preset.label, preset.description) for name, preset in PRESETS.items()),
-    (CUSTOM, "Custom", "Values set in the Method panel"),
+    (CUSTOM, "Custom", "Values set in the panel Method"),
 )
 
 
@@ -219,7 +219,9 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     preset: EnumProperty(
         name="Preset",
-        description="Preset of size, model and samples",
+        description=(
+            "Detail of the textures, and the time that it takes, the overall shape is the same"
+        ),
         items=_PRESET_ITEMS,
         get=_get_preset,
         set=_set_preset,
@@ -258,10 +260,10 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     max_size: IntProperty(
         name="Size",
         description=(
-            "Longer side of the object in pixels, in maps and mesh, 0 keeps the photo's "
-            "resolution; time grows with the square"
+            "Longer side of the object in its textures, in pixels, 0 keeps the photo's "
+            "resolution, time grows with the square"
         ),
-        default=256,
+        default=512,
         min=0,
         max=8192,
         soft_min=64,
@@ -269,7 +271,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples per pixel of Cycles in the object's own scene",
+        description="Samples per pixel of renders in a new scene, with Cycles",
         default=64,
         min=1,
         soft_max=4096,
@@ -279,13 +281,24 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Object Size",
         description="Longer side of the object in the scene",
         subtype="DISTANCE",
-        default=0.1,
+        default=1.0,
         min=1e-4,
         soft_max=10.0,
     )
     own_scene: BoolProperty(
-        name="Own Scene",
-        description="Build the object in a new scene instead of this one",
+        name="New Scene",
+        description=(
+            "Create the object in a new scene, in the photo's light and seen by its camera, "
+            "instead of at the 3D cursor of this one"
+        ),
+        default=False,
+    )
+    light_and_camera: BoolProperty(
+        name="Light and Camera",
+        description=(
+            "Add the photo's camera and an estimated sun, in a collection that is unchecked in "
+            "the Outliner until you want it"
+        ),
         default=True,
     )
     set_world: BoolProperty(
@@ -305,30 +318,38 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         default=False,
     )
     sun: BoolProperty(
-        name="Sun",
+        name="Estimated Sun",
         description=(
-            "Light the object by a sun along the dominant direction of the light and a uniform "
-            "world"
+            "Add a sun along the photo's main direction of light, the recovered light is then "
+            "uniform"
         ),
         default=False,
     )
     displacement: BoolProperty(
         name="Displacement",
-        description="Build a flat grid with a Displace modifier instead of a mesh",
+        description="Create a flat grid with a Displace modifier instead of a mesh",
         default=False,
     )
     closed_back: BoolProperty(
         name="Closed Back", description="Close the mesh with a flat back", default=False
     )
+    all_maps: BoolProperty(
+        name="All Maps",
+        description=(
+            "Also pack the layers and maps that the material does not use into the file, such as "
+            "normals, shading and diffuse light, for compositing"
+        ),
+        default=False,
+    )
     shadows: EnumProperty(
-        name="Own Shadows",
-        description="Whether the object casts shadows and diffuse light on itself in Cycles",
+        name="Self-Shadowing",
+        description="Whether the object casts shadows and diffuse light, also on itself, in Cycles",
         items=OWN_SHADOWS_ITEMS,
         default="auto",
     )
     specular_from: EnumProperty(
         name="Highlights",
-        description="Source of the material's highlights",
+        description="Where the material's highlights come from",
         items=SPECULAR_SOURCES,
         default="image",
     )
@@ -352,6 +373,9 @@ class ISC_PG_run(bpy.types.PropertyGroup):
         options={"SKIP_SAVE"},
     )
     message: StringProperty(name="Message", description="Outcome of the run", options={"SKIP_SAVE"})
+    notes: StringProperty(
+        name="Details", description="Notes on the result, one a line", options={"SKIP_SAVE"}
+    )
     longest_call_ms: FloatProperty(
         name="Longest Call",
         description="Longest time in milliseconds for which the run has blocked the window",

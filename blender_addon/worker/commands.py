@@ -244,6 +244,7 @@ def start_box_mask(
     numbers = ",".join(map(str, box))
     # The equals sign keeps a negative number from being parsed as an option.
     words = ["mask", _absolute(photo), f"--box={numbers}", "--transfer", transfer]
+    words += ["--overlay", _absolute(overlay_of(output))]
     return _start([*words, "-o", _absolute(output)], output, environment)
 
 
@@ -281,8 +282,25 @@ def start_auto_mask(
         If the worker cannot be started.
     """
     words = ["mask", _absolute(photo), "--auto", "--transfer", transfer]
+    words += ["--overlay", _absolute(overlay_of(output))]
     words += [f"--point={x},{y}" for x, y in points] + [f"--not={x},{y}" for x, y in others]
     return _start([*words, "-o", _absolute(output)], output, environment)
+
+
+def overlay_of(mask: Path) -> Path:
+    """Return the file of the small picture that shows a mask on its photo.
+
+    Parameters
+    ----------
+    mask : Path
+        PNG file of the mask.
+
+    Returns
+    -------
+    Path
+        A PNG file beside it.
+    """
+    return mask.with_name(f"{mask.stem}_overlay.png")
 
 
 def _start(

@@ -62,6 +62,8 @@ class WorkerUpdate:
         When done, the lines the command would print. When failed, one line with the reason.
     log : str
         Last part of the worker's standard error, once it has ended.
+    seconds_left : float or None
+        Estimate of the time until the end; None if unknown.
     """
 
     stage: str = ""
@@ -69,6 +71,7 @@ class WorkerUpdate:
     state: WorkerState = WorkerState.RUNNING
     message: str = ""
     log: str = ""
+    seconds_left: float | None = None
 
 
 class WorkerProcess:

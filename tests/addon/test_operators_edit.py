@@ -29,7 +29,8 @@ from tests.addon.scene_render import render  # noqa: E402
 @pytest.fixture
 def built(addon: Any, bump_folder: Path) -> BuiltObject:
     """The bump in its own scene, active, with the fitted lobe."""
-    addon.context.scene.isc.specular_from = "lobe"
+    settings = addon.context.scene.isc
+    settings.own_scene, settings.specular_from, settings.all_maps = True, "lobe", True
     addon.ops.isc.import_result(directory=str(bump_folder))
     found = find_built(addon.context.object)
     assert found is not None
@@ -168,7 +169,7 @@ def test_a_missing_node_group_is_reported(addon: Any, built: BuiltObject) -> Non
 def test_an_object_without_a_request_is_not_decomposed_again(
     addon: Any, built: BuiltObject
 ) -> None:
-    assert "is not in this file: open it, and press Decompose" in error_of(
+    assert "is not in this file: open it, and press Create Object" in error_of(
         addon.ops.isc.redo, max_size=64
     )
     del built.object["isc_request"]
@@ -245,7 +246,7 @@ def test_a_copy_is_not_decomposed_again(addon: Any, built: BuiltObject) -> None:
     )
     addon.ops.isc.recolour(hue=0.3)
     addon.data.objects.remove(built.object)
-    assert "is a copy, and only the original is updated: press Decompose" in error_of(
+    assert "is a copy, and only the original is updated: press Create Object" in error_of(
         addon.ops.isc.redo, max_size=64
     )
 

@@ -17,9 +17,10 @@ from blender_addon.files.image_source import ImageSource  # noqa: E402
 from blender_addon.operators import run_steps  # noqa: E402
 from blender_addon.operators.modal import WorkerOperator, advance_run  # noqa: E402
 from blender_addon.operators.request import MethodSettings  # noqa: E402
-from blender_addon.operators.run_steps import decompose_steps, mask_steps  # noqa: E402
+from blender_addon.operators.run_steps import ResultPlace, decompose_steps, mask_steps  # noqa: E402
 from blender_addon.operators.worker_run import (  # noqa: E402
     RunOutput,
+    RunSteps,
     WorkerFailed,
     WorkerRun,
     active_run,
@@ -74,8 +75,8 @@ def failing(error: Exception) -> Generator[WorkerUpdate, None, RunOutput]:
     raise error
 
 
-def take(_context: Any, result: Path) -> str:
-    return f"took {result.name}"
+def take(_context: Any, output: RunOutput) -> str:
+    return f"took {output.path.name}"
 
 
 def until(true: Callable[[], object], seconds: float = 20.0) -> None:
@@ -128,7 +129,7 @@ def test_a_failure_is_reported_and_leaves_nothing(
 
 
 def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
-    def refuse(_context: Any, _result: Path) -> str:
+    def refuse(_context: Any, _output: RunOutput) -> str:
         raise InputError("linked")
 
     run = WorkerRun("Decompose cup", script(0, folder), refuse, folder)
@@ -143,17 +144,19 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
 def test_notes_on_the_result_are_passed_on(folder: Path) -> None:
     def talkative() -> Generator[WorkerUpdate, None, RunOutput]:
         yield WorkerUpdate("at work")
-        return RunOutput(folder, "note: it did not converge")
+        return RunOutput(folder, ("note: it did not converge", "gloss: 0.2"))
 
     run = WorkerRun("Decompose cup", talkative(), take, folder)
     run.step()
     run.step()
-    assert run.import_result(None).message == "took run; note: it did not converge"
+    status = run.import_result(None)
+    assert status.message == "took run", "one short line"
+    assert status.notes == ("note: it did not converge", "gloss: 0.2")
 
 
 @pytest.mark.parametrize("where", ["script", "finish"])
 def test_an_unexpected_error_does_not_block_the_next_run(folder: Path, where: str) -> None:
-    def broken(_context: Any, _result: Path) -> str:
+    def broken(_context: Any, _output: RunOutput) -> str:
         raise ZeroDivisionError("an error of ours")
 
     steps = (
@@ -199,7 +202,7 @@ def test_calls_and_import_are_timed_separately(folder: Path) -> None:
         yield WorkerUpdate("slow")
         return RunOutput(folder)
 
-    def slow_import(_context: Any, _result: Path) -> str:
+    def slow_import(_context: Any, _output: RunOutput) -> str:
         time.sleep(0.2)
         return ""
 
@@ -251,6 +254,11 @@ def photo_file(tmp_path: Path) -> ImageSource:
     return ImageSource("cup", path=tmp_path / "cup.png")
 
 
+def steps_of(photo: ImageSource, folder: Path, environment: WorkerEnvironment) -> RunSteps:
+    place = ResultPlace(folder)
+    return decompose_steps(photo, None, None, MethodSettings(), place, 0, environment)
+
+
 def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -263,7 +271,9 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     monkeypatch.setattr(run_steps, "start_decompose", started)
     run = WorkerRun(
         "Decompose cup",
-        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), folder, 0, environment),
+        decompose_steps(
+            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
+        ),
         take,
         folder,
     )
@@ -289,7 +299,9 @@ def test_a_starting_worker_is_ended_too(
     monkeypatch.setattr(run_steps, "start_decompose", slow_start)
     run = WorkerRun(
         "Decompose cup",
-        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), folder, 0, environment),
+        decompose_steps(
+            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
+        ),
         take,
         folder,
     )
@@ -326,11 +338,19 @@ print(json.dumps({"event": "failed", "message": message, "code": 2}), flush=True
 sys.exit(2)
 """
     script = decompose_steps(
-        photo_file(tmp_path), None, None, MethodSettings(), folder, 0, fake_core(tmp_path, code)
+        photo_file(tmp_path),
+        None,
+        None,
+        MethodSettings(),
+        ResultPlace(folder),
+        0,
+        fake_core(tmp_path, code),
     )
     run = WorkerRun("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
-    assert run.status.message == "cup: choose a mask image, or make one with Add Point or Draw Box"
+    assert (
+        run.status.message == "cup: choose a mask image, or make one with Add Point or Select Box"
+    )
 
 
 def test_following_ends_the_worker_when_it_is_closed() -> None:
@@ -477,7 +497,7 @@ import bpy, blender_addon
 blender_addon.register()
 from blender_addon.operators.worker_run import RunOutput, WorkerRun, begin_run
 from blender_addon.operators.request import MethodSettings
-from blender_addon.operators.run_steps import decompose_steps
+from blender_addon.operators.run_steps import ResultPlace, decompose_steps
 from blender_addon.files.image_source import ImageSource
 from blender_addon.worker.commands import WorkerEnvironment
 search, cache = Path({str(environment.search[0])!r}), Path({str(tmp_path / "cache")!r})
@@ -485,7 +505,7 @@ environment = WorkerEnvironment(Path(sys.executable), (search,), cache)
 folder = Path({str(tmp_path / "run")!r})
 folder.mkdir()
 picture = ImageSource("cup", path=Path({str(tmp_path / "cup.png")!r}))
-steps = decompose_steps(picture, None, None, MethodSettings(), folder, 0, environment)
+steps = decompose_steps(picture, None, None, MethodSettings(), ResultPlace(folder), 0, environment)
 run = begin_run(WorkerRun("Decompose cup", steps, lambda *_: "", folder))
 end = time.monotonic() + 30
 while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exists():

@@ -1,9 +1,11 @@
-"""Drives a real Blender window with a real mouse and keyboard: decompose, undo, redo, Esc, the
-Cancel button, save, load during a run.
+"""Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
+automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color, a
+second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a run, a new
+scene.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
     blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
-    demo/input/photo.png --size 1280x800 \\
+    PHOTOS/photo.png --size 1280x800 \\
         --timeout 600 --driver tests/addon/window_driver.py --out OUT
 `acc` is that script's helper: `find` moves the mouse until the button under it runs the operator,
 `shot` saves the screen, a number that is yielded is waited for. Exit code 1 where a check fails;
@@ -19,52 +21,164 @@ from typing import Any
 import bpy
 
 NAME = "photo"
+_SHADERS = 75.0  # seconds until a software renderer has compiled the shaders of a new material
 
 
 def main(acc: Any) -> Iterator[float]:
     """The whole of it."""
     measured: list[str] = []
-    settings = bpy.context.scene.isc
-    settings.image, settings.preset = bpy.data.images.load(f"{acc.inp}/{NAME}.png"), "DRAFT"
     yield 1.5
-    yield acc.shot("1_panel")
-    yield from decompose(acc, measured)
+    yield acc.shot("01_start")
+    yield from mask(acc, measured)
+    yield from create(acc, measured)
+    yield from look_around(acc)
+    yield from second_run(acc, measured)
     yield from undo_and_redo(acc)
-    bpy.context.scene.isc.max_size = 512
+    yield from asset(acc)
+    yield from box(acc, measured)
+    bpy.context.scene.isc.separator = "none"
     yield from cancel(acc, measured, "Esc", escape)
     yield from cancel(acc, measured, "Cancel", press_cancel)
     yield from load_during_a_run(acc, measured)
+    yield from new_scene(acc, measured)
     Path(acc.out, "measured.txt").write_text("\n".join(measured) + "\n")
 
 
-def decompose(acc: Any, measured: list[str]) -> Iterator[float]:
-    """A click on the button; the object appears, in its own scene."""
-    yield from begin(acc)
-    yield from until(lambda: shown().fraction > 0.05, 240)
-    yield acc.shot("2_running")
-    yield from until(lambda: shown().state not in {"running", "ready"}, 400)
-    note(acc, measured, "decomposed")
-    acc.check(
-        shown().state == "done" and objects() == [NAME], f"the run ends well: {shown().message}"
-    )
-    acc.check(bpy.context.scene.name == NAME, "the object's own scene is shown")
-    yield acc.shot("3_done")
+def mask(acc: Any, measured: list[str]) -> Iterator[float]:
+    """A photo as dropped on the view: its mask is found, and shown."""
+    with acc.context():
+        bpy.ops.isc.photo_as_object("INVOKE_DEFAULT", filepath=f"{acc.inp}/{NAME}.png")
+    yield from until(lambda: shown().state == "running", 10)
+    yield acc.shot("02_started")
+    if shown().title.startswith("Create"):
+        return  # a photo with transparency needs no mask
+    yield from ended(60)
+    note(acc, measured, "mask")
+    found = bpy.context.scene.isc.mask
+    acc.check(found is not None and shown().state == "done", f"a mask: {shown().message}")
+    yield 2
+    yield acc.shot("03_mask")
+
+
+def create(acc: Any, measured: list[str]) -> Iterator[float]:
+    """Accepting the mask is a click on Create Object; the object arrives beside the cube."""
+    began = time.monotonic()
+    if shown().state != "running":
+        yield from begin(acc)
+    yield from until(lambda: shown().fraction > 0.4, 240)
+    yield acc.shot("04_running")
+    yield from ended(400)
+    note(acc, measured, f"created in {time.monotonic() - began:.0f} s")
+    acc.check(shown().state == "done" and objects() == [NAME], f"it ends well: {shown().message}")
+    acc.check(bpy.context.scene.name == "Scene", "the user's scene is shown")
+    acc.check(bpy.context.object.name == NAME, "the object is active")
     space = acc.view3d()[1].spaces.active
-    space.shading.type = "RENDERED"
-    yield 20
-    yield acc.shot("4_rendered")
-    space.shading.type = "SOLID"
-    yield 1
+    acc.check(space.shading.type == "MATERIAL", "in Material Preview")
+    yield _SHADERS
+    yield acc.shot("05_created")
+
+
+def look_around(acc: Any) -> Iterator[float]:
+    """Orbit, move the lamp, recolor."""
+    view = acc.view3d()[1].spaces.active
+    for _ in range(2):
+        yield keys(acc, "KP_4", 1)
+    yield 2
+    yield acc.shot("06_orbit")
+    for _ in range(2):
+        yield keys(acc, "KP_6", 1)
+    obj, lamp = bpy.data.objects[NAME], bpy.data.objects["Light"]
+    view.shading.use_scene_lights = True
+    yield _SHADERS
+    for number, side in enumerate((-1.5, 1.5)):
+        lamp.location = (obj.location.x + side, obj.location.y - 2, obj.location.z + 1.5)
+        lamp.data.energy = 200
+        yield 8
+        yield acc.shot(f"07_lamp_{number}")
+    with acc.context():
+        bpy.ops.isc.recolour("EXEC_DEFAULT", True, hue=0.8)
+    yield 8
+    yield acc.shot("08_recolored")
+
+
+def second_run(acc: Any, measured: list[str]) -> Iterator[float]:
+    """The same photo with other output: from the cache."""
+    bpy.context.scene.isc.closed_back = True
+    began = time.monotonic()
+    yield from begin(acc)
+    yield from ended(100)
+    seconds = time.monotonic() - began
+    note(acc, measured, f"second run, other output options, in {seconds:.1f} s")
+    acc.check(shown().message == f"{NAME} updated", f"the second run: {shown().message}")
+    bpy.context.scene.isc.closed_back = False
 
 
 def undo_and_redo(acc: Any) -> Iterator[float]:
-    """One step takes all of it away, one brings it back."""
-    yield keys(acc, "ctrl+z", 4)
-    left = [len(blocks) for blocks in (objects(), [s for s in bpy.data.scenes if s.name == NAME])]
-    acc.check(left == [0, 0], f"one undo takes all of it away: {left}")
-    yield acc.shot("5_undone")
-    yield keys(acc, "ctrl+shift+z", 4)
+    """Steps back take all of it away, steps forward bring it back."""
+    for _ in range(3):
+        yield keys(acc, "ctrl+z", 2)
+    acc.check(objects() == [], f"undo takes all of it away: {objects()}")
+    for _ in range(3):
+        yield keys(acc, "ctrl+shift+z", 2)
     acc.check(objects() == [NAME], "redo brings it back")
+
+
+def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
+    """In a new scene, and back by one button."""
+    bpy.context.scene.isc.own_scene = True
+    yield from begin(acc)
+    yield from ended(100)
+    note(acc, measured, "new scene")
+    acc.check(bpy.context.scene.name == NAME, "the object's own scene is shown")
+    acc.view3d()[1].spaces.active.shading.type = "RENDERED"
+    yield 20
+    yield acc.shot("09_new_scene")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    place = yield from acc.find("isc.return_to_scene")
+    if acc.check(place, "the button back is found"):
+        yield acc.click(*place, settle=2)
+    acc.check(bpy.context.scene.name == "Scene", "and leads back")
+    bpy.context.scene.isc.own_scene = False
+
+
+def box(acc: Any, measured: list[str]) -> Iterator[float]:
+    """A box drawn on the photo over the 3D view."""
+    left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
+    with acc.context():
+        bpy.ops.isc.draw_box("INVOKE_DEFAULT")
+    yield 1.5
+    side = 0.45 * min(width, height)
+    x, y = left + width / 2, top + height / 2
+    start, end = (
+        (int(x - side * 0.8), int(y - side * 0.8)),
+        (int(x + side * 0.8), int(y + side * 0.8)),
+    )
+    yield acc.xdo(f"mousemove {start[0]} {start[1]} mousedown 1 mousemove {end[0]} {end[1]}", 2)
+    yield acc.shot("10_box")
+    yield acc.xdo("mouseup 1", 1)
+    yield from ended(60)
+    note(acc, measured, "box")
+    acc.check(shown().state == "done", f"the box is cut out: {shown().message}")
+
+
+def asset(acc: Any) -> Iterator[float]:
+    """The object becomes an asset, found by F3."""
+    library = Path(acc.out, "library")
+    library.mkdir(exist_ok=True)
+    bpy.ops.preferences.asset_library_add(directory=str(library))
+    with acc.context():
+        bpy.context.view_layer.objects.active = bpy.data.objects[NAME]
+        libraries = bpy.context.preferences.filepaths.asset_libraries
+        done = bpy.ops.isc.save_asset("EXEC_DEFAULT", library=libraries[-1].name)
+    acc.check(done == {"FINISHED"} and (library / f"{NAME}.blend").is_file(), "an asset is saved")
+    yield keys(acc, "F3", 2)
+    yield acc.type("photo as 3d")
+    yield acc.shot("11_search")
+    yield acc.xdo("key Escape", 1)
+    yield keys(acc, "F3", 2)
+    yield acc.type("ISC")
+    yield acc.shot("12_search_isc")
+    yield acc.xdo("key Escape", 1)
 
 
 def cancel(
@@ -74,7 +188,6 @@ def cancel(
     yield from begin(acc)
     yield from until(lambda: shown().fraction > 0.02, 100)
     acc.check(shown().state == "running" and workers(), "a worker is at work")
-    yield acc.shot(f"6_before_{how}")
     yield from stop(acc)
     yield from until(lambda: shown().state == "cancelled", 5)
     acc.check(shown().state == "cancelled", f"{how} cancels")
@@ -83,7 +196,6 @@ def cancel(
     acc.check(
         not workers() and objects() == [NAME], "no worker is left, and the scene is as before"
     )
-    yield acc.shot(f"7_after_{how}")
 
 
 def load_during_a_run(acc: Any, measured: list[str]) -> Iterator[float]:
@@ -100,7 +212,7 @@ def load_during_a_run(acc: Any, measured: list[str]) -> Iterator[float]:
     note(acc, measured, "loaded")
     acc.tab("ISC")
     yield 2
-    yield acc.shot("8_loaded")
+    yield acc.shot("13_loaded")
 
 
 def begin(acc: Any) -> Iterator[float]:
@@ -110,7 +222,7 @@ def begin(acc: Any) -> Iterator[float]:
     place = yield from acc.find("isc.decompose")
     if acc.check(place, "the button is found"):
         yield acc.click(*place, settle=0.5)
-        yield from until(lambda: shown().state == "running", 10)
+        yield from until(lambda: shown().state != "", 10)
 
 
 def escape(acc: Any) -> Iterator[float]:
@@ -131,6 +243,11 @@ def keys(acc: Any, text: str, wait: float) -> float:
     return float(
         acc.xdo(f"mousemove {left + width // 3} {top + height // 2} sleep .3 key {text}", wait)
     )
+
+
+def ended(seconds: float) -> Iterator[float]:
+    """Waits until no run is active."""
+    yield from until(lambda: shown().state not in {"running", "ready"}, seconds)
 
 
 def until(fact: Callable[[], Any], seconds: float) -> Iterator[float]:

@@ -7,6 +7,7 @@ from ...errors import InputError
 from ...masking.finder import MaskSearch, read_each
 from ...masking.hints import Hints
 from ...photo.grabcut import check_mask_path, write_mask
+from ...photo.mask_overlay import write_mask_overlay
 from ...photo.photo import Photo
 from ...photo.reading import read_photo
 from ...progress import Monitor
@@ -51,6 +52,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     add_hints(parser)
     add_each(parser, "MASK_1.png, MASK_2.png and so on")
+    parser.add_argument(
+        "--overlay",
+        type=Path,
+        metavar="PNG",
+        help="also write a small picture of the photo with the mask over it",
+    )
     add_transfer(parser)
     add_limits(parser)
     parser.add_argument(
@@ -84,6 +91,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
             "--point x,y mark it"
         )
     check_mask_path(options.photo, options.output)
+    if options.overlay is not None:
+        if options.each:
+            raise InputError("--overlay shows one mask: leave out --each")
+        check_mask_path(options.photo, options.overlay)
     with photo_file(options.photo, options) as file:
         lines = _each(file, options) if options.each else _one(file, given, options)
     return hints(options, *lines)
@@ -93,7 +104,10 @@ def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
     """Write one mask, and return what to print."""
     limits, finder = limits_of(options), MaskSearch(given)
     photo = read_photo(file, None, options.transfer, limits=limits, finder=finder)
-    return [_write(photo, options.output)]
+    line = _write(photo, options.output)
+    if options.overlay is not None:
+        write_mask_overlay(options.overlay, photo.image, photo.mask)
+    return [line]
 
 
 def _each(file: Path, options: argparse.Namespace) -> list[str]:

@@ -9,6 +9,7 @@ from PIL import Image
 
 from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.photo.mask_overlay import mask_overlay
 from tests.core.command_line import write_image
 from tests.core.masking.test_search import ONE, TWO, balls, overlap
 
@@ -36,6 +37,33 @@ def test_a_mask_is_found_and_written(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "% sure; check it" in capsys.readouterr().out
     codes = np.unique(np.asarray(Image.open(tmp_path / "mask.png")))
     assert len(codes) > 2, "the rim is soft"
+
+
+def test_an_overlay_shows_the_mask_on_the_photo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, _ = photo(tmp_path, ONE)
+    files = ("-o", tmp_path / "mask.png", "--overlay", tmp_path / "overlay.png")
+    assert isc("mask", path, "--auto", *files) == 0
+    shown = np.asarray(Image.open(tmp_path / "overlay.png")).astype(int)
+    before, inside = np.asarray(Image.open(path)).astype(int), mask_in(tmp_path / "mask.png")
+    assert shown.shape == before.shape, "a photo of 200 x 150 pixels is not scaled"
+    orange = (shown == [255, 140, 26]).all(-1)
+    assert 0 < orange.sum() < inside.sum() / 4
+    same = np.abs(shown - before).max(-1) <= 1
+    assert same[inside & ~orange].mean() > 0.9, "the object as it is, but for its rim"
+    wall = shown[~inside]
+    assert (wall[:, 0] > wall[:, 1]).mean() > 0.99, "the background is tinted red"
+    assert isc("mask", path, "--each", *files) == 2
+    assert "leave out --each" in capsys.readouterr().err
+
+
+def test_a_large_photo_has_a_small_overlay() -> None:
+    mask = np.zeros((900, 600), bool)
+    mask[300:600, 200:400] = True
+    picture = mask_overlay(np.full((900, 600, 3), 0.5, np.float32), mask)
+    assert picture.shape[0] == 256 and picture.dtype == np.uint8
+    assert abs(picture.shape[1] - 171) <= 1
 
 
 def test_each_thing_gets_a_mask(tmp_path: Path) -> None:

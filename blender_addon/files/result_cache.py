@@ -1,0 +1,148 @@
+"""Results of earlier runs, found again by what they were made of.
+
+A result is kept in a folder whose name is a SHA-256 of everything that it depends on: the content
+of photo and mask, the settings, and the files of `isc_core`. What is built of it in Blender does
+not count, nor do names and places of files: Blender packs them.
+
+The worker writes a result under its final name complete or not at all. One that cannot be read is
+removed, and made again. When the folder grows above its limit, the results that were not used for
+the longest time go first.
+
+Citation: FIPS 180-4, Secure Hash Standard, 2015.
+
+Limits: the hash of `isc_core` is of names, sizes and dates of its files, not of their content. A
+result that is larger than the limit is kept until the next one is made.
+"""
+
+import contextlib
+import hashlib
+import os
+import shutil
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from isc_core.errors import InputError
+
+from .result_arrays import ARRAYS, ResultArrays, read_result
+
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class ResultCache:
+    """Folder of results.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder with one folder per result; created when it is first written to.
+    limit : int
+        Size in bytes above which results are removed.
+    """
+
+    folder: Path
+    limit: int
+
+    def place(self, key: str) -> Path:
+        """Return where the result of a key is, or belongs.
+
+        Parameters
+        ----------
+        key : str
+            As `content_key` returns it.
+
+        Returns
+        -------
+        Path
+            The result folder.
+        """
+        return self.folder / key
+
+    def read(self, key: str) -> ResultArrays | None:
+        """Read a result, and note that it was used.
+
+        Parameters
+        ----------
+        key : str
+            As `content_key` returns it.
+
+        Returns
+        -------
+        ResultArrays or None
+            None if there is none; a damaged one is removed.
+        """
+        place = self.place(key)
+        if not (place / ARRAYS).is_file():
+            return None
+        try:
+            result = read_result(place)
+        except InputError:
+            shutil.rmtree(place, ignore_errors=True)
+            return None
+        with contextlib.suppress(OSError):  # a cache of somebody else's can still be read
+            os.utime(place)
+        return result
+
+    def trim(self, keep: str) -> None:
+        """Remove the results that were not used for the longest time, until the rest fits.
+
+        Parameters
+        ----------
+        keep : str
+            Key of a result that stays.
+        """
+        with contextlib.suppress(OSError):  # another Blender may remove the same ones
+            entries = sorted(self.folder.iterdir(), key=lambda entry: -entry.stat().st_mtime)
+            room = self.limit - _size(self.place(keep))
+            for entry in entries:
+                if entry.name == keep or not entry.is_dir():
+                    continue
+                room -= _size(entry)
+                if room < 0:
+                    shutil.rmtree(entry, ignore_errors=True)
+
+
+def content_key(files: Sequence[Path | None], settings: Iterable[object], core: Path) -> str:
+    """Return the key of what a result depends on.
+
+    Parameters
+    ----------
+    files : sequence of Path or None
+        Photo and mask.
+    settings : iterable of object
+        Settings, in a fixed order.
+    core : Path
+        Folder of the package `isc_core` that makes the result.
+
+    Returns
+    -------
+    str
+        Hexadecimal digits.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    digest = hashlib.sha256(repr(tuple(settings)).encode())
+    for file in files:
+        digest.update(b"\0none" if file is None else _file_digest(file))
+    for path in sorted(core.rglob("*")):
+        if path.is_file() and "__pycache__" not in path.parts:
+            status = path.stat()
+            entry = (str(path.relative_to(core)), status.st_size, status.st_mtime_ns)
+            digest.update(repr(entry).encode())
+    return digest.hexdigest()
+
+
+def _file_digest(path: Path) -> bytes:
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while chunk := stream.read(_CHUNK):
+            digest.update(chunk)
+    return digest.digest()
+
+
+def _size(folder: Path) -> int:
+    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())

@@ -1,0 +1,139 @@
+"""The photo under the mouse: as an image editor shows it, or laid over the 3D view.
+
+Over the 3D view, the photo fills as much of the region as its shape allows, with a margin; the
+scene stays visible around it.
+
+Limits: the photo over the 3D view cannot be zoomed: use an image editor for small objects.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+import bpy
+import gpu  # type: ignore[import-not-found]
+from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
+
+_FILL = 0.9  # of the region, along the side that limits the photo
+_EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
+
+Point = tuple[float, float]
+
+
+def shown_photo(context: Any) -> Any:
+    """Return the photo that can be pointed at in the editor under the mouse.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    bpy.types.Image or None
+        The image of an image editor, or that of the panel in a 3D view; None elsewhere.
+    """
+    kind = "" if context.area is None else context.area.type
+    if kind == "IMAGE_EDITOR":
+        return context.space_data.image
+    return context.scene.isc.image if kind == "VIEW_3D" else None
+
+
+class PhotoCanvas:
+    """Mouse positions on a photo, and drawing over it, until `close`.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context, of a 3D view or an image editor.
+    photo : bpy.types.Image
+        The photo.
+    draw : callable, optional
+        Draws over the photo, in pixels of the region.
+    """
+
+    def __init__(self, context: Any, photo: Any, draw: Callable[[], None] | None = None) -> None:
+        # The button may be in the sidebar: the region is that of the view.
+        self.region = next(part for part in context.area.regions if part.type == "WINDOW")
+        self._size: tuple[int, int] = tuple(photo.size)
+        self._draw_over = draw
+        self._is_laid_over = context.area.type == "VIEW_3D"
+        self._texture = gpu.texture.from_image(photo) if self._is_laid_over else None
+        self._space = getattr(bpy.types, _EDITORS[context.area.type])
+        self._handler = self._space.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
+        self.region.tag_redraw()
+
+    def position(self, event: Any) -> tuple[int, int]:
+        """Return where the mouse is, in pixels of the region.
+
+        Parameters
+        ----------
+        event : bpy.types.Event
+            Its position is in pixels of the window.
+
+        Returns
+        -------
+        tuple of int
+        """
+        return event.mouse_x - self.region.x, event.mouse_y - self.region.y
+
+    def place(self, position: tuple[int, int]) -> Point:
+        """Return which place of the photo is at a position.
+
+        Parameters
+        ----------
+        position : tuple of int
+            As `position` returns it.
+
+        Returns
+        -------
+        tuple of float
+            (0, 0) is the photo's lower left corner, (1, 1) its upper right one.
+        """
+        if not self._is_laid_over:
+            view: Point = self.region.view2d.region_to_view(*position)
+            return view
+        left, bottom, width, height = fitted(self._size, (self.region.width, self.region.height))
+        return (position[0] - left) / width, (position[1] - bottom) / height
+
+    def close(self) -> None:
+        """Stop drawing. Does nothing the second time."""
+        if self._handler is not None:
+            self._space.draw_handler_remove(self._handler, "WINDOW")
+            self._handler = self._texture = None
+            self.region.tag_redraw()
+
+    def _draw(self) -> None:
+        if bpy.context.region != self.region:  # another view of the same kind
+            return
+        if self._texture is not None:
+            left, bottom, width, height = fitted(
+                self._size, (self.region.width, self.region.height)
+            )
+            right, top = left + width, bottom + height
+            corners = ((left, bottom), (right, bottom), (right, top), (left, top))
+            shader = gpu.shader.from_builtin("IMAGE")
+            shader.uniform_sampler("image", self._texture)
+            sheet = {"pos": corners, "texCoord": ((0, 0), (1, 0), (1, 1), (0, 1))}
+            batch_for_shader(shader, "TRI_FAN", sheet).draw(shader)
+        if self._draw_over is not None:
+            self._draw_over()
+
+
+def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, float, float]:
+    """Fit a photo into a region.
+
+    Parameters
+    ----------
+    size : tuple of int
+        Width and height of the photo.
+    room : tuple of int
+        Width and height of the region.
+
+    Returns
+    -------
+    tuple of float
+        Left, bottom, width and height in pixels of the region.
+    """
+    scale = _FILL * min(room[0] / size[0], room[1] / size[1])
+    width, height = scale * size[0], scale * size[1]
+    return (room[0] - width) / 2, (room[1] - height) / 2, width, height

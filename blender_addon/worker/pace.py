@@ -1,0 +1,72 @@
+"""Progress in time: which share of a run's time is over, and how many seconds are left.
+
+A worker's own fraction counts steps: the solver takes two thirds of it whether the maps are large
+or small. Here the fractions at which its stages begin are mapped to the seconds that the stages
+took when they were measured (two cores, photos of 2,400 pixels). With t(f) those seconds until the
+fraction f, T their sum, and e the seconds since the start, the share is t(f) / T, and e (T - t) / t
+are left.
+
+Limits: the time of the solver depends on the photo, by a factor of three either way; the estimate
+corrects itself once the solver is done. Nothing is said about the first two seconds.
+"""
+
+from bisect import bisect_right
+from dataclasses import dataclass, field, replace
+
+from .process import WorkerUpdate
+
+# Fractions at which loading, separation, solver, relief and writing begin, and the end.
+_FRACTIONS = (0.0, 0.024, 0.064, 0.736, 0.8, 1.0)
+# Seconds of these stages by the longer side of the maps.
+_SECONDS = {
+    256: (2.0, 1.5, 3.5, 0.4, 1.5),
+    512: (2.0, 1.7, 3.5, 1.3, 2.4),
+    1024: (2.3, 3.0, 3.5, 6.2, 6.0),
+    2048: (2.3, 4.5, 5.0, 7.0, 17.5),
+}
+_UNSURE_SECONDS = 2.0
+
+
+@dataclass
+class Pace:
+    """The time of one run.
+
+    Attributes
+    ----------
+    size : int
+        Longer side of the maps; 0 is that of the photo.
+    share : float
+        Share of the time that is over, in [0, 1]; never falls.
+    """
+
+    size: int
+    share: float = field(default=0.0, init=False)
+
+    def at(self, update: WorkerUpdate, elapsed: float) -> WorkerUpdate:
+        """Put an update in time.
+
+        Parameters
+        ----------
+        update : WorkerUpdate
+            Of a worker that runs.
+        elapsed : float
+            Seconds since the worker was started.
+
+        Returns
+        -------
+        WorkerUpdate
+            The update with the share of the time for its fraction, and the seconds left.
+        """
+        done, total = self._seconds(update.fraction)
+        self.share = max(self.share, done / total)
+        left = elapsed * (1 - self.share) / self.share if self.share > 0 else 0.0
+        sure = min(elapsed, done) >= _UNSURE_SECONDS
+        return replace(update, fraction=self.share, seconds_left=left if sure else None)
+
+    def _seconds(self, fraction: float) -> tuple[float, float]:
+        """Measured seconds until a fraction of the worker's, and in total."""
+        stages = _SECONDS[min(_SECONDS, key=lambda size: abs(size - (self.size or max(_SECONDS))))]
+        stage = min(bisect_right(_FRACTIONS, max(fraction, 0.0)), len(stages)) - 1
+        start, end = _FRACTIONS[stage : stage + 2]
+        part = min((fraction - start) / (end - start), 1.0)
+        return sum(stages[:stage]) + part * stages[stage], sum(stages)

@@ -1,0 +1,68 @@
+"""A small picture of a photo with its mask over it, to judge the mask by.
+
+The background is darkened and tinted red, the mask's outline is orange.
+
+Limits: at most 256 pixels wide or high, so thin parts of a mask are hard to see.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ..imaging.area_resize import AreaFilter
+from ..imaging.srgb import linear_to_srgb
+from ..io.atomic import new_file
+
+_SIZE = 256
+_TINT, _TINT_SHARE = np.array([0.45, 0.05, 0.05]), 0.6
+_OUTLINE = np.array([1.0, 0.55, 0.1])
+
+
+def mask_overlay(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return the picture.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Photo, linear Rec.709.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (h, w, 3) uint8 ndarray
+        sRGB codes; neither side is longer than 256 pixels.
+    """
+    area = AreaFilter.of(mask.shape, min(1.0, _SIZE / max(mask.shape)))
+    small = np.dstack([area(np.clip(image[..., k], 0, 1)) for k in range(3)]) / area.full[..., None]
+    coded, inside = linear_to_srgb(small), area(mask) >= 0.5 * area.full
+    shown = np.where(inside[..., None], coded, (1 - _TINT_SHARE) * coded + _TINT_SHARE * _TINT)
+    shown[_outline(inside)] = _OUTLINE
+    codes: np.ndarray = np.rint(255 * shown).astype(np.uint8)
+    return codes
+
+
+def write_mask_overlay(path: Path, image: np.ndarray, mask: np.ndarray) -> None:
+    """Write the picture as a PNG, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+    image, mask
+        As for `mask_overlay`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    with new_file(path) as partial:
+        Image.fromarray(mask_overlay(image, mask)).save(partial, format="PNG")
+
+
+def _outline(inside: np.ndarray) -> np.ndarray:
+    """Pixels of the object beside the background."""
+    padded = np.pad(inside, 1, mode="edge")
+    neighbours = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
+    outline: np.ndarray = inside & ~np.logical_and.reduce(neighbours)
+    return outline

@@ -1,0 +1,46 @@
+"""Progress in time."""
+
+import pytest
+
+from blender_addon.operators.messages import stage_text
+from blender_addon.worker.pace import Pace
+from blender_addon.worker.process import WorkerUpdate
+
+
+@pytest.mark.parametrize("size", [0, 64, 256, 512, 1024, 2048, 8192])
+def test_the_share_grows_from_nothing_to_all(size: int) -> None:
+    pace = Pace(size)
+    shares = [pace.at(WorkerUpdate("x", n / 200), n / 10).fraction for n in range(201)]
+    assert shares[0] == 0 and shares[-1] == pytest.approx(1)
+    assert all(a <= b for a, b in zip(shares, shares[1:], strict=False))
+
+
+def test_a_fraction_that_falls_does_not_move_the_bar_back() -> None:
+    pace = Pace(512)
+    first = pace.at(WorkerUpdate("x", 0.5), 3.0).fraction
+    assert pace.at(WorkerUpdate("x", 0.1), 3.5).fraction == first
+
+
+def test_the_time_left_follows_the_machine() -> None:
+    """A machine of half the speed needs twice the time, and the end is at hand in the end."""
+    quick, slow = (Pace(1024).at(WorkerUpdate("x", 0.8), seconds) for seconds in (15.0, 30.0))
+    assert quick.seconds_left and slow.seconds_left == pytest.approx(2 * quick.seconds_left)
+    assert Pace(1024).at(WorkerUpdate("x", 1.0), 20.0).seconds_left == pytest.approx(0)
+
+
+def test_nothing_is_said_at_the_start() -> None:
+    assert Pace(512).at(WorkerUpdate("x", 0.0), 5.0).seconds_left is None
+    assert Pace(512).at(WorkerUpdate("x", 0.5), 0.5).seconds_left is None
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (None, "shape"),
+        (0.0, "shape, about 5 s left"),
+        (22.0, "shape, about 20 s left"),
+        (200.0, "shape, about 3 min left"),
+    ],
+)
+def test_the_time_left_is_written_in_round_numbers(seconds: float | None, text: str) -> None:
+    assert stage_text("shape", seconds) == text

@@ -1,0 +1,189 @@
+"""Where an object arrives in a scene that is not its own, and what comes along."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+from mathutils import Euler, Vector  # noqa: E402 (after the skip)
+
+from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
+from blender_addon.operators.viewport import find_view, front_view, show  # noqa: E402
+from blender_addon.scene.build import BuildOptions, build_object, find_built  # noqa: E402
+from blender_addon.scene.hand_edits import is_edited_by_hand  # noqa: E402
+
+SHARED = BuildOptions(own_scene=False, size_metres=1.0)
+
+
+@pytest.fixture
+def result(blender: Any, bump_folder: Path) -> ResultArrays:
+    """The bump, in an empty file."""
+    return read_result(bump_folder)
+
+
+def bounds(obj: Any) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest and the highest corner of an object in the world."""
+    bpy.context.view_layer.update()
+    corners = np.array([obj.matrix_world @ Vector(corner) for corner in obj.bound_box])
+    return corners.min(0), corners.max(0)
+
+
+def cube(size: float, place: tuple[float, float, float], inward: bool = False) -> Any:
+    bpy.ops.mesh.primitive_cube_add(size=size, location=place)
+    if inward:
+        bpy.context.object.data.flip_normals()
+    return bpy.context.object
+
+
+def test_a_new_object_stands_on_the_cursor(result: ResultArrays) -> None:
+    bpy.context.scene.cursor.location = (3, -2, 0.5)
+    low, high = bounds(build_object(result, SHARED).object)
+    np.testing.assert_allclose([*((low + high) / 2)[:2], low[2]], [3, -2, 0.5], atol=1e-5)
+    assert max(high - low) == pytest.approx(1, abs=0.03)
+
+
+def test_an_object_that_is_updated_stays_where_it_is(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    obj.location = (5, 6, 7)
+    bpy.context.scene.cursor.location = (1, 1, 1)
+    assert build_object(result, SHARED).object.location == Vector((5, 6, 7))
+
+
+@pytest.mark.parametrize("size", [0.1, 1.0])
+def test_the_cube_of_a_new_file_does_not_swallow_it(result: ResultArrays, size: float) -> None:
+    blocks = [cube(2, (0, 0, 0)), cube(2, (2, 0, 0))]
+    obj = build_object(result, BuildOptions(own_scene=False, size_metres=size)).object
+    low, high = bounds(obj)
+    for block in blocks:
+        block_low, block_high = bounds(block)
+        assert (low > block_high).any() or (high < block_low).any(), block.name
+    assert low[2] == pytest.approx(0, abs=1e-5), "beside it, at the same height"
+
+
+@pytest.mark.parametrize(
+    "prepare",
+    [
+        lambda: cube(20, (0, 0, 0), inward=True),  # a room
+        lambda: cube(2, (0, 0, -1)),  # a table
+        lambda: setattr(cube(2, (0, 0, 0)), "hide_viewport", True),
+        lambda: setattr(cube(2, (0, 0, 0)), "display_type", "WIRE"),
+    ],
+)
+def test_rooms_tables_and_hidden_things_leave_it_on_the_cursor(
+    result: ResultArrays, prepare: Any
+) -> None:
+    prepare()
+    low, high = bounds(build_object(result, SHARED).object)
+    np.testing.assert_allclose([*((low + high) / 2)[:2], low[2]], 0, atol=1e-5)
+
+
+def test_light_and_camera_wait_in_a_collection_that_is_unchecked(result: ResultArrays) -> None:
+    scene = bpy.context.scene
+    before = scene.world, scene.camera, scene.render.resolution_x
+    built = build_object(result, SHARED)
+    assert (scene.world, scene.camera, scene.render.resolution_x) == before
+    (part,) = built.collection.children
+    assert sorted(obj.type for obj in part.objects) == ["CAMERA", "LIGHT"]
+    assert [obj.name for obj in bpy.context.view_layer.objects] == [built.object.name]
+    entry = bpy.context.view_layer.layer_collection.children[built.collection.name].children[0]
+    assert entry.exclude
+    entry.exclude = False
+    build_object(result, SHARED)
+    assert not entry.exclude, "the user's choice is kept"
+    assert len(bpy.context.view_layer.objects) == 3
+
+
+def test_a_wanted_camera_or_sun_is_in_the_scene_at_once(result: ResultArrays) -> None:
+    built = build_object(result, BuildOptions(own_scene=False, set_camera=True, sun=True))
+    assert bpy.context.scene.camera == built.camera
+    bpy.context.view_layer.update()
+    seen = {obj.type for obj in bpy.context.view_layer.objects}
+    assert seen == {"MESH", "CAMERA", "LIGHT"}
+
+
+def test_neither_light_nor_camera_is_made_if_not_wanted(result: ResultArrays) -> None:
+    built = build_object(result, BuildOptions(own_scene=False, light_and_camera=False))
+    assert built.camera is None and not bpy.data.cameras and not bpy.data.lights
+    assert not built.collection.children
+
+
+def test_renders_can_have_the_photos_resolution(result: ResultArrays) -> None:
+    object.__setattr__(result, "photo_size", np.array([352, 256], np.int32))
+    scene = build_object(result, BuildOptions(photo_resolution=True)).scene
+    assert (scene.render.resolution_x, scene.render.resolution_y) == (352, 256)
+
+
+def test_a_new_scene_previews_quickly(result: ResultArrays) -> None:
+    scene = build_object(result).scene
+    assert scene.cycles.preview_samples == 32 and scene.cycles.use_preview_denoising
+
+
+def test_maps_that_nothing_uses_are_left_out(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    assert "isc_map_shading" in obj
+    images = len(bpy.data.images)
+    build_object(result, BuildOptions(own_scene=False, all_maps=False))
+    left = sorted(name for name in obj.keys() if name.startswith("isc_map_"))  # noqa: SIM118
+    assert left == ["isc_map_height", "isc_map_mask", "isc_map_specular"]
+    assert len(bpy.data.images) == images - 7, "no map of an earlier result stays"
+
+
+def test_hand_edits_are_noticed(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    assert not is_edited_by_hand(obj)
+    obj.location.x, obj.data.name = 3, "mine"
+    obj.modifiers.new("smooth", "SMOOTH")
+    assert not is_edited_by_hand(obj), "places, names and modifiers are kept anyway"
+    obj.data.vertices[7].co.z += 0.01
+    assert is_edited_by_hand(obj)
+    build_object(result, SHARED)
+    assert not is_edited_by_hand(obj)
+    obj.shape_key_add(name="Basis")
+    assert is_edited_by_hand(obj)
+
+
+def test_the_object_is_shown_in_the_largest_view(blender: Any, bump_folder: Path) -> None:
+    blender.ops.wm.read_factory_settings(use_empty=False)
+    view = find_view(blender.context.window, 0)
+    assert view is not None and find_view(blender.context.window, view.as_pointer()) == view
+    space = view.spaces.active
+    space.shading.type = "SOLID"
+    built = build_object(read_result(bump_folder), SHARED)
+    show(blender.context, built, own_scene=False)
+    assert space.shading.type == "MATERIAL"
+    space.shading.type = "RENDERED"
+    show(blender.context, built, own_scene=True, address=view.as_pointer())
+    assert space.shading.type == "RENDERED" and space.region_3d.view_perspective == "CAMERA"
+
+
+def test_a_view_turns_to_the_front_of_an_object() -> None:
+    for turned in (0.0, 1.0, 4.0):
+        rotation = Euler((0, 0, turned)).to_quaternion()
+        front = rotation @ Vector((0, -1, 0))
+        for view in (
+            Euler((1.1, 0, 0.8 + turned)),
+            Euler((0, 0, 0)),
+            Euler((1.5, 0, 3.1 + turned)),
+        ):
+            toward_viewer = front_view(view.to_quaternion(), rotation) @ Vector((0, 0, 1))
+            assert toward_viewer.angle(front) == pytest.approx(0.405, abs=0.02)
+            assert toward_viewer.z > 0.15, "from above"
+        kept = Euler((1.5, 0, turned + 0.2)).to_quaternion()
+        assert front_view(kept, rotation) == kept
+
+
+def test_two_objects_of_one_photo_share_the_material_of_the_original(
+    result: ResultArrays,
+) -> None:
+    built = build_object(result, SHARED)
+    bpy.context.view_layer.objects.active = built.object
+    built.object.select_set(True)
+    bpy.ops.object.duplicate()
+    copy = bpy.context.object
+    place = copy.location.copy()
+    build_object(result, SHARED)
+    found = find_built(copy)
+    assert found is not None and found.material == built.material and copy.location == place
