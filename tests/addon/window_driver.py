@@ -154,7 +154,10 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
         (int(x - side * 0.8), int(y - side * 0.8)),
         (int(x + side * 0.8), int(y + side * 0.8)),
     )
-    yield acc.xdo(f"mousemove {start[0]} {start[1]} mousedown 1 mousemove {end[0]} {end[1]}", 2)
+    drag = (
+        f"mousemove {start[0]} {start[1]} sleep 1 mousedown 1 sleep 1 mousemove {end[0]} {end[1]}"
+    )
+    yield acc.xdo(drag, 5)
     yield acc.shot("10_box")
     yield acc.xdo("mouseup 1", 1)
     yield from until(lambda: shown().state == "running", 20)
