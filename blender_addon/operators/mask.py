@@ -286,13 +286,15 @@ class ISC_OT_draw_box(bpy.types.Operator):
         if self._canvas is None:
             return {"CANCELLED"}
         position = self._canvas.position(event)
+        if position is None:
+            return self._leave(context, {"CANCELLED"})
         if event.type in {"ESC", "RIGHTMOUSE"}:
             return self._leave(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self._start = self._end = position
         elif event.type == "MOUSEMOVE" and self._start is not None:
             self._end = position
-            self._canvas.region.tag_redraw()
+            self._canvas.redraw()
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._start is not None:
             self._end = position
             return self._finish(context, self._canvas)
@@ -325,8 +327,9 @@ class ISC_OT_draw_box(bpy.types.Operator):
         if self._canvas is not None:
             self._canvas.close()
             self._canvas = None
-            context.window.cursor_modal_restore()
-            context.workspace.status_text_set(None)
+            if context.window is not None:  # another file is loaded
+                context.window.cursor_modal_restore()
+                context.workspace.status_text_set(None)
         return result
 
     def _draw(self) -> None:

@@ -153,7 +153,10 @@ class ISC_OT_mark_point(bpy.types.Operator):
             return self._leave(context, {"CANCELLED"})
         if event.type != "LEFTMOUSE" or event.value != "PRESS" or self._canvas is None:
             return {"PASS_THROUGH"}
-        point = point_at(self._canvas.place(self._canvas.position(event)), self._size)
+        position = self._canvas.position(event)
+        if position is None:
+            return self._leave(context, {"CANCELLED"})
+        point = point_at(self._canvas.place(position), self._size)
         self._leave(context, set())
         if point is None:
             self.report({"WARNING"}, "the point lies outside of the photo: click on the photo")
@@ -178,8 +181,9 @@ class ISC_OT_mark_point(bpy.types.Operator):
         if self._canvas is not None:
             self._canvas.close()
             self._canvas = None
-        context.window.cursor_modal_restore()
-        context.workspace.status_text_set(None)
+        if context.window is not None:  # another file is loaded
+            context.window.cursor_modal_restore()
+            context.workspace.status_text_set(None)
         return result
 
 

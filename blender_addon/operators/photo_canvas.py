@@ -41,6 +41,9 @@ def shown_photo(context: Any) -> Any:
 class PhotoCanvas:
     """Mouse positions on a photo, and drawing over it, until `close`.
 
+    The region is looked up whenever it is needed: the user may close the area, or load another
+    file, and Blender then frees it.
+
     Parameters
     ----------
     context : bpy.types.Context
@@ -53,16 +56,17 @@ class PhotoCanvas:
 
     def __init__(self, context: Any, photo: Any, draw: Callable[[], None] | None = None) -> None:
         # The button may be in the sidebar: the region is that of the view.
-        self.region = next(part for part in context.area.regions if part.type == "WINDOW")
+        region = next(part for part in context.area.regions if part.type == "WINDOW")
+        self._address = region.as_pointer()
+        self._kind: str = context.area.type
         self._size: tuple[int, int] = tuple(photo.size)
         self._draw_over = draw
-        self._is_laid_over = context.area.type == "VIEW_3D"
-        self._texture = gpu.texture.from_image(photo) if self._is_laid_over else None
-        self._space = getattr(bpy.types, _EDITORS[context.area.type])
+        self._texture = gpu.texture.from_image(photo) if self._kind == "VIEW_3D" else None
+        self._space = getattr(bpy.types, _EDITORS[self._kind])
         self._handler = self._space.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
-        self.region.tag_redraw()
+        region.tag_redraw()
 
-    def position(self, event: Any) -> tuple[int, int]:
+    def position(self, event: Any) -> tuple[int, int] | None:
         """Return where the mouse is, in pixels of the region.
 
         Parameters
@@ -72,9 +76,11 @@ class PhotoCanvas:
 
         Returns
         -------
-        tuple of int
+        tuple of int or None
+            None if the region is gone.
         """
-        return event.mouse_x - self.region.x, event.mouse_y - self.region.y
+        _, region = self._find()
+        return None if region is None else (event.mouse_x - region.x, event.mouse_y - region.y)
 
     def place(self, position: tuple[int, int]) -> Point:
         """Return which place of the photo is at a position.
@@ -89,34 +95,65 @@ class PhotoCanvas:
         tuple of float
             (0, 0) is the photo's lower left corner, (1, 1) its upper right one.
         """
-        if not self._is_laid_over:
-            view: Point = self.region.view2d.region_to_view(*position)
+        area, region = self._find()
+        if region is None:
+            return -1.0, -1.0
+        if self._kind != "VIEW_3D":
+            view: Point = region.view2d.region_to_view(*position)
             return view
-        left, bottom, width, height = fitted(self._size, (self.region.width, self.region.height))
+        left, bottom, width, height = fitted(self._size, _room(area, region))
         return (position[0] - left) / width, (position[1] - bottom) / height
+
+    def redraw(self) -> None:
+        """Draw again."""
+        _, region = self._find()
+        if region is not None:
+            region.tag_redraw()
 
     def close(self) -> None:
         """Stop drawing. Does nothing the second time."""
         if self._handler is not None:
             self._space.draw_handler_remove(self._handler, "WINDOW")
             self._handler = self._texture = None
-            self.region.tag_redraw()
+            self.redraw()
+
+    def _find(self) -> tuple[Any, Any]:
+        """Area and region, or None and None if they are gone."""
+        for window in bpy.context.window_manager.windows:
+            for area in window.screen.areas:
+                for region in area.regions if area.type == self._kind else ():
+                    if region.as_pointer() == self._address:
+                        return area, region
+        return None, None
 
     def _draw(self) -> None:
-        if bpy.context.region != self.region:  # another view of the same kind
+        area, region = bpy.context.area, bpy.context.region
+        if region.as_pointer() != self._address:  # another view of the same kind
             return
         if self._texture is not None:
-            left, bottom, width, height = fitted(
-                self._size, (self.region.width, self.region.height)
-            )
+            left, bottom, width, height = fitted(self._size, _room(area, region))
             right, top = left + width, bottom + height
             corners = ((left, bottom), (right, bottom), (right, top), (left, top))
-            shader = gpu.shader.from_builtin("IMAGE")
+            shader = _image_shader()
             shader.uniform_sampler("image", self._texture)
             sheet = {"pos": corners, "texCoord": ((0, 0), (1, 0), (1, 1), (0, 1))}
             batch_for_shader(shader, "TRI_FAN", sheet).draw(shader)
         if self._draw_over is not None:
             self._draw_over()
+
+
+def _room(area: Any, region: Any) -> tuple[int, int]:
+    """Width and height of a region, without the sidebar that lies over its right part."""
+    edges = [part.x for part in area.regions if part.type == "UI" and part.width > 1]
+    return min([region.x + region.width, *edges]) - region.x, region.height
+
+
+def _image_shader() -> Any:
+    """The shader that shows an image's colours as they are, which older Blenders lack."""
+    try:
+        return gpu.shader.from_builtin("IMAGE_SCENE_LINEAR_TO_REC709_SRGB")
+    except ValueError:
+        return gpu.shader.from_builtin("IMAGE")
 
 
 def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, float, float]:
@@ -127,7 +164,7 @@ def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, 
     size : tuple of int
         Width and height of the photo.
     room : tuple of int
-        Width and height of the region.
+        Width and height of the free part of the region, from its lower left corner.
 
     Returns
     -------

@@ -204,7 +204,7 @@ class _PhotoHandler:
         return context.area is not None and context.area.type in _EDITORS
 
 
-HANDLERS: tuple[type, ...] = (
+HANDLERS: tuple[Any, ...] = (
     (type("ISC_FH_photo", (_PhotoHandler, bpy.types.FileHandler), {}),)
     if hasattr(bpy.types, "FileHandler")
     else ()

@@ -4,7 +4,7 @@ A worker's own fraction counts steps: the solver takes two thirds of it whether 
 or small. Here the fractions at which its stages begin are mapped to the seconds that the stages
 took when they were measured (two cores, photos of 2,400 pixels). With t(f) those seconds until the
 fraction f, T their sum, and e the seconds since the start, the share is t(f) / T, and e (T - t) / t
-are left.
+are left. While a stage reports nothing, t grows with the time, to at most four fifths of the stage.
 
 Limits: the time of the solver depends on the photo, by a factor of three either way; the estimate
 corrects itself once the solver is done. Nothing is said about the first two seconds.
@@ -25,6 +25,7 @@ _SECONDS = {
     2048: (2.3, 4.5, 5.0, 7.0, 17.5),
 }
 _UNSURE_SECONDS = 2.0
+_MOST_UNREPORTED = 0.8  # share of a stage's rest
 
 
 @dataclass
@@ -41,6 +42,8 @@ class Pace:
 
     size: int
     share: float = field(default=0.0, init=False)
+    _fraction: float = field(default=-1.0, init=False)
+    _since: float = field(default=0.0, init=False)
 
     def at(self, update: WorkerUpdate, elapsed: float) -> WorkerUpdate:
         """Put an update in time.
@@ -57,16 +60,21 @@ class Pace:
         WorkerUpdate
             The update with the share of the time for its fraction, and the seconds left.
         """
-        done, total = self._seconds(update.fraction)
-        self.share = max(self.share, done / total)
+        done, end, total = self._seconds(update.fraction)
+        if update.fraction != self._fraction:
+            self._fraction, self._since = update.fraction, elapsed
+        slowness = max(1.0, elapsed / done) if done > 0 else 1.0
+        waited = min((elapsed - self._since) / slowness, _MOST_UNREPORTED * (end - done))
+        self.share = max(self.share, (done + waited) / total)
         left = elapsed * (1 - self.share) / self.share if self.share > 0 else 0.0
         sure = min(elapsed, done) >= _UNSURE_SECONDS
         return replace(update, fraction=self.share, seconds_left=left if sure else None)
 
-    def _seconds(self, fraction: float) -> tuple[float, float]:
-        """Measured seconds until a fraction of the worker's, and in total."""
+    def _seconds(self, fraction: float) -> tuple[float, float, float]:
+        """Measured seconds until a fraction of the worker's, until its stage ends, in total."""
         stages = _SECONDS[min(_SECONDS, key=lambda size: abs(size - (self.size or max(_SECONDS))))]
         stage = min(bisect_right(_FRACTIONS, max(fraction, 0.0)), len(stages)) - 1
         start, end = _FRACTIONS[stage : stage + 2]
         part = min((fraction - start) / (end - start), 1.0)
-        return sum(stages[:stage]) + part * stages[stage], sum(stages)
+        before = sum(stages[:stage])
+        return before + part * stages[stage], before + stages[stage], sum(stages)

@@ -28,6 +28,13 @@ def test_the_time_left_follows_the_machine() -> None:
     assert Pace(1024).at(WorkerUpdate("x", 1.0), 20.0).seconds_left == pytest.approx(0)
 
 
+def test_the_bar_moves_while_a_stage_reports_nothing() -> None:
+    pace = Pace(512)
+    shares = [pace.at(WorkerUpdate("x", 0.064), 4 + n / 10).fraction for n in range(600)]
+    assert shares[10] > shares[0] and all(a <= b for a, b in zip(shares, shares[1:], strict=False))
+    assert shares[-1] < pace.at(WorkerUpdate("x", 0.736), 64.0).fraction, "never past the stage"
+
+
 def test_nothing_is_said_at_the_start() -> None:
     assert Pace(512).at(WorkerUpdate("x", 0.0), 5.0).seconds_left is None
     assert Pace(512).at(WorkerUpdate("x", 0.5), 0.5).seconds_left is None
