@@ -330,7 +330,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Highlights",
         description="Source of the material's highlights",
         items=SPECULAR_SOURCES,
-        default="image",
+        default="lobe",
     )
 
 

@@ -27,7 +27,7 @@ EDITS = {
 @pytest.fixture
 def enabled(blender: Any) -> Iterator[Any]:
     """Blender with the add-on enabled in its preferences, so that exporters ask it."""
-    import addon_utils
+    import addon_utils  # type: ignore[import-not-found]
 
     addon_utils.enable("blender_addon", default_set=True)
     yield blender
