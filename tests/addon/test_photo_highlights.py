@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402
+from blender_addon.operators import live_edits  # noqa: E402
 from blender_addon.scene.build import BuildOptions, BuiltObject, build_object  # noqa: E402
 from blender_addon.scene.material import shows_highlights  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
@@ -122,3 +124,68 @@ def test_edits_of_scripts_are_baked_without_a_call_of_ours(built: BuiltObject) -
     values = np.empty(4 * link.from_node.image.size[0] * link.from_node.image.size[1], np.float32)
     link.from_node.image.pixels.foreach_get(values)
     assert values.max() <= 1 and link.from_node.image["isc_role"] == "edited_base_color"
+
+
+def test_with_a_window_baking_waits_until_the_slider_rests(
+    built: BuiltObject, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each move starts the pause again; meanwhile the group is seen."""
+    started: list[Any] = []
+    timers = SimpleNamespace(
+        is_registered=lambda timer: timer in started,
+        register=lambda timer, first_interval: started.append(timer),
+        unregister=started.remove,
+    )
+    app = SimpleNamespace(
+        background=False, timers=timers, is_job_running=lambda kind: kind == rendering
+    )
+    node, surface = dichromatic_node(built.material), surface_node(built.material)
+    assert node is not None and surface is not None
+    with monkeypatch.context() as patch:
+        patch.setattr(live_edits, "bpy", SimpleNamespace(app=app, data=bpy.data))
+        for value in (0.9, 0.8, 0.7):
+            node.inputs["Value"].default_value = value
+            live_edits.settle_edits(built.material)
+            (link,) = surface.inputs["Base Color"].links
+            assert link.from_node == node and len(started) == 1
+        rendering = "RENDER"
+        assert started[0]() is not None and link.is_valid, "it waits for a render to end"
+        rendering = ""
+        assert started[0]() is None
+    (link,) = surface.inputs["Base Color"].links
+    assert link.from_node.type == "TEX_IMAGE"
+
+
+def test_a_saved_file_has_the_edits(built: BuiltObject, tmp_path: Path) -> None:
+    from blender_addon.scene.material_edits import apply_edits
+
+    node, surface = dichromatic_node(built.material), surface_node(built.material)
+    assert node is not None and surface is not None
+    node.inputs["Value"].default_value = 0.5
+    assert apply_edits(built.material)
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"), copy=True)
+    assert surface.inputs["Base Color"].links[0].from_node.type == "TEX_IMAGE"
+
+
+def test_a_material_of_an_earlier_version_is_left_as_it_is(addon: Any) -> None:
+    """Its group is the whole surface, and its sliders work without us."""
+    group = bpy.data.node_groups.new("ISC Dichromatic", "ShaderNodeTree")
+    group["isc_group"], group["isc_group_version"] = "ISC Dichromatic", 2
+    for name in ("Hue", "Saturation", "Value", "Diffuse Gain", "Specular Gain", "Roughness"):
+        group.interface.new_socket(name, in_out="INPUT", socket_type="NodeSocketFloat")
+    group.interface.new_socket("Surface", in_out="OUTPUT", socket_type="NodeSocketShader")
+    material = bpy.data.materials.new("old")
+    material["isc_key"] = "old"
+    if material.node_tree is None:  # before Blender 5
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    node, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
+    node.node_tree = group
+    tree.links.new(node.outputs["Surface"], output.inputs["Surface"])
+    node.inputs["Hue"].default_value = 0.2
+    live_edits.settle_edits(material)
+    live_edits.prepare_export()
+    live_edits.finish_export()
+    assert dichromatic_node(material) == node and surface_node(material) is None
+    assert len(tree.nodes) == 2 and tree.links[0].from_node == node
