@@ -5,9 +5,10 @@
 Objects are those of `closed_loop_cases`: photos, and rendered scenes with known truth. Each is
 decomposed, built in Blender, and rendered by Cycles from the photo's camera.
 
-Exports: the object, as recovered and after edits (hue, value, level, gloss), is written by Blender's
-own exporters for glTF and USD, as File > Export calls them, imported in place of the original, and
-rendered again. PSNR inside the mask; the peak is the 99.9th percentile of the original.
+Exports: the object, as recovered and after edits of hue, value, level and gloss, is written by
+Blender's own exporters for glTF and USD, as File > Export calls them, imported in place of the
+original, and rendered again. PSNR inside the mask; the peak is the 99.9th percentile of the
+original.
 
 Highlights: a sun from each of `LAMPS` lights the object alone. The centre of the highlight is the
 mean place of the pixels with at least half of the largest glossy light, weighted by it. Measured is
