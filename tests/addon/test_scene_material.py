@@ -170,6 +170,24 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     np.testing.assert_allclose(half, 0.5 * gloss[bright], rtol=0.05)
 
 
+def test_the_highlight_moves_with_a_lamp(
+    blender: Any, result: ResultArrays, tmp_path: Path
+) -> None:
+    """Its centre is where the normal halves the angle between lamp and view."""
+    from benchmarks.blender.exported_objects import highlight_centre
+
+    built, view = build(replace(result, specular_level=1.0, roughness=0.25)), np.array([0.0, 0, 1])
+    angles = []
+    for turn in (0.4, 2.5, 4.6):
+        toward = np.array([0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.75**0.5])
+        lamp(built, toward)
+        layers = render(built.scene, tmp_path, samples=16)
+        centre = highlight_centre(layers["Glossy Direct"] * layers["Glossy Color"], result.mask)
+        half = (toward + view) / np.linalg.norm(toward + view)
+        angles.append(np.degrees(np.arccos(result.normal[centre] @ half)))
+    assert max(angles) < 4
+
+
 @pytest.mark.parametrize(("level", "roughness"), [(0.3, 0.2), (1.0, 0.4), (2.0, 0.3)])
 def test_the_object_is_as_bright_as_without_a_specular_layer(
     blender: Any, result: ResultArrays, tmp_path: Path, level: float, roughness: float
