@@ -131,6 +131,7 @@ def test_with_a_window_baking_waits_until_the_slider_rests(
 ) -> None:
     """Each move starts the pause again; meanwhile the group is seen."""
     started: list[Any] = []
+    rendering = ""
     timers = SimpleNamespace(
         is_registered=lambda timer: timer in started,
         register=lambda timer, first_interval: started.append(timer),
