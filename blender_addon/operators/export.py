@@ -3,7 +3,7 @@ textures under the names of other programs, and the recovered maps as OpenEXR.
 
 What is seen is exported: edits are baked first, and the layer with the photo's highlights is hidden
 meanwhile. Objects of files from earlier versions get a plain material meanwhile
-(`scene.export_material`). Blender's OBJ exporter names packed textures without writing them: they
+(`export_material`). Blender's OBJ exporter names packed textures without writing them: they
 are written beside the file.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
@@ -22,9 +22,9 @@ from isc_core.result_files.exports.targets import TARGETS
 
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import is_copy
-from ..scene.export_material import export_material, temporarily_assigned
 from ..scene.material_edits import specular_level, surface_node
 from ..scene.provenance import KEY, ROLE
+from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
 from .texture_set import PLASTIC, linked_image, write_texture_set
 
