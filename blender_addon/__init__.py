@@ -26,7 +26,13 @@ def unregister() -> None:
 
 
 def glTF2_pre_export_callback(export_settings: Any) -> None:
-    """Prepare the materials; Blender's glTF exporter calls this before it reads them."""
+    """Prepare the materials; Blender's glTF exporter calls this before it reads them.
+
+    Parameters
+    ----------
+    export_settings : dict
+        The exporter's settings; not used.
+    """
     from .operators.live_edits import prepare_export
 
     del export_settings
@@ -34,7 +40,13 @@ def glTF2_pre_export_callback(export_settings: Any) -> None:
 
 
 def glTF2_post_export_callback(export_settings: Any) -> None:
-    """Restore the materials; Blender's glTF exporter calls this at its end."""
+    """Restore the materials; Blender's glTF exporter calls this at its end.
+
+    Parameters
+    ----------
+    export_settings : dict
+        The exporter's settings; not used.
+    """
     from .operators.live_edits import finish_export
 
     del export_settings

@@ -199,7 +199,7 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--specular",
-        default="image",
+        default="lobe",
         choices=("lobe", "image", "none"),
         help="source of the highlights (default: %(default)s)",
     )

@@ -16,7 +16,9 @@ from .operators.worker_run import RunState, active_run
 from .scene.build import LIGHT_AND_CAMERA, BuiltObject, find_built
 from .scene.collection import find_layer_collection
 from .scene.copies import objects_sharing_material
+from .scene.material import shows_highlights
 from .scene.material_edits import dichromatic_node
+from .scene.photo_highlights import can_show_highlights
 from .scene.provenance import KEY, find_tagged
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
@@ -187,10 +189,24 @@ class _Edit(_Panel):
         for name in (*_COLOR_EDITS, "Diffuse Gain"):
             column.prop(node.inputs[name], "default_value", text=name)
         column.label(text="Specular", icon="MATERIAL")
-        for name in ("Specular Level", "Roughness"):
-            column.prop(node.inputs[name], "default_value", text=name)
+        shown = shows_highlights(built.material)
+        level = column.column()
+        level.enabled = not shown
+        level.prop(node.inputs["Specular Level"], "default_value", text="Specular Level")
+        gloss = level.column()
+        gloss.enabled = not shown and node.inputs["Specular Level"].default_value > 0
+        for name in ("Roughness", "Gloss Gain"):
+            if name in node.inputs:
+                gloss.prop(node.inputs[name], "default_value", text=name)
         gain = node.inputs["Specular Gain"].default_value
         column.operator("isc.dichromatic", text=f"Specular Gain {gain:.2f}")
+        if shown:
+            column.label(text="The photo's highlights are shown", icon="INFO")
+        elif not gloss.enabled:
+            column.label(text="Without a level there is no gloss", icon="INFO")
+        if can_show_highlights(built.material):
+            text = f"{'Hide' if shown else 'Show'} Photo Highlights"
+            column.operator("isc.photo_highlights", text=text).show = not shown
 
 
 def draw_progress(layout: Any, context: Any) -> None:

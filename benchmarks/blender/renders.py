@@ -180,7 +180,7 @@ def render_scene(
     coverage : (H, W) ndarray
         In [0, 1].
     """
-    scene.render.engine = "CYCLES"
+    scene.render.engine, scene.render.film_transparent = "CYCLES", True
     cycles, image = scene.cycles, scene.render.image_settings
     cycles.device, cycles.samples, cycles.seed = "CPU", samples, 0
     cycles.use_denoising, cycles.use_adaptive_sampling = False, False

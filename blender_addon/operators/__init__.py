@@ -2,7 +2,13 @@
 
 from .asset import ISC_OT_save_asset
 from .decompose import ISC_OT_confirm_overwrite, ISC_OT_decompose, ISC_OT_redo
-from .edit import ISC_OT_dichromatic, ISC_OT_own_material, ISC_OT_recolour, ISC_OT_relight
+from .edit import (
+    ISC_OT_dichromatic,
+    ISC_OT_own_material,
+    ISC_OT_photo_highlights,
+    ISC_OT_recolour,
+    ISC_OT_relight,
+)
 from .export import ISC_OT_export, ISC_OT_export_textures
 from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
 from .mask_points import ISC_OT_auto_mask, ISC_OT_clear_points, ISC_OT_mark_point
@@ -39,6 +45,7 @@ CLASSES = (
     ISC_OT_recolour,
     ISC_OT_dichromatic,
     ISC_OT_own_material,
+    ISC_OT_photo_highlights,
     ISC_OT_relight,
     ISC_OT_export,
     ISC_OT_export_textures,

@@ -10,7 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty
 
 from isc_core.errors import InputError
 
@@ -18,6 +18,7 @@ from ..scene.build import BuiltObject, find_built
 from ..scene.copies import find_material, make_material_single_user
 from ..scene.material import set_specular_gain
 from ..scene.material_edits import dichromatic_node
+from ..scene.photo_highlights import can_show_highlights, hide_highlights, show_highlights
 from ..scene.provenance import KEY
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
@@ -240,6 +241,43 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
         """
         single_user_inputs(built)["Diffuse Gain"].default_value = self.diffuse_gain
         set_specular_gain(find_material(built.object), self.specular_gain)
+
+
+class ISC_OT_photo_highlights(EditOperator, bpy.types.Operator):
+    """Show the photo's own highlights, or those of the surface."""
+
+    bl_idname = "isc.photo_highlights"
+    bl_label = "Photo Highlights"
+    bl_description = (
+        "Show the photo's own highlights instead of the surface's, until light, camera or object "
+        "move"
+    )
+
+    show: BoolProperty(name="Show", description="Show the highlights of the photo", default=True)
+
+    def edit(self, built: BuiltObject) -> None:
+        """Add or remove the layer; see `EditOperator`.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object; afterwards no other object shares its material.
+
+        Raises
+        ------
+        InputError
+            As `dichromatic_inputs`, or if the material has no such image.
+        """
+        single_user_inputs(built)
+        material = find_material(built.object) or built.material
+        if not self.show:
+            hide_highlights(material)
+        elif can_show_highlights(material):
+            show_highlights(material)
+        else:
+            raise InputError(
+                f"{material.name} has no image of the photo's highlights: create the object again"
+            )
 
 
 class ISC_OT_own_material(EditOperator, bpy.types.Operator):

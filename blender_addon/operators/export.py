@@ -3,14 +3,14 @@ textures under the names of other programs, and the recovered maps as OpenEXR.
 
 What is seen is exported: edits are baked first, and the layer with the photo's highlights is hidden
 meanwhile. Objects of files from earlier versions get a plain material meanwhile
-(`scene.export_material`). Blender's OBJ exporter names packed textures without writing them: they
+(`export_material`). Blender's OBJ exporter names packed textures without writing them: they
 are written beside the file.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -22,13 +22,13 @@ from isc_core.result_files.exports.targets import TARGETS
 
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import is_copy
-from ..scene.export_material import export_material, temporarily_assigned
-from ..scene.material_edits import surface_node
+from ..scene.material_edits import specular_level, surface_node
 from ..scene.provenance import KEY, ROLE
+from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
-from .texture_set import linked_image, write_texture_set
+from .texture_set import PLASTIC, linked_image, write_texture_set
 
-_EXR_MAGIC = b"v/1\x01"
+_EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
 # Names of the recovered maps in files, where they differ from the role.
 _MAP_NAMES = {"lobe": "specular_fit", "residual": "difference", "reflectance": "albedo"}
 # Light and camera are the scene's; textures are the material's.
@@ -83,7 +83,7 @@ def _export_obj(path: Path) -> None:
         filepath=str(path),
         export_selected_objects=True,
         export_pbr_extensions=True,
-        path_mode="RELATIVE",
+        path_mode="STRIP",
     )
 
 
@@ -362,13 +362,15 @@ def _export_mesh(built: BuiltObject, folder: Path, file_format: str) -> str:
     suffix, export = _EXPORTERS[file_format]
     path = folder / f"{folder.name}{suffix}"
     selected = [obj for obj in bpy.context.selected_objects if obj != built.object]
-    with _exportable(built):
+    with _exportable(built), ExitStack() as stack:
         try:
             for obj in selected:
                 obj.select_set(False)
             built.object.select_set(True, view_layer=bpy.context.view_layer)
             if file_format == "OBJ":
-                _write_textures(built.object, folder)
+                stack.enter_context(_textures_beside(built.object, folder))
+            if file_format == "FBX":
+                stack.enter_context(_level_as_blenders(built.material))
             export(path)
         except (RuntimeError, AttributeError) as error:
             reason = str(error).strip().splitlines()[-1]
@@ -400,11 +402,42 @@ def _exportable(built: BuiltObject) -> Iterator[None]:
         yield
 
 
-def _write_textures(obj: bpy.types.Object, folder: Path) -> None:
+@contextmanager
+def _level_as_blenders(material: bpy.types.Material) -> Iterator[None]:
+    """The specular level is Blender's own meanwhile: FBX has no index of refraction."""
+    surface = surface_node(material)
+    if surface is None:
+        yield
+        return
+    sockets = surface.inputs["Specular IOR Level"], surface.inputs["IOR"]
+    before = [socket.default_value for socket in sockets]
+    level = PLASTIC * specular_level(surface)
+    try:
+        for socket, value in zip(sockets, (level, 1.5), strict=True):
+            socket.default_value = value
+        yield
+    finally:
+        for socket, value in zip(sockets, before, strict=True):
+            socket.default_value = value
+
+
+@contextmanager
+def _textures_beside(obj: bpy.types.Object, folder: Path) -> Iterator[None]:
+    """The packed textures are files in the folder, and have their paths while the context lasts."""
+    written = []
     for slot in obj.material_slots:
         nodes = slot.material.node_tree.nodes if slot.material is not None else ()
         for node in nodes:
             image = node.image if node.type == "TEX_IMAGE" else None
-            if image is not None and image.packed_file is not None and image.filepath_raw:
-                name = Path(bpy.path.abspath(image.filepath_raw)).name
-                (folder / name).write_bytes(image.packed_file.data)
+            packed = image.packed_file if image is not None else None
+            if image is None or packed is None or packed.data[:4] != _PNG_MAGIC:
+                continue
+            path = folder / f"{bpy.path.clean_name(image.name)}.png"
+            path.write_bytes(packed.data)
+            written.append((image, image.filepath_raw))
+            image.filepath_raw = str(path)
+    try:
+        yield
+    finally:
+        for image, before in written:
+            image.filepath_raw = before

@@ -6,77 +6,34 @@ highlights of the photo that no longer belong to what is seen are turned off
 and before a file is saved or exported, it happens at once.
 
 glTF's exporter asks for `prepare_export` and `finish_export` through the functions of the package
-that are named after its interface. USD's exporter calls `ISC_USD_material`: USD's own material has
-no specular level, and takes the index of refraction that reflects as much.
+that are named after its interface.
 """
-# mypy: allow-subclassing-any
 
 from collections.abc import Iterator
-from math import sqrt
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..scene.material import shows_highlights
-from ..scene.material_edits import apply_edits, bake_edits, surface_node
+from ..scene.material_edits import apply_edits, bake_edits
 from ..scene.photo_highlights import has_moved, hide_highlights, show_highlights
 from ..scene.provenance import KEY
 
 _PAUSE, _SHOWN = 0.4, 6.0  # seconds: without a change before baking; of a line in the status bar
-_MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
 _MATERIAL_KINDS = ("MATERIAL", "NODETREE")
 _VIEW_KINDS = ("OBJECT", "LIGHT", "CAMERA", "WORLD", "NODETREE", "SCENE")
 _HIDDEN_FOR_EXPORT = "isc_hidden_for_export"
-
-
-class ISC_USD_material(bpy.types.USDHook):
-    """Gives exported materials the index of refraction of their specular level."""
-
-    bl_idname = "isc_usd_material"
-    bl_label = "ISC Specular Level"
-    bl_description = "Export the specular level as index of refraction"
-
-    @staticmethod
-    def on_material_export(context: Any, material: Any, usd_material: Any) -> bool:
-        """Set the index of refraction.
-
-        Parameters
-        ----------
-        context : bpy.types.USDMaterialExportContext
-            Blender's context of the export; not used.
-        material : bpy.types.Material
-            The material.
-        usd_material : pxr.UsdShade.Material
-            The exported material.
-
-        Returns
-        -------
-        bool
-            Whether the material was changed.
-        """
-        surface = surface_node(material)
-        if surface is None:
-            return False
-        shader = usd_material.ComputeSurfaceSource("")[0]
-        index = shader.GetInput("ior") if shader else None
-        if not index:
-            return False
-        amplitude = sqrt(min(0.08 * surface.inputs["Specular IOR Level"].default_value, _MOST))
-        index.Set((1 + amplitude) / (1 - amplitude))
-        return True
 
 
 def add_handlers() -> None:
     """Follow edits from now on."""
     bpy.app.handlers.depsgraph_update_post.append(_after_update)
     bpy.app.handlers.save_pre.append(_before_saving)
-    bpy.utils.register_class(ISC_USD_material)
 
 
 def remove_handlers() -> None:
     """Stop following edits."""
-    bpy.utils.unregister_class(ISC_USD_material)
     bpy.app.handlers.save_pre.remove(_before_saving)
     bpy.app.handlers.depsgraph_update_post.remove(_after_update)
     for timer in (_bake_when_idle, _clear_status):

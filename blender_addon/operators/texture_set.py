@@ -26,9 +26,10 @@ from isc_core.shading.ambient_occlusion import ambient_occlusion
 
 from ..files.png import encode_png
 from ..scene.build import BuiltObject
-from ..scene.material_edits import LEVEL_FACTOR, linear_colors, surface_node
+from ..scene.material_edits import LEVEL_FACTOR, linear_colors, specular_level, surface_node
 
 FORMATS = ("PNG8", "PNG16", "EXR")
+PLASTIC = 0.5  # of a specular texture, as in Blender and Unreal
 _FLAT = (0.5, 0.5, 1.0)
 
 
@@ -145,8 +146,8 @@ class _Planes:
         factor = _source(level)
         image = linked_image(factor.inputs[0]) if factor is not None else None
         if factor is None or factor.name != LEVEL_FACTOR or image is None:
-            return np.full(self.size, min(1.0, level.default_value))
-        share = linear_colors(image)[::-1, :, 0] * factor.inputs[1].default_value
+            return np.full(self.size, min(1.0, PLASTIC * specular_level(self.surface)))
+        share = linear_colors(image)[::-1, :, 0] * PLASTIC * specular_level(self.surface)
         return np.asarray(np.clip(share, 0, 1))
 
     @property

@@ -30,8 +30,12 @@ LIGHT_MODULES = frozenset(
         "isc_core.progress",
         "isc_core.result_files.diagnostics_json",
         "isc_core.result_files.diagnostics_text",
+        "isc_core.result_files.exports.targets",
         "isc_core.result_files.reading_notes_text",
         "isc_core.scene.diagnostics",
+        "isc_core.shading.ambient_occlusion",
+        "isc_core.shading.brdf.energy",
+        "isc_core.shading.brdf.ggx",
     }
 )
 _BLENDER = {

@@ -3,9 +3,10 @@ Principled BSDF.
 
 Equation: base colour = g_d v (1 - p s) rotated(rho; hue, saturation), g_d the diffuse gain, v the
 value, p 1 while the photo's own highlights are shown and s the share of the light that the specular
-layer takes from the diffuse one (`specular_share`). Blender's specular level = .5 (1 - p) g_s L for
-a level L (1 is plastic, .04 along the normal) and its gain g_s; roughness = min(1, r / g) for the
-gain g of the gloss.
+layer takes from the diffuse one (`specular_share`). For a specular level L (1 is plastic) and its
+gain g_s, the reflectance along the normal is f0 = min(.04 (1 - p) g_s L, .96), and the index of
+refraction is (1 + sqrt f0) / (1 - sqrt f0): unlike Blender's own level, USD has it, too. Roughness
+= min(1, r / g) for the gain g of the gloss.
 
 The group holds the values; its outputs are linked only while a slider moves. Otherwise the BSDF has
 images and numbers, which every exporter reads: see `material_edits`.
@@ -26,9 +27,12 @@ from typing import Any
 
 import bpy
 
+from isc_core.shading.brdf.ggx import F0
+
 from .nodes import add_node, connect
 
 VERSION = 3
+MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
 
 
@@ -156,7 +160,7 @@ HIGHLIGHTS_INPUTS = (
 
 _DICHROMATIC_OUTPUTS = (
     ("Base Color", "Color", "Edited color of the surface"),
-    ("Specular IOR Level", "Float", "Edited specular level as the Principled BSDF has it"),
+    ("IOR", "Float", "Index of refraction of the edited specular level"),
     ("Roughness", "Float", "Edited roughness"),
 )
 _HIGHLIGHTS_OUTPUTS = (("Surface", "Shader", "The photo's highlights"),)
@@ -236,19 +240,27 @@ def _create_group(
 
 def _wire_dichromatic(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
     inputs = add_node(group, "NodeGroupInput", (-1100, 0)).outputs
-    output = add_node(group, "NodeGroupOutput", (300, 100))
+    output = add_node(group, "NodeGroupOutput", (380, 100))
     shown = add_node(group, "Math", (-800, -350), operation="SUBTRACT", label="Own Highlights")
     shown.inputs[0].default_value = 1.0
     level = _product(group, inputs["Specular Level"], inputs["Specular Gain"], (-800, -150))
     level = _product(group, level, shown.outputs["Value"], (-600, -150))
+    f0 = _math(group, "MINIMUM", _product(group, level, F0, (-400, -150)), MOST, (-250, -150))
+    amplitude = _math(group, "SQRT", f0, 0.0, (-100, -150))
+    above = _math(group, "ADD", amplitude, 1.0, (50, -100))
+    below = add_node(group, "Math", (50, -250), operation="SUBTRACT")
+    below.inputs[0].default_value = 1.0
+    index = add_node(group, "Math", (180, -150), operation="DIVIDE", label="Index of Refraction")
     rougher = add_node(group, "Math", (-600, -350), operation="DIVIDE", label="Gloss Gain")
     roughness = add_node(group, "Math", (-400, -350), operation="MINIMUM", label="At Most 1")
     roughness.inputs[1].default_value = 1.0
     connect(
         group,
         (inputs["Photo Highlights"], shown.inputs[1]),
-        # Blender's level of plastic is 0.5.
-        (_product(group, level, 0.5, (-400, -150)), output.inputs["Specular IOR Level"]),
+        (amplitude, below.inputs[1]),
+        (above, index.inputs[0]),
+        (below.outputs["Value"], index.inputs[1]),
+        (index.outputs["Value"], output.inputs["IOR"]),
         (inputs["Roughness"], rougher.inputs[0]),
         (inputs["Gloss Gain"], rougher.inputs[1]),
         (rougher.outputs["Value"], roughness.inputs[0]),
@@ -314,7 +326,17 @@ def _product(
     second: bpy.types.NodeSocket | float,
     location: tuple[float, float],
 ) -> bpy.types.NodeSocket:
-    node = add_node(group, "Math", location, operation="MULTIPLY")
+    return _math(group, "MULTIPLY", first, second, location)
+
+
+def _math(
+    group: bpy.types.NodeTree,
+    operation: str,
+    first: bpy.types.NodeSocket,
+    second: bpy.types.NodeSocket | float,
+    location: tuple[float, float],
+) -> bpy.types.NodeSocket:
+    node = add_node(group, "Math", location, operation=operation)
     group.links.new(first, node.inputs[0])
     if isinstance(second, float):
         node.inputs[1].default_value = second

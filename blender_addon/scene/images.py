@@ -3,10 +3,8 @@
 Blender counts rows from below, the maps from above. Maps are float32: colours "Linear Rec.709",
 everything else "Non-Color", so that the values are used unchanged; packed, they are 32-bit OpenEXR,
 and saving the file loses nothing. Textures are what other programs read: PNG of 8 bits, colours
-coded as sRGB, everything else "Non-Color". Their file names are those that exporters write.
+coded as sRGB, everything else "Non-Color". Exporters name files by the images' names.
 """
-
-import re
 
 import bpy
 import numpy as np
@@ -146,7 +144,12 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
     """
     rows, columns = values.shape[:2]
     name = TEXTURE_NAMES[role]
-    image = bpy.data.images.new(datablock_name(key, name), columns, rows, alpha=values.ndim == 2)
+    image = bpy.data.images.new(
+        f"{datablock_name(key, name)[: -len(name) - 1]}_{name}",
+        columns,
+        rows,
+        alpha=values.ndim == 2,
+    )
     image.colorspace_settings.name = space
     shares = np.clip(values, 0, 1)
     pixels = np.ones((rows, columns, 4), np.float32)
@@ -156,7 +159,6 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
     else:
         pixels[..., :3] = linear_to_srgb(shares) if space == SRGB else shares
     image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw = f"//{re.sub(r'[^0-9A-Za-z._-]', '_', key)}_{name}.png"
     image.file_format = "PNG"
     image.pack()
     return image

@@ -14,6 +14,7 @@ from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .material_edits import (
     BASE_COLOR,
     LEVEL_FACTOR,
+    OWN_LEVEL,
     SURFACE,
     bake_edits,
     dichromatic_node,
@@ -175,6 +176,7 @@ def _add_surface(
         parent=edits,
     )
     bsdf = add_node(tree, "BsdfPrincipled", (50, 420), name=SURFACE, parent=surface)
+    bsdf.inputs["Specular IOR Level"].default_value = OWN_LEVEL
     output = add_node(tree, "OutputMaterial", (400, 420), parent=surface)
     connect(
         tree,
@@ -193,6 +195,7 @@ def _add_surface(
             operation="MULTIPLY",
             parent=surface,
         )
+        factor.inputs[1].default_value = OWN_LEVEL
         connect(
             tree,
             (variation.outputs["Color"], factor.inputs[0]),

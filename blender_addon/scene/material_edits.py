@@ -25,8 +25,9 @@ import bpy
 import numpy as np
 
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.shading.brdf.ggx import F0
 
-from .dichromatic import DICHROMATIC
+from .dichromatic import DICHROMATIC, MOST
 from .images import SRGB, new_texture
 from .nodes import add_node
 from .provenance import KEY, ROLE, tag
@@ -37,6 +38,9 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Edited Base Color",
     "Specular Level",
 )
+# Blender's own level of the BSDF: .5 is plastic. With exactly .5, its glTF exporter leaves out the
+# index of refraction.
+OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
 _UNCHANGED = 1e-6  # as in the group
 
@@ -216,6 +220,42 @@ def recolour_reflectance(
     return np.asarray(gain * (value[..., None] - removed))
 
 
+def refraction(level: float) -> float:
+    """Return the index of refraction of a specular level.
+
+    Parameters
+    ----------
+    level : float
+        0 or more; 1 is plastic.
+
+    Returns
+    -------
+    float
+        1 or more.
+    """
+    amplitude = min(F0 * level, MOST) ** 0.5
+    return float((1 + amplitude) / (1 - amplitude))
+
+
+def specular_level(surface: Any) -> float:
+    """Return the specular level of a Principled BSDF, from its index of refraction.
+
+    Parameters
+    ----------
+    surface : bpy.types.ShaderNodeBsdfPrincipled
+        The BSDF; its own level, or its factor, is 0.5 for plastic.
+
+    Returns
+    -------
+    float
+        1 is plastic; without the spatial variation.
+    """
+    index = surface.inputs["IOR"].default_value
+    level = surface.inputs["Specular IOR Level"]
+    factor = OWN_LEVEL if level.is_linked else level.default_value
+    return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / 0.5)
+
+
 def linear_colors(image: bpy.types.Image) -> np.ndarray:
     """Return the colours of an image.
 
@@ -277,14 +317,10 @@ def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> N
             "Photo Highlights",
         )
     )
-    # Blender's level of plastic is 0.5.
-    wanted = [0.5 * level * gain * (1 - shown), min(1.0, roughness / max(gloss, 1e-3))]
+    wanted = [refraction(level * gain * (1 - shown)), min(1.0, roughness / max(gloss, 1e-3))]
     written = material.get(_NUMBERS)
     if written is None or abs(written[0] - wanted[0]) > _UNCHANGED:
-        surface.inputs["Specular IOR Level"].default_value = wanted[0]
-        factor = material.node_tree.nodes.get(LEVEL_FACTOR)
-        if factor is not None:
-            factor.inputs[1].default_value = wanted[0]
+        surface.inputs["IOR"].default_value = wanted[0]
     if written is None or abs(written[1] - wanted[1]) > _UNCHANGED:
         surface.inputs["Roughness"].default_value = wanted[1]
     if written is None or np.abs(np.subtract(list(written), wanted)).max() > 0:

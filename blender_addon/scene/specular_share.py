@@ -23,9 +23,10 @@ import numpy as np
 from isc_core.shading.brdf.energy import directional_albedo
 from isc_core.shading.brdf.ggx import F0, Ggx
 
+from .dichromatic import MOST
+
 _ANGLES, _NODES = 10, 32
 _SMALLEST_ROUGHNESS = 0.05
-_MOST = 0.96  # of the reflectance along the normal
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def specular_share(level: float, roughness: float, cosines: np.ndarray) -> float
     """
     if level <= 0:
         return 0.0
-    layer = _Layer(max(roughness, _SMALLEST_ROUGHNESS) ** 2, min(F0 * level, _MOST))
+    layer = _Layer(max(roughness, _SMALLEST_ROUGHNESS) ** 2, min(F0 * level, MOST))
     places = np.linspace(1 / _ANGLES, 1, _ANGLES)
     albedos = [float(directional_albedo(layer, float(one), _NODES)) for one in places]
     return float(np.interp(cosines, places, albedos).mean())

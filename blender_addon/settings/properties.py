@@ -351,7 +351,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Highlights",
         description="Where the material's highlights come from",
         items=SPECULAR_SOURCES,
-        default="image",
+        default="lobe",
     )
 
 

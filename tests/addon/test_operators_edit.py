@@ -327,14 +327,10 @@ def surface(path: Path) -> dict[str, Any]:
     return tree["materials"][0]
 
 
-def specular_factor(path: Path) -> float:
-    """1, the default of the glTF extension, if absent."""
-    return float(
-        surface(path)
-        .get("extensions", {})
-        .get("KHR_materials_specular", {})
-        .get("specularFactor", 1.0)
-    )
+def exported_level(path: Path) -> float:
+    """The specular level of a file, from its index of refraction; 1.5 if absent."""
+    index = surface(path).get("extensions", {}).get("KHR_materials_ior", {}).get("ior", 1.5)
+    return float(((index - 1) / (index + 1)) ** 2 / 0.04)
 
 
 @pytest.mark.parametrize(
@@ -392,7 +388,7 @@ def test_the_fitted_level_is_exported_unless_highlights_are_off(
     set_specular_gain(thing.material, 0.5)
     export_object(thing, tmp_path)
     path = tmp_path / "bump" / "bump.glb"
-    assert specular_factor(path) == pytest.approx(level)
+    assert exported_level(path) == pytest.approx(level, rel=0.01)
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
 
 
@@ -405,7 +401,7 @@ def test_an_unknown_specular_level_is_not_exported(
         ),
         tmp_path,
     )
-    assert specular_factor(tmp_path / "bump" / "bump.glb") == 0
+    assert exported_level(tmp_path / "bump" / "bump.glb") == 0
 
 
 def test_a_constant_reflectance_is_exported_and_other_nodes_are_refused(

@@ -170,6 +170,24 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     np.testing.assert_allclose(half, 0.5 * gloss[bright], rtol=0.05)
 
 
+def test_the_highlight_moves_with_a_lamp(
+    blender: Any, result: ResultArrays, tmp_path: Path
+) -> None:
+    """Its centre is where the normal halves the angle between lamp and view."""
+    from benchmarks.blender.exported_objects import highlight_centre
+
+    built, view = build(replace(result, specular_level=1.0, roughness=0.25)), np.array([0.0, 0, 1])
+    angles = []
+    for turn in (0.4, 2.5, 4.6):
+        toward = np.array([0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.75**0.5])
+        lamp(built, toward)
+        layers = render(built.scene, tmp_path, samples=16)
+        centre = highlight_centre(layers["Glossy Direct"] * layers["Glossy Color"], result.mask)
+        half = (toward + view) / np.linalg.norm(toward + view)
+        angles.append(np.degrees(np.arccos(result.normal[centre] @ half)))
+    assert max(angles) < 4
+
+
 @pytest.mark.parametrize(("level", "roughness"), [(0.3, 0.2), (1.0, 0.4), (2.0, 0.3)])
 def test_the_object_is_as_bright_as_without_a_specular_layer(
     blender: Any, result: ResultArrays, tmp_path: Path, level: float, roughness: float
@@ -189,21 +207,23 @@ def test_the_object_is_as_bright_as_without_a_specular_layer(
 
 
 def test_gloss_and_gains_are_numbers_on_the_surface(blender: Any, result: ResultArrays) -> None:
+    from blender_addon.scene.material_edits import specular_level
+
     built = build(replace(result, specular_level=0.8, roughness=0.4))
     inputs = surface(built).inputs
 
     def numbers() -> list[float]:
-        assert not inputs["Roughness"].is_linked and not inputs["Specular IOR Level"].is_linked
-        return [inputs[name].default_value for name in ("Specular IOR Level", "Roughness")]
+        assert not inputs["Roughness"].is_linked and not inputs["IOR"].is_linked
+        return [specular_level(surface(built)), inputs["Roughness"].default_value]
 
-    assert numbers() == pytest.approx([0.4, 0.4])
+    assert numbers() == pytest.approx([0.8, 0.4], rel=0.005)
     edit(built, Specular_Gain=2.0, Gloss_Gain=2.0)
-    assert numbers() == pytest.approx([0.8, 0.2])
+    assert numbers() == pytest.approx([1.6, 0.2], rel=0.005)
     inputs["Roughness"].default_value = 0.7
     edit(built, Hue=0.3)
-    assert numbers() == pytest.approx([0.8, 0.7]), "an edit of the BSDF itself is kept"
+    assert numbers() == pytest.approx([1.6, 0.7], rel=0.005), "an edit of the BSDF itself is kept"
     edit(built, Gloss_Gain=0.1)
-    assert numbers() == pytest.approx([0.8, 1.0])
+    assert numbers() == pytest.approx([1.6, 1.0], rel=0.005)
 
 
 def test_an_edited_color_is_an_image_and_an_unedited_one_the_original(
@@ -303,7 +323,7 @@ def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result
     assert node.inputs["Specular Level"].default_value == pytest.approx(1.7)
     (link,) = surface(build(fitted)).inputs["Specular IOR Level"].links
     factor, role = link.from_node, link.from_node.inputs[0].links[0].from_node.image["isc_role"]
-    assert role == "specular_variation" and factor.inputs[1].default_value == pytest.approx(0.85)
+    assert role == "specular_variation" and factor.inputs[1].default_value == pytest.approx(0.499)
     built = build(fitted, specular_from="none")
     assert group_node(built).inputs["Specular Level"].default_value == 0
     assert not surface(built).inputs["Specular IOR Level"].is_linked
@@ -329,7 +349,7 @@ def test_the_photos_highlights_are_visible_and_emit_no_light(
     ]
     sources = {link.from_socket.name for link in strength.links[0].from_node.inputs[0].links}
     assert sources == {"Is Camera Ray"}
-    assert surface(built).inputs["Specular IOR Level"].default_value == 0, "not both at once"
+    assert surface(built).inputs["IOR"].default_value == 1, "not both at once"
     build(result)
     kinds = {
         node.type
