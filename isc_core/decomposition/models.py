@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
+from .ahead import Ahead
 from .assumption_checks import with_warnings
 from .detail import with_fine_relief
 from .light_colour import under_given_light, under_light
@@ -54,8 +55,10 @@ def _solved(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Predict, solve and check."""
-    task = with_predictions(task)
-    estimate = replace(under_light(task, solver), prediction=task.prediction)
+    with Ahead(task) as ahead:
+        task = with_predictions(task)
+        estimate = under_light(task, lambda lit: solver(ahead.added(lit)))
+    estimate = replace(estimate, prediction=task.prediction)
     estimate = with_fine_relief(task, estimate)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate

@@ -1,10 +1,7 @@
 """What the compiled kernels promise whatever they compute."""
 
-import pytest
-
-numba = pytest.importorskip("numba")
-
-from isc_core.sirfs import kernels, vector_kernels  # noqa: E402
+from isc_core.numerics.jit import Kernel
+from isc_core.sirfs import kernels, vector_kernels
 
 
 def test_what_kernels_call_is_part_of_them():
@@ -12,18 +9,12 @@ def test_what_kernels_call_is_part_of_them():
     cache, and rounds otherwise.
     """
     for module in (kernels, vector_kernels):
-        dispatchers = {
-            name: one
-            for name, one in vars(module).items()
-            if isinstance(one, numba.core.registry.CPUDispatcher)
-        }
+        compiled = {name: one for name, one in vars(module).items() if isinstance(one, Kernel)}
         called = {
             name
-            for one in dispatchers.values()
-            for name in one.py_func.__code__.co_names
-            if name in dispatchers
+            for one in compiled.values()
+            for name in one.function.__code__.co_names
+            if name in compiled
         }
-        assert all(dispatchers[name].targetoptions.get("forceinline") for name in called), sorted(
-            called
-        )
+        assert all(compiled[name].inline for name in called), sorted(called)
         assert module is vector_kernels or len(called) >= 2
