@@ -132,6 +132,7 @@ class Kernel:
             forceinline=self.inline,
         )(self._linked())
         drop_broken(Path(str(dispatcher.stats.cache_path)))
+        _load_alone(dispatcher)
         return cast(Callable[..., Any], dispatcher)
 
     def _linked(self) -> Callable[..., Any]:
@@ -145,6 +146,28 @@ class Kernel:
             if name in function.__code__.co_names or name.startswith("__")
         }
         return FunctionType(function.__code__, names, function.__name__)
+
+
+def _load_alone(dispatcher: Any) -> None:
+    """Let a dispatcher load compiled code without what only the compiler needs.
+
+    Before it looks into its cache, Numba imports all that it can compile (a fifth of a second, with
+    `scipy.linalg`), and compiling does so again. Code that is compiled needs Numba's runtime alone.
+    """
+    try:
+        from numba.core.caching import FunctionCache
+        from numba.core.runtime.nrt import rtsys
+    except ImportError:  # a version that has them elsewhere: as it is
+        return
+
+    class LoadingCache(FunctionCache):
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+            return None
+
+    dispatcher._cache = LoadingCache(dispatcher.py_func)
 
 
 def numba_available() -> bool:
