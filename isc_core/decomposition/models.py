@@ -20,6 +20,8 @@ from dataclasses import replace
 from functools import partial
 from types import TracebackType
 
+from ..io.memory import LARGE, give_back_memory
+from ..networks.detail_network import DetailNetwork
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..sirfs.kernel_cache import load_kernels
@@ -70,6 +72,8 @@ def _solved(
         task = with_predictions(task)
         estimate = under_light(task, lambda lit: solver(ahead.added(lit)))
     estimate = replace(estimate, prediction=task.prediction)
+    if task.maps.mask.size > LARGE:
+        give_back_memory()
     estimate = with_fine_relief(task, estimate)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
@@ -94,6 +98,8 @@ class _Ahead:
         self._kernels: Future[None] | None = None
         if settings.engine != "numpy" and task.prior_set is None:
             self._kernels = self._pool.submit(load_kernels, settings.illumination)
+        if settings.detail and task.options.detail_network is None:
+            self._pool.submit(DetailNetwork.shipped)  # read once; it is asked after the solve
 
     def added(self, task: DecompositionTask) -> DecompositionTask:
         """Return the task with the layers that were separated ahead; waits for all the work.

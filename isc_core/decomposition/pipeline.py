@@ -6,6 +6,7 @@ maps that satisfy the identities.
 
 import platform
 import sys
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
-from ..io.memory import enough_memory, require_memory
+from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -111,11 +112,7 @@ def decompose(
                 "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
                 "or use a larger photo"
             )
-    height, width = maps.mask.shape
-    work = f"{name or 'the photo'}: {width} x {height} pixels to decompose"
-    needed = _LEAST_BYTES + _WORKING_BYTES * working.mask.size + _MAPS_BYTES * maps.mask.size
-    require_memory(work, needed, memory, _REMEDY)
-    with enough_memory(work, needed, _REMEDY):
+    with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
         estimate = solve(
             DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
         )
@@ -130,9 +127,11 @@ def decompose(
     )
     with clock.stage("maps"):
         result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
-        if estimate.prediction is None or inputs.height is not None:
-            return result
-        return with_expected_error(result, estimate.prediction, working)
+        if estimate.prediction is not None and inputs.height is None:
+            result = with_expected_error(result, estimate.prediction, working)
+    if maps.mask.size > LARGE:
+        give_back_memory()
+    return result
 
 
 def _working(photo: Photo, maps: Photo) -> Photo:
@@ -142,6 +141,16 @@ def _working(photo: Photo, maps: Photo) -> Photo:
         return maps
     working = photo.resized_to_object(WORKING_SIZE)
     return maps if working.scale == maps.scale else working
+
+
+def _within_memory(
+    name: str, working_size: int, shape: tuple[int, ...], allowed: int | None
+) -> AbstractContextManager[None]:
+    """Refuse a photo that needs more memory than allowed; errors of the block say how much."""
+    work = f"{name}: {shape[1]} x {shape[0]} pixels to decompose"
+    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * shape[0] * shape[1]
+    require_memory(work, needed, allowed, _REMEDY)
+    return enough_memory(work, needed, _REMEDY)
 
 
 def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | None) -> None:

@@ -9,6 +9,8 @@ than there is, and ends a process that uses it, which no process can report: wor
 need more than is free is refused before it begins (`require_memory`).
 """
 
+import contextlib
+import ctypes
 import mmap
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,6 +19,7 @@ from pathlib import Path
 from ..errors import InputError
 
 _SYSTEM, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
+LARGE = 1 << 20  # pixels: memory of larger photos is worth the time that giving it back takes
 READING = 32  # bytes a pixel, at most, from the file to linear light
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
 
@@ -86,6 +89,15 @@ def free_memory(system: Path = _SYSTEM, group: Path = _GROUP) -> int | None:
     except (OSError, ValueError):  # no group, or one without a limit: "max"
         pass
     return max(0, min(known))
+
+
+def give_back_memory() -> None:
+    """Give memory that was freed back to the system, where the C library can.
+
+    It keeps what it may need again, in pieces: after work on large arrays, as much as is in use.
+    """
+    with contextlib.suppress(OSError, AttributeError):  # another library than glibc
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> None:
