@@ -18,6 +18,9 @@ from contextlib import suppress
 from typing import NoReturn
 
 _CANCELLED = 130
+# Seconds (Python's own are 5e-3) that a thread waits, after each array operation, for one that
+# imports.
+_SWITCH = 5e-4
 
 
 def _end(number: int, frame: object) -> None:
@@ -34,6 +37,7 @@ def start() -> NoReturn:
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
     gc.disable()  # until `cli.main` has imported the command
+    sys.setswitchinterval(_SWITCH)
     from .cli.main import main
 
     code = main()
