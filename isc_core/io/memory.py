@@ -19,7 +19,7 @@ from pathlib import Path
 from ..errors import InputError
 
 _SYSTEM, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
-LARGE = 1 << 20  # pixels: memory of larger photos is worth the time that giving it back takes
+LARGE = 1 << 18  # pixels: memory of larger photos is worth the time that giving it back takes
 READING = 32  # bytes a pixel, at most, from the file to linear light
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
 
