@@ -32,7 +32,7 @@ from .light_colour import under_given_light, under_light
 from .predictions import with_predictions
 from .settings import SEPARATING_MODELS, SIRFS_MODELS, LightColour, Settings
 from .task import DecompositionTask, SceneEstimate, SolveOptions
-from .toning import under_tone
+from .toning import is_grey, under_tone
 
 
 def solve(task: DecompositionTask) -> SceneEstimate:
@@ -96,7 +96,7 @@ class _Ahead:
         if separates and settings.light_colour != LightColour.ESTIMATE:
             self._split = self._pool.submit(_separated, task)
         self._kernels: Future[None] | None = None
-        if settings.engine != "numpy" and task.prior_set is None:
+        if settings.engine != "numpy" and task.prior_set is None and not is_grey(task.maps):
             self._kernels = self._pool.submit(load_kernels, settings.illumination)
         if settings.detail and task.options.detail_network is None:
             self._pool.submit(DetailNetwork.shipped)  # read once; it is asked after the solve

@@ -3,10 +3,12 @@
 Problem: Numba takes a quarter of a second to import, and as long again to load two dozen compiled
 kernels. None of it depends on the photo.
 
-Equation: a ball of a few pixels is solved for one step: this calls every kernel that a colour photo
-needs, with arrays of the same types.
+Equation: a ball of a few pixels is solved for two steps, which call each kernel that a colour photo
+needs, with arrays of the same types. It is enlarged for that, as photos are made to fit: resampled
+masks are stored by columns.
 
-Limits: other kernels, those of grey photos and of depth, are loaded when they are called.
+Limits: other kernels, those of grey photos, of depth, and of photos that fit already, are loaded
+when they are called.
 """
 
 import sys
@@ -28,6 +30,7 @@ from .settings import Start, isc_weights
 from .solver import SolverOptions
 
 _RADIUS = 12  # pixels of the ball
+_TWO_STEPS = LbfgsOptions(iterations=2)
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
@@ -84,13 +87,10 @@ def load_kernels(illumination: str) -> None:
         1 / 255,
         priors,
         replace(weights, starts=(Start(),)),
-        RecoverOptions(0, 0, solver=SolverOptions("numba", threads=1, lbfgs=_ONE_STEP)),
+        RecoverOptions(3 * _RADIUS, 0, solver=SolverOptions("numba", threads=1, lbfgs=_TWO_STEPS)),
         predicted_normals=NormalEstimate(zeros + (0, 0, 1), deviation),
         predicted_shading=ShadingEstimate(zeros, deviation),
     )
-
-
-_ONE_STEP = LbfgsOptions(iterations=2)
 
 
 def _folder() -> Path:
