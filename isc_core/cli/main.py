@@ -8,6 +8,7 @@ instead of a person, see `interface.json_progress`.
 """
 
 import argparse
+import gc
 import re
 import sys
 from collections.abc import Sequence
@@ -87,6 +88,9 @@ def _run(
     except SystemExit:  # --help and --version
         return "", []
     interrupts.check()
+    if not gc.isenabled():  # as `__main__` has left it
+        gc.freeze()
+        gc.enable()
     verbosity = _verbosity(options)
     if verbosity is Verbosity.VERBOSE and config is not None:
         print(f"isc: defaults of options from {config}", file=sys.stderr)

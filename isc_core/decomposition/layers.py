@@ -19,6 +19,7 @@ from ..shading.surface_stencils import normals
 from .task import DecompositionTask
 
 _Dtype = type[np.floating[Any]]
+_ROWS = 128  # at a time: intermediate doubles take ten times the room of the result
 
 
 def separated(
@@ -155,13 +156,22 @@ def shaded(
     shading : (H, W, 3) ndarray
         Linear Rec.709; 0 outside the mask.
     """
-    normal = normal_from_reference(normals(height)).astype(dtype)
-    normal[~mask] = (0, 0, 1)
-    shading = np.zeros((*mask.shape, 3), dtype)
-    shading[mask] = np.exp(
-        np.einsum("nk,kc->nc", real_sh(normal[mask].astype(float)), light_from_reference(light))
-    )
+    normal, shading = np.empty((*mask.shape, 3), dtype), np.zeros((*mask.shape, 3), dtype)
+    ours = light_from_reference(light)
+    for first in range(0, len(mask), _ROWS):
+        rows = slice(first, first + _ROWS)
+        part, inside = normal[rows], mask[rows]
+        part[...] = normal_from_reference(_normals_of_rows(height, first))
+        part[~inside] = (0, 0, 1)
+        log_shading = np.einsum("nk,kc->nc", real_sh(part[inside].astype(float)), ours)
+        shading[rows][inside] = np.exp(log_shading)
     return normal, shading
+
+
+def _normals_of_rows(height: np.ndarray, first: int) -> np.ndarray:
+    """The normals of `_ROWS` rows, from these and their neighbours."""
+    low, last = max(first - 1, 0), min(first + _ROWS, len(height))
+    return normals(height[low : last + 1])[first - low : last - low]
 
 
 def scaled_light(light: np.ndarray, log_factor: np.ndarray | float) -> np.ndarray:

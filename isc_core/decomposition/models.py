@@ -6,19 +6,33 @@ A model is a function from a `DecompositionTask` to a `SceneEstimate`: `sirfs_on
 photos grey, `light_colour` decides which colour of light they see; those that recover shape and
 light are given what a network sees in the photo (`predictions`), and `assumption_checks` lowers the
 confidence of photos that violate what the models assume.
+
+The network, the separation by colour and the loading of kernels do not wait for each other: they
+run on threads. Results are those of the same functions, whenever they run.
+
+Limits: where the light's colour is to be estimated, it changes the photo that is separated, which
+then waits. Python interprets one thread at a time: what overlaps are array operations.
 """
 
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
+from types import TracebackType
 
+from ..io.memory import LARGE, give_back_memory
+from ..networks.detail_network import DetailNetwork
+from ..progress import Monitor
+from ..scene.decomposition import Separation
+from ..sirfs.kernel_cache import load_kernels
 from .assumption_checks import with_warnings
 from .detail import with_fine_relief
+from .layers import separated
 from .light_colour import under_given_light, under_light
 from .predictions import with_predictions
-from .settings import SIRFS_MODELS, Settings
+from .settings import SEPARATING_MODELS, SIRFS_MODELS, LightColour, Settings
 from .task import DecompositionTask, SceneEstimate, SolveOptions
-from .toning import under_tone
+from .toning import is_grey, under_tone
 
 
 def solve(task: DecompositionTask) -> SceneEstimate:
@@ -54,12 +68,79 @@ def _solved(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Predict, solve and check."""
-    task = with_predictions(task)
-    estimate = replace(under_light(task, solver), prediction=task.prediction)
+    with _Ahead(task) as ahead:
+        task = with_predictions(task)
+        estimate = under_light(task, lambda lit: solver(ahead.added(lit)))
+    estimate = replace(estimate, prediction=task.prediction)
+    if task.maps.mask.size > LARGE:
+        give_back_memory()
     estimate = with_fine_relief(task, estimate)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate
     return with_warnings(task.maps, estimate, task.prediction)
+
+
+class _Ahead:
+    """Work for a task that begins with the `with` block, and ends with it at the latest.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+    """
+
+    def __init__(self, task: DecompositionTask) -> None:
+        self._pool = ThreadPoolExecutor(2)
+        settings = task.settings
+        self._split: Future[Separation] | None = None
+        separates = settings.model in SEPARATING_MODELS and task.split is None
+        if separates and settings.light_colour != LightColour.ESTIMATE:
+            self._split = self._pool.submit(_separated, task)
+        self._kernels: Future[None] | None = None
+        if settings.engine != "numpy" and task.prior_set is None and not is_grey(task.maps):
+            self._kernels = self._pool.submit(load_kernels, settings.illumination)
+        if settings.detail and task.options.detail_network is None:
+            self._pool.submit(DetailNetwork.shipped)  # read once; it is asked after the solve
+
+    def added(self, task: DecompositionTask) -> DecompositionTask:
+        """Return the task with the layers that were separated ahead; waits for all the work.
+
+        Parameters
+        ----------
+        task : DecompositionTask
+            As this one's, or with predictions.
+
+        Returns
+        -------
+        DecompositionTask
+
+        Raises
+        ------
+        InputError
+            If the method cannot separate this photo.
+        Cancelled
+            If the monitor cancels.
+        """
+        if self._kernels is not None:
+            self._kernels.result()
+        return task if self._split is None else replace(task, split=self._split.result())
+
+    def __enter__(self) -> "_Ahead":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._pool.shutdown(cancel_futures=True)
+
+
+def _separated(task: DecompositionTask) -> Separation:
+    """The layers of the maps' photo; progress is reported by the thread that waits."""
+    with task.clock.stage("separation"):
+        monitor = Monitor(cancelled=task.monitor.cancelled)
+        return separated(task.maps, task.settings.separator, monitor, task.options.layer_dtype)
 
 
 def _solver(model: str) -> Callable[[DecompositionTask], SceneEstimate]:

@@ -6,6 +6,7 @@ maps that satisfy the identities.
 
 import platform
 import sys
+from contextlib import AbstractContextManager
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
-from ..io.memory import READING, enough_memory
+from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -41,8 +42,9 @@ __all__ = [
     "decompose",
 ]
 
-# Memory of the solver at its peak, measured for objects of 200 to 900 pixels.
-_SOLVER_BYTES, _BYTES_A_PIXEL = 250_000_000, 400
+# Memory at its peak: of the libraries, and for a pixel of the working photo and of the maps.
+_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 320
+_REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
 _PACKAGES = ("numpy", "scipy", "numba")
@@ -55,6 +57,7 @@ def decompose(
     known: KnownInputs | None = None,
     prior_set: PriorSet | None = None,
     name: str = "",
+    memory: int | None = None,
     monitor: Monitor | None = None,
 ) -> Decomposition:
     """Decompose a photo into its intrinsic scene characteristics.
@@ -71,6 +74,9 @@ def decompose(
         SIRFS priors; the shipped set by default.
     name : str, optional
         Name of the photo in the result.
+    memory : int, optional
+        Bytes that the work may need at most; by default what is free. The result does not depend
+        on it.
     monitor : Monitor, optional
         Receives progress; can cancel.
 
@@ -82,7 +88,7 @@ def decompose(
     Raises
     ------
     InputError
-        If the settings, the photo or the known quantities are unusable.
+        If the settings, the photo or the known quantities are unusable, or memory is too small.
     Cancelled
         If the monitor cancels.
     """
@@ -106,12 +112,7 @@ def decompose(
                 "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
                 "or use a larger photo"
             )
-    height, width = working.mask.shape
-    with enough_memory(
-        f"{name or 'the photo'}: {width} x {height} pixels to decompose",
-        _SOLVER_BYTES + _BYTES_A_PIXEL * working.mask.size + READING * maps.mask.size,
-        "use a smaller --max-size",
-    ):
+    with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
         estimate = solve(
             DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
         )
@@ -126,9 +127,11 @@ def decompose(
     )
     with clock.stage("maps"):
         result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
-        if estimate.prediction is None or inputs.height is not None:
-            return result
-        return with_expected_error(result, estimate.prediction, working)
+        if estimate.prediction is not None and inputs.height is None:
+            result = with_expected_error(result, estimate.prediction, working)
+    if maps.mask.size > LARGE:
+        give_back_memory()
+    return result
 
 
 def _working(photo: Photo, maps: Photo) -> Photo:
@@ -138,6 +141,16 @@ def _working(photo: Photo, maps: Photo) -> Photo:
         return maps
     working = photo.resized_to_object(WORKING_SIZE)
     return maps if working.scale == maps.scale else working
+
+
+def _within_memory(
+    name: str, working_size: int, shape: tuple[int, ...], allowed: int | None
+) -> AbstractContextManager[None]:
+    """Refuse a photo that needs more memory than allowed; errors of the block say how much."""
+    work = f"{name}: {shape[1]} x {shape[0]} pixels to decompose"
+    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * shape[0] * shape[1]
+    require_memory(work, needed, allowed, _REMEDY)
+    return enough_memory(work, needed, _REMEDY)
 
 
 def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | None) -> None:

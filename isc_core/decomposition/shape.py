@@ -27,7 +27,7 @@ from ..scene.known_inputs import SceneConstraints
 from ..sirfs.kernel_cache import announce_compilation
 from ..sirfs.priors.light_colour import with_light_colour
 from ..sirfs.priors.light_posterior import light_posterior
-from ..sirfs.priors.prior_file import shipped_prior_set
+from ..sirfs.priors.prior_file import shipped_priors
 from ..sirfs.priors.priors import Priors
 from ..sirfs.recover import Recovered, RecoverOptions, recover
 from ..sirfs.settings import PredictionWeights, Weights, isc_weights, prediction_weights
@@ -211,8 +211,10 @@ def _recover(
 def _priors(task: DecompositionTask, channels: int) -> Priors:
     """The priors for this photo, with what was predicted of its light."""
     coefficients, illumination = task.light_coefficients, task.settings.illumination
-    prior_set = task.prior_set or shipped_prior_set(illumination)
-    priors = prior_set.priors(illumination, channels)
+    if task.prior_set is None:
+        priors = shipped_priors(illumination, channels)
+    else:
+        priors = task.prior_set.priors(illumination, channels)
     light = priors.light
     if coefficients is not None:
         temperature = _prediction_weights(task).light_temperature

@@ -27,6 +27,7 @@ import re
 import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Sequence, Set
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -47,6 +48,7 @@ _MAX_SIBLINGS = 0x10000
 _MAX_NAME_BYTES = (
     230  # bytes of a name, of the usual 255, with room for the suffix of a temporary sibling
 )
+_TOGETHER = 8  # files that are flushed at a time
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fs.h
 
 _REASONS = {
@@ -450,16 +452,19 @@ def _flush(content: Path) -> None:
         if content.is_dir()
         else []
     )
-    for file in (
-        [content] if not folders else [entry for entry in content.rglob("*") if entry.is_file()]
-    ):
-        descriptor = os.open(file, os.O_RDWR)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
+    files = [entry for entry in content.rglob("*") if entry.is_file()] if folders else [content]
+    with ThreadPoolExecutor(_TOGETHER) as pool:  # file systems write what waits at once
+        list(pool.map(_flush_file, files))
     for folder in folders:
         _flush_names(folder)
+
+
+def _flush_file(file: Path) -> None:
+    descriptor = os.open(file, os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
 
 
 def _flush_names(folder: Path) -> None:

@@ -5,15 +5,21 @@ exception, or as nothing but damaged data (libjpeg). Taken for damage, the error
 the wrong remedy.
 
 Limits: the amounts are estimates for the usual path, within about a third. Linux grants more memory
-than there is, and ends a process that uses it; no process can report that.
+than there is, and ends a process that uses it, which no process can report: work that is known to
+need more than is free is refused before it begins (`require_memory`).
 """
 
+import contextlib
+import ctypes
 import mmap
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from ..errors import InputError
 
+_SYSTEM, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
+LARGE = 1 << 18  # pixels: memory of larger photos is worth the time that giving it back takes
 READING = 32  # bytes a pixel, at most, from the file to linear light
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
 
@@ -56,6 +62,78 @@ def is_available(needed: int) -> bool:
     return True
 
 
+def free_memory(system: Path = _SYSTEM, group: Path = _GROUP) -> int | None:
+    """Return how much memory processes may still take, in bytes.
+
+    Parameters
+    ----------
+    system : Path, optional
+        Linux's report of the machine's memory.
+    group : Path, optional
+        Folder of the control group's limits: those of a container.
+
+    Returns
+    -------
+    int or None
+        None where the system does not say.
+    """
+    known = []
+    try:
+        lines = dict(line.split(":", 1) for line in system.read_text("ascii").splitlines())
+        known.append(1024 * int(lines["MemAvailable"].split()[0]))
+    except (OSError, ValueError, KeyError):
+        return None
+    try:
+        most, used = (int((group / f"memory.{n}").read_text("ascii")) for n in ("max", "current"))
+        known.append(most - used)
+    except (OSError, ValueError):  # no group, or one without a limit: "max"
+        pass
+    return max(0, min(known))
+
+
+def give_back_memory() -> None:
+    """Give memory that was freed back to the system, where the C library can.
+
+    It keeps what it may need again, in pieces: after work on large arrays, as much as is in use.
+    """
+    with contextlib.suppress(OSError, AttributeError):  # another library than glibc
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> None:
+    """Refuse work that needs more memory than it may take.
+
+    Parameters
+    ----------
+    work : str
+        What needs the memory, in the plural: opens the message.
+    needed : int
+        In bytes.
+    allowed : int or None
+        In bytes; None for what is free.
+    remedy : str
+        Ends the message.
+
+    Raises
+    ------
+    InputError
+        If it needs more.
+    """
+    free = free_memory() if allowed is None else allowed
+    if free is None or needed <= free:
+        return
+    if allowed is None:
+        raise memory_error(work, needed, remedy)
+    raise InputError(
+        f"{work} need about {_amount(needed)} of memory, more than the {_amount(allowed)} of "
+        f"--memory: allow more, or {remedy}"
+    )
+
+
+def _amount(size: int) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e8 else f"{size / 1e6:.1f} MB"
+
+
 def memory_error(work: str, needed: int, remedy: str) -> InputError:
     """Return the error for work that memory does not suffice for.
 
@@ -72,8 +150,9 @@ def memory_error(work: str, needed: int, remedy: str) -> InputError:
     -------
     InputError
     """
-    amount = f"{needed / 1e9:.1f} GB" if needed >= 1e8 else f"{needed / 1e6:.1f} MB"
-    return InputError(f"{work} need about {amount} of memory, more than is available: {remedy}")
+    return InputError(
+        f"{work} need about {_amount(needed)} of memory, more than is available: {remedy}"
+    )
 
 
 def memory_message(error: MemoryError, remedy: str) -> str:

@@ -129,7 +129,7 @@ def fit_lobe(
         options.model,
         options.thresholded,
         directions=fixed is None,
-        nearness=observed.place is not None,
+        nearness=observed.places is not None,
     )
     fitted = _search(problem, options, fixed, monitor)
     monitor.report("how sure the gloss is", 0.7)
@@ -149,7 +149,7 @@ def _direction(light: GivenLight) -> np.ndarray | None:
 
 
 def _checked_shading(shading: np.ndarray, seen: Observed) -> np.ndarray:
-    shading = np.asarray(shading, float)
+    shading = np.asarray(shading)
     if shading.shape != seen.specular.shape or not (
         np.isfinite(shading[seen.mask]).all() and (shading[seen.mask] >= 0).all()
     ):
@@ -368,7 +368,8 @@ def _coloured(
         # The environment map is too weak for a colour of its own: it gets the lamps' mean colour.
         colour = pixels.colour - mirrored[:, None] * _mean_colour(pixels)
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
-    place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]
+    cells = np.argwhere(seen.mask)
+    place = np.zeros((len(cells), 3)) if seen.places is None else seen.places.at(cells)
     inside = seen.normal[seen.mask]
     values = contributions(problem.model, lamps, inside, place).T @ gains
     if not problem.thresholded:

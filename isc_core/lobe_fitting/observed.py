@@ -64,6 +64,43 @@ class RecoveredScene:
 
 
 @dataclass(frozen=True)
+class Places:
+    """Where the pixels' surface is, in radii of the object (half of the longer side of the mask's
+    box) from the middle of that box.
+
+    Attributes
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    middle : tuple of float
+        Row, column and height that are 0.
+    radius : float
+        In pixels.
+    """
+
+    height: np.ndarray
+    middle: tuple[float, float, float]
+    radius: float
+
+    def at(self, cells: np.ndarray) -> np.ndarray:
+        """Return places.
+
+        Parameters
+        ----------
+        cells : (N, 2) ndarray of int
+            Row and column, on the object.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            Right, up, toward the viewer.
+        """
+        (row, column), (middle_row, middle_column, middle) = cells.T, self.middle
+        depth = self.height[row, column] - middle
+        return np.stack([column - middle_column, middle_row - row, depth], axis=1) / self.radius
+
+
+@dataclass(frozen=True)
 class Observed:
     """A validated specular image.
 
@@ -79,9 +116,8 @@ class Observed:
         Where the light is a lower bound.
     inside : (H, W) ndarray of bool
         Pixels that count.
-    place : (H, W, 3) ndarray or None
-        Position of each pixel's surface in radii of the object (half of the longer side of the
-        mask's box) from the middle of that box; None where the height is unknown.
+    places : Places or None
+        None where the height is unknown.
     silhouette_normals : (H, W, 3) ndarray or None
         Unit normals that the silhouette alone suggests.
     """
@@ -92,7 +128,7 @@ class Observed:
     confidence: np.ndarray
     clipped: np.ndarray
     inside: np.ndarray
-    place: np.ndarray | None
+    places: Places | None
     silhouette_normals: np.ndarray | None = None
 
     @property
@@ -174,7 +210,7 @@ def observe(
     return Observed(specular, normal, mask, confidence, clipped, inside, places, silhouette_normals)
 
 
-def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
+def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
     if height is None or not mask.any():
         return None
     height = np.asarray(height, float)
@@ -184,7 +220,6 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
         )
     rows, columns = np.nonzero(mask)
     low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])
-    middle, radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
-    row, column = np.indices(mask.shape)
-    depth = np.where(mask, height - (height[mask].min() + height[mask].max()) / 2, 0)
-    return np.dstack([column - middle[1], middle[0] - row, depth]) / radius
+    (row, column), radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
+    middle = float((height[mask].min() + height[mask].max()) / 2)
+    return Places(height, (float(row), float(column), middle), radius)

@@ -29,7 +29,7 @@ class Pixels:
     normal : (N, 3) ndarray
         Unit normals.
     place : (N, 3) ndarray
-        See `Observed.place`; 0 where unknown.
+        See `Places`; 0 where unknown.
     colour : (N, 3) ndarray
         Specular light.
     value : (N,) ndarray
@@ -94,15 +94,16 @@ def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixe
         weights.append(np.full(len(taken), len(part) / max(len(taken), 1)))
     taken = np.concatenate(parts)
     sigma = np.sqrt((noise[0] * peak) ** 2 + (noise[1] * value[taken]) ** 2)
+    cell = np.argwhere(inside)[taken]
     return Pixels(
         normal=seen.normal[inside][taken],
-        place=np.zeros((len(taken), 3)) if seen.place is None else seen.place[inside][taken],
+        place=np.zeros((len(taken), 3)) if seen.places is None else seen.places.at(cell),
         colour=seen.specular[inside][taken],
         value=value[taken],
         sigma=np.maximum(sigma, np.finfo(float).tiny),
         weight=np.concatenate(weights) * seen.confidence[inside][taken],
         clipped=seen.clipped[inside][taken],
-        cell=np.argwhere(inside)[taken],
+        cell=cell,
         peak=peak,
         dark=_DARK * peak,
         bright=int((value > 0.5 * peak).sum()),

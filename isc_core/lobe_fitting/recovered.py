@@ -111,7 +111,7 @@ def fit_recovered(
         With one light.
     """
     convention, inside = CONVENTION[options.model], seen.inside
-    light_there = shading[inside].mean(axis=1)
+    light_there = shading[inside].astype(float).mean(axis=1)
     brightest, mirrored_light = (
         float(np.percentile(light_there, _BRIGHTEST)),
         seen.specular[inside].mean(axis=1),

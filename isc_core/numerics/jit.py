@@ -6,6 +6,9 @@ Compiled code is cached between runs: beside the source if that folder is writab
 user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary folder
 serves until the process ends.
 
+Numba is imported, and a function compiled, when one is first called: its import takes longer than
+many a command.
+
 Determinism: a compiled sum has the order that the compiler gave it, whatever the number of threads,
 because one call is one thread's work. `REASSOCIATED` lets the compiler choose that order once, so
 the sum may use vector instructions; it stays the same for every call of the same machine code.
@@ -16,9 +19,10 @@ import contextlib
 import shutil
 import tempfile
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
-from typing import TypeVar, cast, overload
+from types import FunctionType
+from typing import Any, TypeVar, cast, overload
 
 Loop = TypeVar("Loop", bound=Callable[..., object])
 
@@ -82,22 +86,88 @@ def jit(
     """
 
     def decorate(function: Loop) -> Loop:
+        return cast(Loop, Kernel(function, math, inline))
+
+    return decorate if loop is None else decorate(loop)
+
+
+class Kernel:
+    """A function that is compiled when it is first called.
+
+    Parameters
+    ----------
+    function : callable
+    math : frozenset of str
+    inline : bool
+        See `jit`.
+
+    Attributes
+    ----------
+    function : callable
+        As it was written.
+    inline : bool
+    """
+
+    def __init__(self, function: Callable[..., Any], math: frozenset[str], inline: bool) -> None:
+        self.function, self.inline, self._math = function, inline, math
+        self.__doc__, self.__module__ = function.__doc__, function.__module__
+
+    def __call__(self, *values: Any) -> Any:
+        """Call the compiled function."""
+        return self.compiled(*values)
+
+    @cached_property
+    def compiled(self) -> Callable[..., Any]:
+        """Numba's dispatcher; the function itself without Numba."""
         try:
             import numba
         except ImportError:
-            return function
+            return self.function
         ensure_cache_folder()
         dispatcher = numba.njit(
             cache=True,
             nogil=True,
             error_model="numpy",
-            fastmath=set(math),
-            forceinline=inline,
-        )(function)
+            fastmath=set(self._math),
+            forceinline=self.inline,
+        )(self._linked())
         drop_broken(Path(str(dispatcher.stats.cache_path)))
-        return cast(Loop, dispatcher)
+        _load_alone(dispatcher)
+        return cast(Callable[..., Any], dispatcher)
 
-    return decorate if loop is None else decorate(loop)
+    def _linked(self) -> Callable[..., Any]:
+        """The function, calling dispatchers where it called kernels: compiled code knows no
+        others.
+        """
+        function = cast(FunctionType, self.function)
+        names = {
+            name: value.compiled if isinstance(value, Kernel) else value
+            for name, value in function.__globals__.items()
+            if name in function.__code__.co_names or name.startswith("__")
+        }
+        return FunctionType(function.__code__, names, function.__name__)
+
+
+def _load_alone(dispatcher: Any) -> None:
+    """Let a dispatcher load compiled code without what only the compiler needs.
+
+    Before it looks into its cache, Numba imports all that it can compile (a fifth of a second, with
+    `scipy.linalg`), and compiling does so again. Code that is compiled needs Numba's runtime alone.
+    """
+    try:
+        from numba.core.caching import FunctionCache
+        from numba.core.runtime.nrt import rtsys
+    except ImportError:  # a version that has them elsewhere: as it is
+        return
+
+    class LoadingCache(FunctionCache):
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)
+            with self._guard_against_spurious_io_errors():
+                return self._load_overload(sig, target_context)
+            return None
+
+    dispatcher._cache = LoadingCache(dispatcher.py_func)
 
 
 def numba_available() -> bool:

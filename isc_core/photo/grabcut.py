@@ -19,7 +19,6 @@ import os
 from enum import IntEnum
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from ..errors import InputError
@@ -115,6 +114,8 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     """Object coverage (H, W) float32 of an (H, W, 3) uint8 RGB image; solved at no more than a
     megapixel.
     """
+    import cv2  # takes a while, and most photos have a mask
+
     height, width = coded.shape[:2]
     factor = min(1.0, float(np.sqrt(SOLVED_PIXELS / (height * width))))
     size = (max(round(width * factor), 1), max(round(height * factor), 1))
@@ -136,12 +137,12 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
 
 
 class Label(IntEnum):
-    """What is known of a pixel."""
+    """What is known of a pixel, in OpenCV's numbers."""
 
-    BACKGROUND = cv2.GC_BGD
-    OBJECT = cv2.GC_FGD
-    PROBABLY_BACKGROUND = cv2.GC_PR_BGD
-    PROBABLY_OBJECT = cv2.GC_PR_FGD
+    BACKGROUND = 0
+    OBJECT = 1
+    PROBABLY_BACKGROUND = 2
+    PROBABLY_OBJECT = 3
 
 
 def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndarray:
@@ -159,6 +160,8 @@ def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndar
     -------
     (H, W) bool ndarray
     """
+    import cv2
+
     cv2.setRNGSeed(_SEED)
     found = cv2.grabCut(
         np.ascontiguousarray(coded[..., ::-1]),
@@ -201,6 +204,8 @@ def encoded_mask(mask: np.ndarray) -> bytes:
     -------
     bytes
     """
+    import cv2
+
     codes = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
     return bytes(cv2.imencode(".png", codes)[1].tobytes())
 

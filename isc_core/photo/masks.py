@@ -1,6 +1,5 @@
 """Finding the object's mask in a photo, and checking it."""
 
-import cv2
 import numpy as np
 from scipy.ndimage import label
 
@@ -210,6 +209,8 @@ def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
     """
     if values.shape[:2] == (height, width):
         return values
+    import cv2  # takes a while, and most masks have the photo's size
+
     grows = width > values.shape[1] or height > values.shape[0]
     how = cv2.INTER_LINEAR if grows else cv2.INTER_AREA
     return np.asarray(cv2.resize(np.ascontiguousarray(values), (width, height), interpolation=how))

@@ -11,7 +11,9 @@ light as a white sphere. `other_views` draws the object from both sides and in a
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path, PurePath
 
 import numpy as np
@@ -86,9 +88,11 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
             "x right, y up, z to viewer",
         )
     )
-    panels += [_relief(d, frame, small), _light_panel(d, light)]
-    panels += [*turned_panels(d, frame, small, photo), relit_panel(d, frame, small)]
-    panels.append(_error_panel(d, frame))
+    with ThreadPoolExecutor(1) as aside:  # half of the work
+        turned = aside.submit(turned_panels, d, frame, small, photo)
+        panels += [_relief(d, frame, small), _light_panel(d, light)]
+        last = [relit_panel(d, frame, small), _error_panel(d, frame)]
+        panels += [*turned.result(), *last]
     return _sheet(*_title(d), panels, columns=4)
 
 
@@ -421,10 +425,12 @@ def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> 
     _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
     _write(draw, (_EDGE, 80), subtitle, 16, _FAINT, width - 2 * _EDGE)
     card = _rounded()
-    for index, panel in enumerate(panels):
+    with ThreadPoolExecutor(2) as pool:
+        pictures = list(pool.map(_picture, panels))
+    for index, (panel, picture) in enumerate(zip(panels, pictures, strict=True)):
         row, column = divmod(index, columns)
         x, y = _EDGE + column * (SIDE + _GAP), _HEAD + row * (SIDE + _LABEL + _GAP)
-        sheet.paste(_picture(panel), (x, y), card)
+        sheet.paste(picture, (x, y), card)
         end = _write(draw, (x + 2, y + SIDE + 27), panel.label, 18, _TEXT, SIDE)
         right = _write_keys(draw, (x + SIDE - 2, y + SIDE + 27), panel.keys)
         _write(draw, (right, y + SIDE + 27), panel.remark, 14, _FAINT, right - end - 10, right=True)
@@ -440,7 +446,7 @@ def _write_keys(
     begin.
     """
     right, baseline = place
-    font = ImageFont.load_default(14)
+    font = _font(14)
     for text, color in reversed(keys):
         draw.text((right, baseline), text, fill=_FAINT, font=font, anchor="rs")
         right -= font.getlength(text) + 4
@@ -460,13 +466,18 @@ def _write(
     right: bool = False,
 ) -> float:
     """Draw a line of text at the baseline `place`, cut to `room` pixels; return its end."""
-    font, text = ImageFont.load_default(size), readable(text)
+    font, text = _font(size), readable(text)
     if font.getlength(text) > room:
         while text and font.getlength(text + "…") > room:
             text = text[:-1]
         text += "…"
     draw.text(place, text, fill=color, font=font, anchor="rs" if right else "ls")
     return place[0] + font.getlength(text)
+
+
+@cache
+def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
+    return ImageFont.load_default(size)
 
 
 def _picture(panel: Panel) -> Image.Image:

@@ -121,9 +121,11 @@ def _fragments(
     """
     corners = points[faces]
     plane = corners[..., :2]
-    area = _cross(plane[:, 1] - plane[:, 0], plane[:, 2] - plane[:, 0])
-    first = np.ceil(plane.min(axis=1) - 0.5).clip(0, side).astype(np.int64)
-    last = np.floor(plane.max(axis=1) - 0.5).clip(-1, side - 1).astype(np.int64)
+    a, b, c = plane[:, 0], plane[:, 1], plane[:, 2]  # faster than reductions along three numbers
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    area = _cross(b - a, c - a)
+    first = np.ceil(low - 0.5).clip(0, side).astype(np.int64)
+    last = np.floor(high - 0.5).clip(-1, side - 1).astype(np.int64)
     size = last - first + 1
     shown = (np.abs(area) > _FEWEST) & (size > 0).all(axis=1)
     boxes = np.where(size <= 4, size, 2 ** np.ceil(np.log2(size.clip(1)))).astype(np.int64)

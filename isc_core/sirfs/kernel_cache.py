@@ -1,11 +1,36 @@
-"""Whether the next solve has to compile its kernels first."""
+"""Whether the next solve has to compile its kernels first, and loading them ahead of it.
+
+Problem: Numba takes a quarter of a second to import, and as long again to load two dozen compiled
+kernels. None of it depends on the photo.
+
+Equation: a ball of a few pixels is solved for two steps, which call each kernel that a colour photo
+needs, with arrays of the same types. It is enlarged for that, as photos are made to fit: resampled
+masks are stored by columns.
+
+Limits: other kernels, those of grey photos, of depth, and of photos that fit already, are loaded
+when they are called.
+"""
 
 import sys
+from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..numerics.jit import drop_broken, ensure_cache_folder, numba_available
+from ..numerics.lbfgs import LbfgsOptions
 from ..progress import Monitor
+from ..scene.normal_estimate import NormalEstimate
+from ..scene.shading_estimate import ShadingEstimate
+from .priors.prior_file import shipped_priors
+from .recover import RecoverOptions, recover
+from .settings import Start, isc_weights
+from .solver import SolverOptions
+
+_RADIUS = 12  # pixels of the ball
+_TWO_STEPS = LbfgsOptions(iterations=2)
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
@@ -32,8 +57,8 @@ def kernels_compiled() -> bool:
     """Return whether the kernels, in their current version, were compiled before. Needs Numba."""
     from . import kernels
 
-    dispatcher: Any = kernels.forward_rows
-    code = dispatcher.py_func.__code__
+    kernel: Any = kernels.forward_rows
+    code = kernel.function.__code__
     source = Path(code.co_filename)
     python = f"py{sys.version_info[0]}{sys.version_info[1]}"
     pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.{python}*.nbi"
@@ -41,9 +66,36 @@ def kernels_compiled() -> bool:
     return any(index.stat().st_mtime >= source.stat().st_mtime for index in indices)
 
 
+@cache
+def load_kernels(illumination: str) -> None:
+    """Load what a solve of a colour photo needs; once a process, and only what was compiled before.
+
+    Parameters
+    ----------
+    illumination : str
+        One of `priors.prior_set.ILLUMINATIONS`: its tables are made, too.
+    """
+    priors, weights = shipped_priors(illumination, 3), isc_weights(illumination, 3)
+    if not numba_available() or not kernels_compiled():
+        return
+    y, x = np.mgrid[-_RADIUS : _RADIUS + 1, -_RADIUS : _RADIUS + 1] / (_RADIUS + 0.5)
+    mask = np.hypot(x, y) < 1
+    zeros, deviation = np.zeros((*mask.shape, 3)), np.where(mask, 0.5, 0.0)
+    recover(
+        zeros.astype(np.float32) + np.float32(0.5),
+        mask,
+        1 / 255,
+        priors,
+        replace(weights, starts=(Start(),)),
+        RecoverOptions(3 * _RADIUS, 0, solver=SolverOptions("numba", threads=1, lbfgs=_TWO_STEPS)),
+        predicted_normals=NormalEstimate(zeros + (0, 0, 1), deviation),
+        predicted_shading=ShadingEstimate(zeros, deviation),
+    )
+
+
 def _folder() -> Path:
     """Folder of the compiled kernels."""
     from . import kernels
 
-    dispatcher: Any = kernels.forward_rows
-    return Path(str(dispatcher.stats.cache_path))
+    kernel: Any = kernels.forward_rows
+    return Path(str(kernel.compiled.stats.cache_path))

@@ -36,7 +36,7 @@ from ..interface.options import (
 )
 from ..interface.parser import describe, hints
 from ..interface.standard_input import STDIN, photo_file
-from ..interface.values import number, positive
+from ..interface.values import memory_size, number, positive
 from ..interface.viewer import show
 
 _EXAMPLES = """  isc decompose cup.png -o cup
@@ -89,7 +89,15 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_limits(reading)
     add_model_settings(parser)
     _add_known_inputs(parser)
-    add_engine(parser.add_argument_group("computing"))
+    computing = parser.add_argument_group("computing")
+    add_engine(computing)
+    computing.add_argument(
+        "--memory",
+        type=memory_size,
+        metavar="SIZE",
+        help="most memory that the work may need, such as 2GB; a photo that needs more is refused "
+        "with the amount (default: what is free)",
+    )
 
 
 def _add_known_inputs(parser: argparse.ArgumentParser) -> None:
@@ -198,6 +206,7 @@ def _decompose_photo(
         known=known,
         prior_set=prior_set,
         name="standard input" if path == STDIN else path.name,
+        memory=options.memory,
         monitor=monitor.part(0.0, 0.8),
     )
     writing = monitor.part(0.8, 1.0)

@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import re
 import sys
 from collections.abc import Callable
 
@@ -80,6 +81,31 @@ def whole(text: str) -> int:
     if value == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 1 or more")
     return value
+
+
+def memory_size(text: str) -> int:
+    """Parse an amount of memory, such as 2GB.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+        Bytes.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is not one.
+    """
+    found = re.fullmatch(r"\s*(\d+(?:\.\d*)?)\s*([kmgt]?i?)b\s*", text.lower())
+    if found is None or not float(found[1]):
+        raise argparse.ArgumentTypeError(f"{text!r} is not an amount of memory, such as 2GB")
+    thousand = 1024 if found[2].endswith("i") else 1000
+    return int(float(found[1]) * thousand ** " kmgt".index(found[2][:1] or " "))
 
 
 def number(text: str) -> float:

@@ -7,6 +7,7 @@ import importlib.resources
 import io
 import json
 import zipfile
+from functools import cache
 from pathlib import Path
 from typing import IO
 
@@ -20,7 +21,7 @@ from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
 from .lights import Contrast, GaussianLight
 from .prior_set import ILLUMINATIONS, FitRecord, LightPriors, PriorSet
-from .priors import SilhouetteProfile
+from .priors import Priors, SilhouetteProfile
 from .scale_mixture import ScaleMixture
 
 SCHEMA_VERSION = 3
@@ -68,6 +69,28 @@ def load_prior_set(path: str | Path) -> PriorSet:
     except OSError as error:
         raise InputError(f"cannot read the priors {path} ({error.strerror}): {remedy}") from error
     return _parse(data, str(path))
+
+
+@cache
+def shipped_priors(illumination: str, channels: int) -> Priors:
+    """Return the tables of the shipped set, made once.
+
+    Parameters
+    ----------
+    illumination : str
+    channels : int
+        See `PriorSet.priors`.
+
+    Returns
+    -------
+    Priors
+
+    Raises
+    ------
+    InputError
+        As `shipped_prior_set` and `PriorSet.priors`.
+    """
+    return shipped_prior_set(illumination).priors(illumination, channels)
 
 
 def shipped_prior_set(illumination: str = "natural") -> PriorSet:

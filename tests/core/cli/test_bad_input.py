@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from isc_core.cli.interface.values import memory_size
 from isc_core.cli.main import main
 from isc_core.io.exr import write_channels
 from tests.core.command_line import ball_codes, ball_photo, run_isc, write_image
@@ -456,3 +457,29 @@ def test_the_reference_of_these_tests_is_usable() -> None:
         and 1000 < np.count_nonzero(codes.max(-1)) < codes.shape[0] * codes.shape[1]
     )
     assert cv2.__version__
+
+
+@pytest.mark.parametrize(
+    ("size", "message"),
+    [
+        (
+            "80MB",
+            "pixels to decompose need about 0.3 GB of memory, more than the 80.0 MB of --memory",
+        ),
+        ("80", "'80' is not an amount of memory, such as 2GB"),
+        ("0GB", "'0GB' is not an amount of memory"),
+        ("some", "'some' is not an amount of memory"),
+    ],
+)
+def test_memory_that_is_too_little_or_none(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], size: str, message: str
+) -> None:
+    photo, output = write_image(tmp_path / "photo.png", ball_codes()), tmp_path / "result"
+    said = refused(capfd, "decompose", photo, "-o", output, "--memory", size)
+    assert message in said
+    assert not output.exists()
+
+
+def test_amounts_of_memory() -> None:
+    sizes = {"2GB": 2 * 10**9, "1.5 gib": 3 << 29, "800 MB": 8 * 10**8, "512B": 512}
+    assert {text: memory_size(text) for text in sizes} == sizes

@@ -723,7 +723,7 @@ def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
     check = (
         "import os, numba; from isc_core.numerics.jit import ensure_cache_folder; "
         "ensure_cache_folder()\n"
-        "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
+        "from isc_core.sirfs import kernels; print(kernels.forward_rows.compiled.stats.cache_path)"
     )
     environment = {
         **os.environ,

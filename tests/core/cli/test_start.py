@@ -47,6 +47,13 @@ def test_a_command_imports_no_other_command() -> None:
     assert not modules & others
 
 
+def test_decompose_loads_its_compiler_while_it_works() -> None:
+    """Numba takes longer to import than a photo to read; OpenCV is for masks that are drawn."""
+    modules = loaded("decompose", "--help")
+    assert "isc_core.decomposition.pipeline" in modules
+    assert not modules & {"numba", "llvmlite", "cv2"}
+
+
 def test_a_command_of_the_core_looks_for_no_other_package() -> None:
     """The search among installed packages takes a tenth of a second."""
     code = (

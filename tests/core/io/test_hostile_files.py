@@ -17,7 +17,7 @@ from PIL import Image
 from isc_core.errors import InputError
 from isc_core.io.decoders import read_raster
 from isc_core.io.limits import Limits
-from isc_core.io.memory import enough_memory, is_exhausted
+from isc_core.io.memory import enough_memory, free_memory, is_exhausted, require_memory
 from isc_core.io.npy import read_arrays
 from tests.core.command_line import ROOT
 
@@ -220,3 +220,27 @@ def test_work_without_memory_says_how_much_it_needs() -> None:
         raise MemoryError
     with pytest.raises(KeyError), enough_memory("4 pixels", 1, "use fewer"):
         raise KeyError
+
+
+@pytest.mark.parametrize(
+    ("group", "free"),
+    [({}, 2_048_000), ({"max": "max"}, 2_048_000), ({"max": "1500", "current": "400"}, 1100)],
+)
+def test_free_memory_is_that_of_the_machine_or_of_the_container(
+    tmp_path: Path, group: dict[str, str], free: int
+) -> None:
+    system = tmp_path / "meminfo"
+    system.write_text("MemTotal:  9000 kB\nMemAvailable:  2000 kB\n")
+    for name, text in group.items():
+        (tmp_path / f"memory.{name}").write_text(f"{text}\n")
+    assert free_memory(system, tmp_path) == free
+    assert free_memory(tmp_path / "nowhere", tmp_path) is None
+
+
+def test_work_that_needs_more_memory_than_allowed_is_refused() -> None:
+    require_memory("4 pixels", 2_000_000_000, 2_000_000_000, "use fewer")
+    expected = r"4 pixels need about 2.0 GB of memory, more than the 50.0 MB of --memory"
+    with pytest.raises(InputError, match=expected):
+        require_memory("4 pixels", 2_000_000_000, 50_000_000, "use fewer")
+    with pytest.raises(InputError, match="more than is available: use fewer"):
+        require_memory("4 pixels", 1 << 60, None, "use fewer")
