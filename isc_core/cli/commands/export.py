@@ -11,11 +11,8 @@ from ...progress import Monitor
 from ...result_files.arrays_file import mesh_of
 from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_mesh_file
 from ...result_files.exports.soft_alpha import object_cover
-from ...result_files.exports.texture_set import (
-    TARGETS,
-    texture_files,
-    write_texture_set,
-)
+from ...result_files.exports.targets import TARGETS
+from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.result_folder import MASK, load
