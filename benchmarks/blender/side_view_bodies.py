@@ -10,13 +10,14 @@ Equation: colour = albedo(u, v) (f + (1 - f) ((1 + n . l) / 2)^2), f the fill.
 Limits: no shadows, no gloss, parallel projection. Results in FOLDER are kept.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
 
 import isc_core
+from blender_addon.files.result_arrays import ResultArrays
 from isc_core.decomposition.settings import Settings
 from isc_core.result_files.arrays_file import write_arrays
 from isc_core.result_files.result_folder import save
@@ -45,12 +46,15 @@ class Body:
         Counter-clockwise from outside.
     color : (V, 3) ndarray
         Linear, as it is lit.
+    normals : (V, 3) ndarray
+        Unit, outward.
     """
 
     name: str
     vertices: np.ndarray
     faces: np.ndarray
     color: np.ndarray
+    normals: np.ndarray
 
 
 def make_body(number: int) -> Body:
@@ -78,7 +82,7 @@ def make_body(number: int) -> Body:
     color = albedo * lit[:, None]
     color *= 0.9 / np.percentile(color, 99.9)
     vertices = (mesh.vertices - (low + high) / 2) * zoom
-    return Body(f"{family} {number}", vertices, mesh.faces, color)
+    return Body(f"{family} {number}", vertices, mesh.faces, color, mesh.normals)
 
 
 def sampled(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
@@ -132,3 +136,33 @@ def decompose_body(body: Body, folder: Path) -> Path:
         save(found, output)
         write_arrays(found, output / "arrays.npz")
     return output
+
+
+def with_true_heights(body: Body, result: ResultArrays) -> ResultArrays:
+    """Replace the heights and normals of a result by the true ones.
+
+    Parameters
+    ----------
+    body : Body
+        The body.
+    result : ResultArrays
+        Of its photo.
+
+    Returns
+    -------
+    ResultArrays
+        With the true height at each pixel and vertex.
+    """
+    carried = np.concatenate([body.vertices, body.normals], 1)
+    seen = turned_view(body.vertices, body.faces, carried, 0.0, _SIDE, 1.0).values
+    maps = seen.astype(np.float32)
+    rows, columns = result.vertex_pixel.T
+    vertices = result.vertices.copy()
+    vertices[:, 2] = maps[rows, columns, 2] * result.metres_per_pixel
+    return replace(
+        result,
+        height=np.where(result.mask, maps[..., 2], 0),
+        normal=maps[..., 3:],
+        vertices=vertices,
+        vertex_normals=maps[rows, columns, 3:],
+    )
