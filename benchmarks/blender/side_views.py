@@ -24,7 +24,6 @@ from pathlib import Path
 import numpy as np
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from blender_addon.scene.closed_back import close_back
 from blender_addon.scene.mesh import front_geometry
 from isc_core.evaluation.metrics import psnr
 from isc_core.result_files.solids.body import Back, make_body
@@ -32,6 +31,7 @@ from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
 
 from . import side_view_bodies as bodies
+from .former_back import close_back
 
 ANGLES = (30, 60)
 BEFORE = ("former open", "former flat")

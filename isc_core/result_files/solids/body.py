@@ -32,6 +32,7 @@ from enum import StrEnum
 
 import numpy as np
 
+from ..adaptive_triangles import Triangulation
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 
@@ -77,6 +78,8 @@ class Body:
         Counter-clockwise from outside.
     front : (V,) bool ndarray
         Vertices at pixels that the photo shows; not those of the outline.
+    visible : Triangulation
+        The triangles between these vertices, which come first.
     """
 
     places: np.ndarray
@@ -84,6 +87,7 @@ class Body:
     pixels: np.ndarray
     faces: np.ndarray
     front: np.ndarray
+    visible: Triangulation
 
 
 def make_body(
@@ -133,7 +137,7 @@ def make_body(
     heights[sheet.inner :] = rim[rows, columns][sheet.inner :]
     front = np.arange(len(heights)) < sheet.inner
     if back is Back.OPEN:
-        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front)
+        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, sheet.pixel_triangles)
     if back is Back.FLAT:
         return _walled(sheet, heights, front, mask)
     edge = _grown(around) & inside
@@ -180,9 +184,7 @@ def _grown(plane: np.ndarray) -> np.ndarray:
     return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
 
 
-def _mirrored(
-    sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray
-) -> Body:
+def _mirrored(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray) -> Body:
     """The sheet and, with the points of the outline in common, the back."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
@@ -193,6 +195,7 @@ def _mirrored(
         np.concatenate([sheet.pixels, sheet.pixels[:inner]]),
         np.concatenate([sheet.faces, other]),
         np.concatenate([front, np.zeros(inner, bool)]),
+        sheet.pixel_triangles,
     )
 
 
@@ -214,4 +217,5 @@ def _walled(sheet: Outlined, heights: np.ndarray, front: np.ndarray, mask: np.nd
         np.concatenate([sheet.pixels, sheet.pixels]),
         np.concatenate([sheet.faces, sheet.faces[:, ::-1] + n, wall]),
         np.concatenate([front, np.zeros(n, bool)]),
+        sheet.pixel_triangles,
     )

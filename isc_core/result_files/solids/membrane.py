@@ -18,9 +18,7 @@ _SWEEPS, _OVER = 40, 1.8
 _COARSEST = 12  # pixels of the shorter side
 
 
-def membrane(
-    inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: float
-) -> np.ndarray:
+def membrane(inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: float) -> np.ndarray:
     """Relax a membrane.
 
     Parameters

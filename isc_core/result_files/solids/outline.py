@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError
-from ..adaptive_triangles import adaptive_triangles
+from ..adaptive_triangles import Triangulation, adaptive_triangles
 
 _CLOSEST = 0.1  # pixels
 _ALL = 1 << 40  # more triangles than any mesh has
@@ -46,6 +46,12 @@ class Outlined:
     pixels: np.ndarray
     inner: int
     faces: np.ndarray
+
+    @property
+    def pixel_triangles(self) -> Triangulation:
+        """The triangles between pixels alone."""
+        between = (self.faces < self.inner).all(1)
+        return Triangulation(self.pixels[: self.inner], self.faces[between])
 
 
 def smooth_cover(cover: np.ndarray) -> np.ndarray:
@@ -128,10 +134,10 @@ def _cut_cells(corners: np.ndarray, width: int, size: int) -> np.ndarray:
         corner = [(row + r) * width + column + c for r, c in _RING]
         left, upper = corner[0], corner[0]
         point = [left + 2 * size, corner[1] + size, corner[3] + 2 * size, upper + size]
-        for triangle in _polygons(case):
-            found.append(
-                np.stack([(corner if kind else point)[k] for kind, k in triangle], -1)
-            )
+        found += [
+            np.stack([(corner if kind else point)[k] for kind, k in triangle], -1)
+            for triangle in _polygons(case)
+        ]
     return np.concatenate(found)
 
 
@@ -150,9 +156,7 @@ def _polygons(case: int) -> list[list[tuple[int, int]]]:
     return triangles
 
 
-def _positions(
-    used: np.ndarray, inner: int, smooth: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+def _positions(used: np.ndarray, inner: int, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The nearest pixels inside (V, 2), and the places (V, 2)."""
     width, size, values = smooth.shape[1], smooth.size, smooth.reshape(-1)
     start = used % size
