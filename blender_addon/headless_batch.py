@@ -234,6 +234,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         displacement=options.displacement,
         back=options.back,
         triangles=options.triangles,
+        texture_size=options.texture_size,
         own_shadows=True if options.own_shadows else None,
         specular_from=options.specular,
         name=source.name,

@@ -221,6 +221,13 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
         help="side that the photo does not show (default: %(default)s)",
     )
     add(
+        "--texture-size",
+        type=int,
+        default=0,
+        metavar="N",
+        help="most pixels of the texture's longer side, 0 for the photo's (default: %(default)s)",
+    )
+    add(
         "--triangles",
         type=int,
         default=50_000,

@@ -114,7 +114,7 @@ class _Build(_Panel):
         settings, column = context.scene.isc, self.property_column()
         column.prop(settings, "size_metres")
         column.prop(settings, "specular_from")
-        for name in ("back", "triangles", "shadows", "sun", "displacement"):
+        for name in ("back", "triangles", "texture_size", "shadows", "sun", "displacement"):
             column.prop(settings, name)
         column.separator()
         column.prop(settings, "own_scene")

@@ -57,13 +57,16 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "photo_size": (2,),
     "principal_point": (2,),
     "eye": (3,),
+    "photo_base_color": ("P", "Q", 3),
 }
 _DTYPES = {
     "mask": np.dtype(bool),
     **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
+    "photo_base_color": np.dtype(np.uint8),
 }
 _CAMERA = ("focal_length", "principal_point", "eye")
-_OPTIONAL, _MAY_BE_NAN = {"specular_variation", *_CAMERA}, {"roughness", "specular_level"}
+_OPTIONAL = {"specular_variation", "photo_base_color", *_CAMERA}
+_MAY_BE_NAN = {"roughness", "specular_level"}
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
 
@@ -136,6 +139,8 @@ class ResultArrays:
         Its (x, y) in pixels from the left and upper edge of the maps.
     eye : (3,) ndarray or None
         Its place, in metres as `vertices`.
+    photo_base_color : (P, Q, 3) ndarray of uint8 or None
+        `base_color` at the photo's resolution, sRGB codes.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -179,6 +184,7 @@ class ResultArrays:
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None
+    photo_base_color: np.ndarray | None = None
     description: dict[str, Any] = field(default_factory=dict)
     folder: Path = Path()
 

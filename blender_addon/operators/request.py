@@ -190,7 +190,8 @@ def build_options(settings: Any, name: str) -> BuildOptions:
         if part.name in offered
     }
     own_shadows = OWN_SHADOWS[settings.shadows]
-    return BuildOptions(**{**chosen, "own_shadows": own_shadows, "name": name})
+    chosen |= {"texture_size": int(settings.texture_size), "own_shadows": own_shadows}
+    return BuildOptions(**{**chosen, "name": name})
 
 
 def inspect_images(

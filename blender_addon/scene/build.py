@@ -12,6 +12,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.solids.body import Back
 
 from ..files.result_arrays import ResultArrays
+from .base_texture import base_texture
 from .body import body_geometry
 from .camera import ensure_camera, eye_of, set_render_size
 from .camera_background import set_background_photo
@@ -65,6 +66,8 @@ class BuildOptions:
         A value of `Back`; "" builds the result's own mesh, whose vertices are pixels.
     triangles : int
         The most of the visible side of a mesh with a `back`; 0 for two at each pixel.
+    texture_size : int
+        Longer side of the base colour in pixels at most; 0 for the photo's.
     specular_from : str
         Source of the highlights: the fitted "lobe", the photo's specular "image", or "none".
     own_shadows : bool or None
@@ -85,6 +88,7 @@ class BuildOptions:
     displacement: bool = False
     back: str = ""
     triangles: int = 50_000
+    texture_size: int = 0
     specular_from: SpecularSource = "lobe"
     own_shadows: bool | None = None
     name: str = ""
@@ -164,7 +168,10 @@ def build_object(
     collection = ensure_collection(key, scene)
     maps = ensure_maps(key, result)
     specular = _specular_settings(result, options)
-    material = ensure_material(key, _material_maps(key, result, maps), specular)
+    material = ensure_material(
+        key, _material_maps(key, result, maps, options.texture_size), specular
+    )
+    _remove_unused(key, material_maps)
     obj = _ensure_object(key, collection, result, options, material, geometry)
     attach_maps(obj, maps)
     camera = ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
@@ -253,6 +260,8 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
         )
     if options.back not in ("", *Back):
         raise InputError(f"there is no back {options.back!r}: choose {', '.join(Back)}")
+    if options.texture_size < 0:
+        raise InputError("the texture size cannot be negative: 0 keeps the photo's")
     if options.triangles < 0:
         raise InputError("the number of triangles cannot be negative: 0 keeps every pixel")
     require_color_spaces(COLOR, DATA)
@@ -292,7 +301,7 @@ def _ensure_object(
 
 
 def _material_maps(
-    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image]
+    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image], texture_size: int
 ) -> MaterialMaps:
     variation, normal = None, None
     if result.specular_variation is not None:
@@ -300,8 +309,15 @@ def _material_maps(
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
         normal = ensure_image(key, "normal_map", result.normal_map, DATA)
-    base_color = ensure_image(key, "base_color", result.base_color, COLOR)
+    base_color = ensure_image(key, "base_color", base_texture(result, texture_size), COLOR)
     return MaterialMaps(base_color, maps["specular"], variation, normal)
+
+
+def _remove_unused(key: str, maps: MaterialMaps) -> None:
+    """Remove the normal map of an earlier mesh that had fewer triangles than this one."""
+    old = find_tagged(bpy.data.images, key, "normal_map")
+    if maps.normal is None and old is not None and old.users == 0:
+        bpy.data.images.remove(old)
 
 
 def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:

@@ -124,6 +124,12 @@ SPECULAR_SOURCES = _numbered(
     ("image", "Image", "Use the separated highlights, fixed to the surface as in the photo"),
     ("none", "None", "Build a diffuse object"),
 )
+TEXTURE_SIZES = _numbered(
+    ("0", "Photo", "As many as the photo has"),
+    ("4096", "4K", "4096 pixels"),
+    ("2048", "2K", "2048 pixels"),
+    ("1024", "1K", "1024 pixels"),
+)
 BACKS = _numbered(
     ("open", "Open", "No back"),
     ("flat", "Flat", "A plane, and a wall along the outline, for reliefs"),
@@ -328,6 +334,12 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="What the object has on the side that the photo does not show",
         items=BACKS,
         default="rounded",
+    )
+    texture_size: EnumProperty(
+        name="Texture Size",
+        description="Most pixels of the longer side of the base color",
+        items=TEXTURE_SIZES,
+        default="0",
     )
     triangles: IntProperty(
         name="Triangles",

@@ -33,6 +33,8 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     specular_variation (H, W)    factor of that level, where it varies; else absent
     photo_size (2,) int32        width and height of the original photo
     crop_scale ()                map pixels per photo pixel
+    photo_base_color (P, Q, 3) uint8   base_color at the photo's resolution, sRGB codes, see
+                                 `photo_texture`; absent at the maps' own resolution
 
 Equation: base_color * exp(SH(n; mesh_illumination)) = diffuse, and the irradiance of `sky` on a
 white surface, over pi, is exp(SH(n; mesh_illumination)).
@@ -50,12 +52,18 @@ from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
 from .mesh import MeshResult, build_mesh
 from .mesh_options import MeshOptions
+from .photo_texture import photo_base_color
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
 
 
-def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) -> None:
+def write_arrays(
+    d: Decomposition,
+    path: Path,
+    built: MeshResult | None = None,
+    photo: np.ndarray | None = None,
+) -> None:
     """Write the file; equal results give equal bytes.
 
     Parameters
@@ -64,6 +72,8 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     path : Path
     built : MeshResult, optional
         The mesh of `d`; built here by default.
+    photo : (P, Q, 3) ndarray, optional
+        The photo at its own resolution, linear.
 
     Raises
     ------
@@ -72,7 +82,13 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     OSError
         If the file cannot be written.
     """
-    arrays = arrays_of(d, built or mesh_of(d))
+    built = built or mesh_of(d)
+    arrays = arrays_of(d, built)
+    scale = float(d.provenance.input.get("scale", 1.0))
+    if photo is not None and scale < 1:
+        arrays["photo_base_color"] = photo_base_color(
+            d.image, d.diffuse, built.base_color, photo, scale
+        )
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 

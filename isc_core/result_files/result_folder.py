@@ -86,6 +86,7 @@ def save(
     arrays: bool = False,
     png: bool = False,
     cover: np.ndarray | None = None,
+    photo: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> None:
     """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
@@ -101,6 +102,8 @@ def save(
         Write the layers as PNG files too, see `layer_pngs`.
     cover : (H, W) ndarray, optional
         A mask that was found, at the photo's size, to write as `mask.png`.
+    photo : (P, Q, 3) ndarray, optional
+        The photo at its own resolution, linear, for the texture in `arrays.npz`.
     monitor : Monitor, optional
 
     Raises
@@ -135,7 +138,7 @@ def save(
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
-            write_arrays(d, partial / ARRAYS, built)
+            write_arrays(d, partial / ARRAYS, built, photo)
         if png:
             write_layer_pngs(d, partial)
         if cover is not None:

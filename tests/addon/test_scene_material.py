@@ -356,3 +356,21 @@ def test_a_flat_normal_map_is_left_out(blender: Any, result: ResultArrays) -> No
     assert link.from_node.type == "NORMAL_MAP" and link.from_node.uv_map == "UVMap"
     (link,) = link.from_node.inputs["Color"].links
     assert link.from_node.image.colorspace_settings.name == "Non-Color"
+
+
+@pytest.mark.parametrize(("size", "longer"), [(0, 352), (176, 176), (64, 88)])
+def test_the_base_colour_has_the_texture_size(
+    blender: Any, bump_folder: Path, size: int, longer: int
+) -> None:
+    """A photo of four times the maps' size (88 x 64)."""
+    from blender_addon.scene import BuildOptions, build_object
+
+    result = read_result(bump_folder)
+    codes = np.full((256, 352, 3), 188, np.uint8)  # half of the light
+    build_object(
+        replace(result, photo_base_color=codes), BuildOptions(texture_size=size, back="rounded")
+    )
+    image = next(i for i in blender.data.images if i.get("isc_role") == "base_color")
+    assert max(image.size) == longer
+    if longer > 88:
+        assert image.pixels[0] == pytest.approx(0.5, abs=0.01)

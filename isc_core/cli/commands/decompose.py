@@ -209,6 +209,7 @@ def _decompose_photo(
         arrays=options.arrays,
         png=options.png,
         cover=cover,
+        photo=photo.image,
         monitor=writing,
     )
     preview = output / "preview.png"
