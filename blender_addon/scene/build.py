@@ -168,9 +168,8 @@ def build_object(
     collection = ensure_collection(key, scene)
     maps = ensure_maps(key, result)
     specular = _specular_settings(result, options)
-    material = ensure_material(
-        key, _material_maps(key, result, maps, options.texture_size), specular
-    )
+    material_maps = _material_maps(key, result, maps, options.texture_size)
+    material = ensure_material(key, material_maps, specular)
     _remove_unused(key, material_maps)
     obj = _ensure_object(key, collection, result, options, material, geometry)
     attach_maps(obj, maps)
