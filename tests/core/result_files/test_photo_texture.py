@@ -25,9 +25,9 @@ def test_the_texture_keeps_the_photos_detail(size: tuple[int, int]) -> None:
     base = wide.reshape(small[0], 4, small[1], 4, 3).mean((1, 3))
     codes = photo_base_color(image, image, base, photo, 0.25)
     assert codes.shape == (4 * small[0], 4 * small[1], 3) and codes.dtype == np.uint8
-    inner = codes[4 : size[0] - 4, 4 : size[1] - 4] / 255
+    inner = codes[8 : size[0] - 8, 8 : size[1] - 8] / 255
     np.testing.assert_allclose(
-        srgb_to_linear(inner), paint[4 : size[0] - 4, 4 : size[1] - 4], atol=0.02
+        srgb_to_linear(inner), paint[8 : size[0] - 8, 8 : size[1] - 8], atol=0.02
     )
 
 
