@@ -214,4 +214,17 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
         action="store_true",
         help="displace a flat grid instead of building the mesh",
     )
-    add("--closed-back", action="store_true", help="close the mesh with a flat back")
+    add(
+        "--back",
+        default="rounded",
+        choices=("open", "flat", "rounded", "mirrored"),
+        help="side that the photo does not show (default: %(default)s)",
+    )
+    add(
+        "--triangles",
+        type=int,
+        default=50_000,
+        metavar="N",
+        help="most triangles of the visible side, 0 keeps two for each pixel "
+        "(default: %(default)s)",
+    )

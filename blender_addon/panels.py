@@ -124,7 +124,7 @@ class _Output(_Panel):
         settings, column = context.scene.isc, self.property_column()
         column.prop(settings, "size_metres")
         column.prop(settings, "specular_from")
-        for name in ("shadows", "sun", "displacement", "closed_back", "all_maps"):
+        for name in ("back", "triangles", "shadows", "sun", "displacement", "all_maps"):
             column.prop(settings, name)
         column.separator()
         column.prop(settings, "own_scene")

@@ -9,11 +9,12 @@ import bpy
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.result_files.solids.body import Back
 
 from ..files.result_arrays import ResultArrays
+from .body import body_geometry
 from .camera import ensure_camera, eye_of, set_render_size
 from .camera_background import set_background_photo
-from .closed_back import close_back
 from .collection import (
     ensure_collection,
     ensure_optional_part,
@@ -35,7 +36,7 @@ from .images import (
     require_color_spaces,
 )
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
-from .mesh import fill_mesh, front_geometry
+from .mesh import MeshGeometry, fill_mesh, front_geometry
 from .photo_highlights import forget_view
 from .placement import free_place
 from .provenance import (
@@ -59,8 +60,6 @@ from .world import ensure_world
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
 LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 _DEFAULT_ROUGHNESS = 0.5
-# Distance of the back from the furthest point of the front, relative to the size.
-_BACK_DISTANCE = 0.02
 
 
 @dataclass(frozen=True)
@@ -88,8 +87,10 @@ class BuildOptions:
         Whether to use a sun and uniform light instead of the environment map.
     displacement : bool
         Whether to displace a flat grid by a modifier instead of building the height mesh.
-    closed_back : bool
-        Whether to close the mesh with a wall and a flat back.
+    back : str
+        A value of `Back`; "" builds the result's own mesh, whose vertices are pixels.
+    triangles : int
+        The most of the visible side of a mesh with a `back`; 0 for two at each pixel.
     specular_from : str
         Source of the highlights: the fitted "lobe", the photo's specular "image" until light,
         camera or pose change, or "none".
@@ -113,7 +114,8 @@ class BuildOptions:
     photo_resolution: bool = False
     sun: bool = False
     displacement: bool = False
-    closed_back: bool = False
+    back: str = ""
+    triangles: int = 50_000
     specular_from: SpecularSource = "lobe"
     own_shadows: bool | None = None
     all_maps: bool = True
@@ -184,13 +186,21 @@ def build_object(
     options = options or BuildOptions()
     key = _choose_key(options.name or result.name, result, photo)
     _require_ready(key, options, scene or bpy.context.scene)
+    geometry = None
+    if options.back and not options.displacement:  # a displaced grid is open
+        geometry, normal_map = body_geometry(
+            result, options.size_metres, options.back, options.triangles
+        )
+        result = replace(result, normal_map=normal_map)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
     maps = ensure_maps(key, result, options.all_maps)
     specular = _specular_settings(result, options)
-    material = ensure_material(key, _material_maps(key, result, maps, specular.share), specular)
+    material_maps = _material_maps(key, result, maps, specular.share)
+    material = ensure_material(key, material_maps, specular)
+    _remove_unused(key, material_maps)
     is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
-    obj = _ensure_object(key, collection, result, options, material)
+    obj = _ensure_object(key, collection, result, options, material, geometry)
     if is_new and not options.own_scene:
         obj.location = free_place(obj, scene)
     attach_maps(obj, maps)
@@ -280,8 +290,10 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
             f"the scene {scene.name} is linked from another file and cannot be changed: "
             "enable New Scene"
         )
-    if options.displacement and options.closed_back:
-        raise InputError("a displaced grid has no back: choose Displacement or Closed Back")
+    if options.back not in ("", *Back):
+        raise InputError(f"there is no back {options.back!r}: choose {', '.join(Back)}")
+    if options.triangles < 0:
+        raise InputError("the number of triangles cannot be negative: 0 keeps every pixel")
     require_color_spaces(COLOR, DATA, SRGB)
     require_local(key)
     obj = find_tagged(bpy.data.objects, key, OBJECT)
@@ -295,6 +307,7 @@ def _ensure_object(
     result: ResultArrays,
     options: BuildOptions,
     material: bpy.types.Material,
+    geometry: MeshGeometry | None,
 ) -> bpy.types.Object:
     obj, shadows = find_tagged(bpy.data.objects, key, OBJECT), options.own_shadows
     if obj is None:
@@ -305,15 +318,12 @@ def _ensure_object(
         obj.visible_shadow = obj.visible_diffuse = shadows
     link_object(obj, collection)
     obj.shape_key_clear()
-    geometry = front_geometry(result, options.size_metres)
     if options.displacement:
-        fill_mesh(obj.data, flatten(geometry, eye_of(result, options.size_metres)))
+        sheet = front_geometry(result, options.size_metres)
+        fill_mesh(obj.data, flatten(sheet, eye_of(result, options.size_metres)))
         add_displacement(key, obj, result, options.size_metres)
     else:
-        if options.closed_back:
-            eye = eye_of(result, options.size_metres)
-            geometry = close_back(geometry, _BACK_DISTANCE * options.size_metres, eye)
-        fill_mesh(obj.data, geometry)
+        fill_mesh(obj.data, geometry or front_geometry(result, options.size_metres))
         remove_displacement(key, obj)
     remember_mesh(obj.data)
     if not obj.data.materials:
@@ -358,6 +368,13 @@ def _peak(result: ResultArrays) -> float:
     """The largest factor of the specular level: textures hold values up to 1."""
     variation = result.specular_variation
     return 1.0 if variation is None else max(1.0, float(variation.max()))
+
+
+def _remove_unused(key: str, maps: MaterialMaps) -> None:
+    """Remove the normal map of an earlier mesh that had fewer triangles than this one."""
+    old = find_tagged(bpy.data.images, key, "normal_map")
+    if maps.normal is None and old is not None and old.users == 0:
+        bpy.data.images.remove(old)
 
 
 def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:

@@ -124,6 +124,12 @@ SPECULAR_SOURCES = _numbered(
     ("image", "Photo", "Use the photo's own highlights, fixed to the surface"),
     ("none", "None", "Create an object without highlights"),
 )
+BACKS = _numbered(
+    ("open", "Open", "No back"),
+    ("flat", "Flat", "A plane, and a wall along the outline, for reliefs"),
+    ("rounded", "Rounded", "A back as round as the outline"),
+    ("mirrored", "Mirrored", "The visible side again"),
+)
 OWN_SHADOWS_ITEMS = _numbered(
     (
         "auto",
@@ -330,8 +336,21 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Create a flat grid with a Displace modifier instead of a mesh",
         default=False,
     )
-    closed_back: BoolProperty(
-        name="Closed Back", description="Close the mesh with a flat back", default=False
+    back: EnumProperty(
+        name="Back",
+        description="What the object has on the side that the photo does not show",
+        items=BACKS,
+        default="rounded",
+    )
+    triangles: IntProperty(
+        name="Triangles",
+        description=(
+            "Most triangles of the visible side, finer detail is in the normal map, 0 keeps two "
+            "for each pixel"
+        ),
+        default=50_000,
+        min=0,
+        soft_max=1_000_000,
     )
     all_maps: BoolProperty(
         name="All Maps",

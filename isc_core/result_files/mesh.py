@@ -460,6 +460,35 @@ def _full_grid(cells: np.ndarray) -> Triangulation:
     return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
 
 
+def interpolated_normals(
+    grid: Triangulation, normal: np.ndarray, view: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the normals of vertices, and the tangent-space map of what lies between them.
+
+    Parameters
+    ----------
+    grid : Triangulation
+        Over the pixels; a vertex without a triangle has the normal of its pixel.
+    normal : (H, W, 3) ndarray
+        Unit vectors, camera frame.
+    view : (3,) or (H, W, 3) ndarray
+        Unit vectors toward the viewer.
+
+    Returns
+    -------
+    smooth : (V, 3) ndarray
+        Unit vectors.
+    detail : (H, W, 3) ndarray
+        Unit vectors in tangent space.
+    """
+    smooth = _mean_normals(grid, 1, normal, view)
+    alone = np.ones(len(smooth), bool)
+    alone[grid.faces] = False
+    row, column = grid.vertices[alone].T
+    smooth[alone] = _facing(normal[row, column].astype(np.float32), _at(view, row, column))
+    return smooth, _detail_normals(grid, 1, normal, smooth, view)[0]
+
+
 def _mean_normals(
     grid: Triangulation, stride: int, normal: np.ndarray, view: np.ndarray
 ) -> np.ndarray:

@@ -53,7 +53,7 @@ def census(bpy: Any) -> dict[str, list[str]]:
         {},
         {"sun": True},
         {"displacement": True},
-        {"closed_back": True},
+        {"back": "rounded"},
         {"specular_from": "image"},
         {"own_scene": False},
     ],
@@ -75,7 +75,7 @@ def test_changed_options_leave_nothing_behind(blender: Any, result: ResultArrays
     build(result)
     plain = census(blender)
     build(result, sun=True, displacement=True, specular_from="image", size_metres=0.3)
-    build(result, closed_back=True)
+    build(result, back="flat")
     build(result)
     changed = {kind: names for kind, names in census(blender).items() if names != plain[kind]}
     assert set(changed) <= {"node_groups"}, "a group without users goes when the file is saved"
@@ -429,9 +429,12 @@ def test_an_invalid_size_is_refused_and_nothing_changes(
     assert census(blender) == before
 
 
-def test_a_displaced_grid_with_a_back_is_refused(blender: Any, result: ResultArrays) -> None:
-    with pytest.raises(InputError, match="choose"):
-        build(result, displacement=True, closed_back=True)
+@pytest.mark.parametrize("options", [{"back": "round"}, {"triangles": -1}], ids=str)
+def test_an_unknown_back_is_refused(
+    blender: Any, result: ResultArrays, options: dict[str, Any]
+) -> None:
+    with pytest.raises(InputError, match="choose|keeps"):
+        build(result, **options)
     assert not blender.data.objects
 
 

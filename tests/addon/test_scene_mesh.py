@@ -2,7 +2,6 @@
 is closed, the displaced one alike.
 """
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.result_files.mesh_options import MeshOptions
-from tests.addon.scene_fixture import bump, write_result
+from tests.addon.scene_fixture import write_result
 
 
 def got(values: Any, name: str, width: int, kind: type = np.float32) -> np.ndarray:
@@ -77,52 +76,62 @@ def manifold(mesh: Any) -> bool:
 
 
 @pytest.mark.slow
-def test_the_closed_body_is_closed(blender: Any, bump_folder: Path) -> None:
+@pytest.mark.parametrize("back", ["flat", "rounded", "mirrored"])
+def test_the_body_is_closed(blender: Any, bump_folder: Path, back: str) -> None:
     result = read_result(bump_folder)
-    opened = build(result).object.data
-    assert not manifold(opened)
-    closed = build(result, closed_back=True).object.data
+    assert not manifold(build(result, back="open").object.data)
+    closed = build(result, back=back, triangles=900).object.data
     assert manifold(closed) and not closed.validate(verbose=True)
     places = got(closed.vertices, "co", 3).astype(float)
     closed.calc_loop_triangles()
     corner = places[got(closed.loop_triangles, "vertices", 3, np.int32)]
-    volume = np.linalg.det(corner).sum() / 6
-    assert volume > 0, "the faces look inward"
+    assert np.linalg.det(corner).sum() > 0, "the faces look inward"
     assert places[:, 1].max() > -result.vertices[:, 2].min()
+    assert crossing_faces(closed) == 0
 
 
-@pytest.mark.slow
-def test_parts_that_meet_in_a_vertex_are_closed_too(blender: Any, tmp_path: Path) -> None:
-    mask = np.zeros((64, 88), bool)
-    mask[5:20, 10:31] = mask[19:40, 30:50] = (
-        True  # two blocks whose cells share the vertex (19, 30)
-    )
-    mask[8:12, 15:18] = False
-    d = bump()
-    zero = np.zeros_like(d.height)
-    result = read_result(write_result(tmp_path / "pinched", replace(d, mask=mask, height=zero)))
-    closed = build(result, closed_back=True).object.data
-    assert len(closed.vertices) == 2 * (len(result.vertices) + 1), "the shared vertex was not split"
-    assert manifold(closed)
+def crossing_faces(mesh: Any) -> int:
+    """Pairs of faces that cross each other without a common vertex, as 3D printing counts them."""
+    import bmesh
+    from mathutils.bvhtree import BVHTree
+
+    edited = bmesh.new()
+    edited.from_mesh(mesh)
+    pairs = BVHTree.FromBMesh(edited, epsilon=0.0).overlap(BVHTree.FromBMesh(edited, epsilon=0.0))
+    edited.free()
+    corners = [set(face.vertices) for face in mesh.polygons]
+    return sum(a < b and not corners[a] & corners[b] for a, b in pairs)
 
 
-def test_the_front_of_the_closed_body_keeps_its_normals(blender: Any, bump_folder: Path) -> None:
+def test_the_front_of_the_body_keeps_heights_and_normals(blender: Any, bump_folder: Path) -> None:
+    """Where there is a vertex at each pixel, all but the rim is the result's own mesh."""
     result = read_result(bump_folder)
-    closed = build(result, closed_back=True).object.data
-    normals = got(closed.corner_normals, "vector", 3)
-    nx, ny, nz = result.vertex_normals.T
-    front = np.stack([nx, -nz, ny], -1)[result.faces.ravel()]
-    np.testing.assert_allclose(normals[: len(front)], front, atol=1e-6)
-    np.testing.assert_allclose(
-        normals[len(front) : 2 * len(front)], np.broadcast_to([0, 1, 0], front.shape), atol=1e-6
-    )
-    wall = normals[2 * len(front) :]
-    corners = got(closed.loops, "vertex_index", 1, np.int32)[2 * len(front) :]
-    places = got(closed.vertices, "co", 3)[corners]
-    middle = got(closed.vertices, "co", 3).mean(0)
-    assert (((places - middle) * wall)[:, [0, 2]].sum(-1) > 0).all(), (
-        "the wall's normals look inward"
-    )
+    mesh = build(result, back="rounded", triangles=0).object.data
+    places, uv = got(mesh.vertices, "co", 3), np.zeros((len(mesh.vertices), 2), np.float32)
+    corners = got(mesh.loops, "vertex_index", 1, np.int32)
+    uv[corners] = got(mesh.uv_layers["UVMap"].uv, "vector", 2)
+    trust = got(mesh.attributes["confidence"].data, "value", 1)
+    normals = got(mesh.attributes["custom_normal"].data, "vector", 3)
+    height, width = result.mask.shape
+    column, row = uv[:, 0] * width - 0.5, (1 - uv[:, 1]) * height - 0.5
+    at = np.full(result.mask.shape, -1)
+    at[tuple(result.vertex_pixel.T)] = np.arange(len(result.vertices))
+    front = np.flatnonzero(trust > 0.5)
+    same = at[np.rint(row[front]).astype(int), np.rint(column[front]).astype(int)]
+    assert len(front) > 0.7 * len(result.vertices) and (same >= 0).all()
+    x, y, z = result.vertices[same].T
+    np.testing.assert_allclose(places[front], np.stack([x, -z, y], -1), atol=1e-6)
+    nx, ny, nz = result.vertex_normals[same].T
+    off = np.arccos(np.clip((normals[front] * np.stack([nx, -nz, ny], -1)).sum(-1), -1, 1))
+    assert np.degrees(off).max() < 2, "normals are means over the triangles of a vertex"
+
+
+def test_the_body_has_few_triangles_and_a_normal_map(blender: Any, bump_folder: Path) -> None:
+    result = read_result(bump_folder)
+    many = len(build(result, back="open", triangles=0).object.data.polygons)
+    built = build(result, back="open", triangles=many // 2)
+    assert len(built.object.data.polygons) < 0.75 * many
+    assert any(image.get("isc_role") == "normal_map" for image in blender.data.images)
 
 
 @pytest.mark.slow

@@ -1,0 +1,221 @@
+"""A body from the height map of its visible side: a smooth outline, a rounded rim, a back.
+
+Problem: a photo shows one side. Turned, that sheet ends in the steps of its pixels, and half of the
+form is missing.
+
+Model: u is a membrane over the inside of the outline, lap u = -4 and u = 0 around, so that sqrt(u)
+is the height of a sphere over a disc. At the rim, where the surface turns away from the viewer, the
+last seen height z and the outline are sqrt(u) apart in depth:
+
+    rim = z - ROUND sqrt(u),   continued inward by a membrane m without load.
+
+The back at a pixel is
+
+    flat       the furthest rim less a share of the size, with a wall
+    rounded    m - FULLNESS sqrt(u)
+    mirrored   m - (z - m)
+
+and at least `_LEAST` sqrt(u) behind the front, so that the two meet in the outline alone. Both are
+graphs over the same triangles: they do not cross each other, and before a pinhole camera, along
+whose rays the back lies, neither.
+
+Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
+artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
+Igarashi, S. Matsuoka and H. Tanaka, "Teddy", SIGGRAPH 1999, doi:10.1145/311535.311602.
+
+Limits: the back is invented. Parts that hide others are joined to them: a step in depth inside the
+outline stays a steep slope.
+"""
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from ..adaptive_triangles import Triangulation
+from .membrane import membrane
+from .outline import Outlined, outlined, smooth_cover
+
+ROUND, FULLNESS = 1.0, 1.0
+_LEAST = 0.2
+_BEHIND = 0.02  # of the longer side
+
+
+class Back(StrEnum):
+    """What a body has on the side that the photo does not show.
+
+    Attributes
+    ----------
+    OPEN
+        Nothing.
+    FLAT
+        A plane, and a wall along the outline.
+    ROUNDED
+        A surface as round as the outline.
+    MIRRORED
+        The front again.
+    """
+
+    OPEN = "open"
+    FLAT = "flat"
+    ROUNDED = "rounded"
+    MIRRORED = "mirrored"
+
+
+@dataclass(frozen=True)
+class Body:
+    """A mesh over the pixels.
+
+    Attributes
+    ----------
+    places : (V, 2) float64 ndarray
+        Row and column of each vertex.
+    heights : (V,) float64 ndarray
+        Pixels toward the viewer.
+    pixels : (V, 2) int64 ndarray
+        Row and column of the nearest pixel inside.
+    faces : (F, 3) int64 ndarray
+        Counter-clockwise from outside.
+    front : (V,) bool ndarray
+        Vertices at pixels that the photo shows; not those of the outline.
+    visible : Triangulation
+        The triangles between these vertices, which come first.
+    """
+
+    places: np.ndarray
+    heights: np.ndarray
+    pixels: np.ndarray
+    faces: np.ndarray
+    front: np.ndarray
+    visible: Triangulation
+
+
+def make_body(
+    height: np.ndarray,
+    cosine: np.ndarray,
+    mask: np.ndarray,
+    cover: np.ndarray,
+    back: Back,
+    triangles: int,
+) -> Body:
+    """Make a body.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer, inside the mask.
+    cosine : (H, W) ndarray
+        Of the angle between normal and view.
+    mask : (H, W) bool ndarray
+        Where heights are known.
+    cover : (H, W) ndarray
+        Share of each pixel that the object covers.
+    back : Back
+    triangles : int
+        The most of the visible side, where its outline allows; 0 for two at each pixel.
+
+    Returns
+    -------
+    Body
+        Closed but for `Back.OPEN`.
+
+    Raises
+    ------
+    InputError
+        If no block of 2 x 2 pixels lies inside.
+    """
+    smooth = smooth_cover(cover)
+    inside = smooth > 0.5
+    known = continued(np.where(mask, height, 0.0), mask, inside)
+    sheet = outlined(smooth, known, cosine, triangles)
+    # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
+    around = _grown(inside) & ~inside
+    round_height = np.sqrt(np.maximum(membrane(inside, around, np.zeros_like(known), 4.0), 0))
+    rim = np.where(inside, known - ROUND * round_height, 0.0)
+    rows, columns = sheet.pixels.T
+    heights = known[rows, columns]
+    heights[sheet.inner :] = rim[rows, columns][sheet.inner :]
+    front = np.arange(len(heights)) < sheet.inner
+    if back is Back.OPEN:
+        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, sheet.pixel_triangles)
+    if back is Back.FLAT:
+        return _walled(sheet, heights, front, mask)
+    edge = _grown(around) & inside
+    middle = membrane(inside & ~edge, edge, rim, 0.0)
+    middle = np.where(edge, rim, middle)
+    depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
+    behind = np.minimum(middle - depth, known - _LEAST * round_height)
+    return _mirrored(sheet, heights, behind, front)
+
+
+def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Continue heights from the mask to the pixels inside, ring by ring.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        0 outside the mask.
+    mask, inside : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W) float64 ndarray
+    """
+    found, known = height.astype(np.float64), mask.copy()
+    while (inside & ~known).any():
+        grown = _grown(known)
+        ring = grown & ~known
+        if not ring.any():
+            break
+        weight = _sums(known.astype(np.float64))
+        found = np.where(ring, _sums(np.where(known, found, 0)) / np.maximum(weight, 1), found)
+        known = grown
+    return found
+
+
+def _sums(plane: np.ndarray) -> np.ndarray:
+    """Sums over the 3 x 3 pixels around each."""
+    padded = np.pad(plane, 1)
+    rows = padded[:-2] + padded[1:-1] + padded[2:]
+    return np.asarray(rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:])
+
+
+def _grown(plane: np.ndarray) -> np.ndarray:
+    return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
+
+
+def _mirrored(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray) -> Body:
+    """The sheet and, with the points of the outline in common, the back."""
+    n, inner = len(heights), sheet.inner
+    rows, columns = sheet.pixels[:inner].T
+    other = np.where(sheet.faces < inner, sheet.faces + n, sheet.faces)[:, ::-1]
+    return Body(
+        np.concatenate([sheet.places, sheet.places[:inner]]),
+        np.concatenate([heights, behind[rows, columns]]),
+        np.concatenate([sheet.pixels, sheet.pixels[:inner]]),
+        np.concatenate([sheet.faces, other]),
+        np.concatenate([front, np.zeros(inner, bool)]),
+        sheet.pixel_triangles,
+    )
+
+
+def _walled(sheet: Outlined, heights: np.ndarray, front: np.ndarray, mask: np.ndarray) -> Body:
+    """The sheet, a plane behind it, and two triangles of wall at each edge of the outline."""
+    n = len(heights)
+    size = (np.ptp(np.argwhere(mask), axis=0) + 1).max()
+    edges = sheet.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    rim = edges[~np.isin(edges @ (n, 1), edges[:, ::-1] @ (n, 1))]
+    wall = np.concatenate(
+        [
+            np.stack([rim[:, 1], rim[:, 0], rim[:, 0] + n], -1),
+            np.stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n], -1),
+        ]
+    )
+    return Body(
+        np.concatenate([sheet.places, sheet.places]),
+        np.concatenate([heights, np.full(n, heights.min() - _BEHIND * size)]),
+        np.concatenate([sheet.pixels, sheet.pixels]),
+        np.concatenate([sheet.faces, sheet.faces[:, ::-1] + n, wall]),
+        np.concatenate([front, np.zeros(n, bool)]),
+        sheet.pixel_triangles,
+    )
