@@ -2,9 +2,10 @@
 
   python -m benchmarks.detail.relief_rule SET --rows FILE [--weights NPZ] [--count N] [--kind KIND]
 
-SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief, and
-the relief that the network finds is judged at several factors. A row is stored for each body, so
-that an interrupted run continues; with `--kind`, rows alone are made.
+SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief. What
+the whole object says is stored first, then, with each body's belief by the rule of the others, the
+relief that the network finds, judged at several factors. A row is stored for each body, so that an
+interrupted run continues; with `--kind`, rows alone are made.
 
 Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
 free). The factors are those of a grid that explain most of the relief, mean over bodies and
@@ -26,12 +27,12 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.decomposition.detail import unscaled_relief
+from isc_core.decomposition.detail import Pyramid
 from isc_core.decomposition.layers import shaded
 from isc_core.decomposition.models import solve
 from isc_core.decomposition.pipeline import WORKING_SIZE
 from isc_core.decomposition.settings import MOST_DETAIL, Settings
-from isc_core.decomposition.task import DecompositionTask, SolveOptions
+from isc_core.decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
 from isc_core.errors import InputError
 from isc_core.networks.detail_network import DetailNetwork
 from isc_core.photo import read_photo
@@ -48,38 +49,62 @@ _INVENTED = 0.04
 _STEPS = 50
 
 
-def at_factors(body: Path, network: DetailNetwork) -> dict[str, Any]:
+def evidence_row(body: Path) -> dict[str, Any]:
+    """Return what a whole body says of its relief.
+
+    Parameters
+    ----------
+    body : Path
+        Its folder.
+
+    Returns
+    -------
+    dict of str to Any
+        "evidence": two numbers, or None.
+    """
+    _, pyramid = _solved(body)
+    evidence = pyramid.evidence()
+    return {"evidence": None if evidence is None else list(asdict(evidence).values())}
+
+
+def at_factors(
+    body: Path, beliefs: Mapping[str, float], network: DetailNetwork | None
+) -> dict[str, Any]:
     """Judge the relief that the network finds on a body, at several factors.
 
     Parameters
     ----------
     body : Path
         Its folder.
-    network : DetailNetwork
+    beliefs : mapping of str to float
+        What the network is told, by the names of bodies.
+    network : DetailNetwork or None
+        None: the shipped one.
 
     Returns
     -------
     dict of str to Any
-        "evidence"; "explained", "error" and "energy" at each of `FACTORS`.
+        "explained", "error" and "energy" at each of `FACTORS`.
     """
+    found, pyramid = _solved(body)
+    relief = pyramid.relief(MOST_DETAIL, beliefs.get(body.name, 0.0), network=network)
+    truth, judged = read_truth(body), []
+    for factor in FACTORS:
+        normal = shaded(found.height + factor * relief, found.light, pyramid.mask)[0]
+        judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
+    return {
+        name: [np.asarray(getattr(one, name)).tolist() for one in judged]
+        for name in ("explained", "error", "energy")
+    }
+
+
+def _solved(body: Path) -> tuple[SceneEstimate, Pyramid]:
+    """A body without fine relief, and its levels."""
     photo, settings = read_photo(body / PHOTO), Settings(detail=0, threads=1)
     options = SolveOptions(fit_lobe=False, check_assumptions=False)
     working = photo.resized_to_object(WORKING_SIZE)
     found = solve(DecompositionTask(working, photo, settings, options=options))
-    relief, evidence = unscaled_relief(
-        found.split.diffuse, photo.mask, found.height, found.light, MOST_DETAIL, network=network
-    )
-    truth, judged = read_truth(body), []
-    for factor in FACTORS:
-        normal = shaded(found.height + factor * relief, found.light, photo.mask)[0]
-        judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
-    return {
-        "evidence": None if evidence is None else list(asdict(evidence).values()),
-        **{
-            name: [np.asarray(getattr(one, name)).tolist() for one in judged]
-            for name in ("explained", "error", "energy")
-        },
-    }
+    return found, Pyramid.of(found.split.diffuse, photo.mask, found.height, found.light)
 
 
 def logistic_weights(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
@@ -182,24 +207,34 @@ def main() -> None:
     add("--kind", type=SetKind, choices=list(SetKind), help="measure one kind of bodies alone")
     add("--count", type=int, help="bodies of each kind")
     given = parser.parse_args()
-    rows, kinds = [], list(SetKind) if given.kind is None else [given.kind]
+    kinds = list(SetKind)
     try:
-        shipped = given.weights is None
-        network = DetailNetwork.shipped() if shipped else DetailNetwork.read(given.weights)
-        key = "shipped" if shipped else str(given.weights.resolve())
-        measure = partial(at_factors, network=network)
-        for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
-            print(row["body"], np.round(row["evidence"] or np.nan, 2), flush=True)
-            rows.append(row)
+        network = None if given.weights is None else DetailNetwork.read(given.weights)
+        rows = partial(body_rows, given.folder, given.rows)
+        told = [
+            row
+            for row in rows(kinds, given.count, "evidence", evidence_row)
+            if row["evidence"] is not None
+        ]
+        names = [row["body"] for row in told]
+        is_relief = np.array([name.startswith(SetKind.RELIEF) for name in names])
+        features = np.array([row["evidence"] for row in told])
+        probability = left_out(features, is_relief)
+        beliefs = dict(zip(names, (2 * probability - 1).tolist(), strict=True))
+        measure = partial(at_factors, beliefs=beliefs, network=network)
+        key = "shipped" if given.weights is None else str(given.weights.resolve())
+        judged = {}
+        for row in rows(kinds if given.kind is None else [given.kind], given.count, key, measure):
+            print(row["body"], np.round(row["explained"], 2).tolist(), flush=True)
+            judged[row["body"]] = row
     except InputError as error:
         parser.error(str(error))
     if given.kind is not None:
         return
-    rows = [row for row in rows if row["evidence"] is not None]
-    is_relief = np.array([row["body"].startswith(SetKind.RELIEF) for row in rows])
-    features = np.array([row["evidence"] for row in rows])
-    weights, probability = logistic_weights(features, is_relief), left_out(features, is_relief)
-    low, high, explained, invented = best_factors(rows, is_relief, probability)
+    weights = logistic_weights(features, is_relief)
+    low, high, explained, invented = best_factors(
+        [judged[name] for name in names], is_relief, probability
+    )
     print(f"{np.mean((probability > 0.5) == is_relief):.0%} of bodies told, each left out")
     print("explained", np.round(explained, 3), "invented", np.round(invented, 4))
     offset, correlation, along = (round(float(weight), 2) for weight in weights)

@@ -6,11 +6,12 @@ Equation: levels of the photo, each half as large as the one before, from the fi
 for down to about the solver's size. With the height Z of SIRFS, the light's log shading S, and the
 detail network's band b_k of level k (`networks.detail_network`),
 
-    R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k)
+    R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k, v)
     height = Z + a R_0
 
-each in the pixels of its level; a is what the whole object says of relief (`relief_evidence`). The
-light and the overall shape do not change: each band is without what the next coarser level holds.
+each in the pixels of its level. What the whole object says of relief (`relief_evidence`) is v, from
+-1 to 1, and a grows with it. The light and the overall shape do not change: each band is without
+what the next coarser level holds.
 
 Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
 Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from shading: A. Pentland
@@ -20,7 +21,9 @@ Limits: relief is where the light from SIRFS says; where that light is from the 
 become bumps. The network sees one tile at a time, so memory is bounded by the maps' own.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 
@@ -140,64 +143,113 @@ def fine_relief(
     Cancelled
         If the monitor cancels.
     """
-    relief, evidence = unscaled_relief(diffuse, mask, height, light, finest, monitor, network)
-    return relief * np.float32((rule or RULE).factor(evidence))
-
-
-def unscaled_relief(
-    diffuse: np.ndarray,
-    mask: np.ndarray,
-    height: np.ndarray,
-    light: np.ndarray,
-    finest: int,
-    monitor: Monitor | None = None,
-    network: DetailNetwork | None = None,
-) -> tuple[np.ndarray, Evidence | None]:
-    """Find the relief that patches alone show, and what the whole object says of it.
-
-    Parameters
-    ----------
-    diffuse, mask, height, light, finest, monitor, network
-        As for `fine_relief`.
-
-    Returns
-    -------
-    relief : (H, W) float32 ndarray
-        R_0, 0 outside of the mask.
-    evidence : Evidence or None
-        None where the object is too small to say anything.
-
-    Raises
-    ------
-    Cancelled
-        If the monitor cancels.
-    """
-    monitor = monitor or Monitor()
-    frame = _Frame.around(mask)
-    inside = np.where(mask[..., None], diffuse, 0).astype(np.float32)
-    levels = [Level(frame.window.cut(inside, 0), frame.window.cut(mask, False))]
-    for _ in range(frame.halvings):
-        levels.append(levels[-1].halved())
-    slope = slopes(frame.coarsest(height))
-    gain = shading_gain(slope, light)
-    found = list[Evidence | None]()
-    relief: np.ndarray = np.zeros(tuple(n // 2 for n in levels[-1].mask.shape), np.float32)
-    for k, level in zip(range(frame.halvings, -1, -1), levels[::-1], strict=True):
-        monitor.report("fine relief", 1 - (k + 1) / (frame.halvings + 1))
-        if k < frame.halvings:
-            slope, gain = (raised(part.astype(np.float32)) for part in (slope, gain))
-        relief, length = 2 * raised(relief), frame.length / 2**k
-        image = level.relative
-        if length <= finest:
-            relief += _band(image, level.mask, slope, gain, network)
-        if length <= _TELLING:
-            found.append(evidence_of(image, level.mask, gain))
-    whole = np.where(mask, frame.window.put(relief, mask.shape), np.float32(0))
-    return whole, mean_evidence(found)
+    rule = rule or RULE
+    pyramid = Pyramid.of(diffuse, mask, height, light)
+    evidence = pyramid.evidence()
+    relief = pyramid.relief(finest, rule.belief(evidence), monitor, network)
+    return relief * np.float32(rule.factor(evidence))
 
 
 @dataclass(frozen=True)
-class _Frame:
+class Pyramid:
+    """The levels of a photo with what is known of its smooth surface.
+
+    Attributes
+    ----------
+    mask : (H, W) bool ndarray
+        Of the photo.
+    frame : Frame
+        The part of the photo that is looked at.
+    levels : list of Level
+        The finest first.
+    slope, gain : (h, w, 2) ndarray
+        Slopes of the smooth surface and derivatives of log shading by them, at the coarsest level.
+    """
+
+    mask: np.ndarray
+    frame: "Frame"
+    levels: list[Level]
+    slope: np.ndarray
+    gain: np.ndarray
+
+    @classmethod
+    def of(
+        cls, diffuse: np.ndarray, mask: np.ndarray, height: np.ndarray, light: np.ndarray
+    ) -> "Pyramid":
+        """Build the levels of an object.
+
+        Parameters
+        ----------
+        diffuse, mask, height, light
+            As for `fine_relief`.
+
+        Returns
+        -------
+        Pyramid
+        """
+        frame = Frame.around(mask)
+        inside = np.where(mask[..., None], diffuse, 0).astype(np.float32)
+        levels = [Level(frame.window.cut(inside, 0), frame.window.cut(mask, False))]
+        for _ in range(frame.halvings):
+            levels.append(levels[-1].halved())
+        slope = slopes(frame.coarsest(height))
+        return cls(mask, frame, levels, slope, shading_gain(slope, light))
+
+    def evidence(self) -> Evidence | None:
+        """Return what the whole object says of relief; None where it is too small."""
+        telling = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest())
+        return mean_evidence(
+            [evidence_of(level.relative, level.mask, gain) for level, _, _, gain in telling]
+        )
+
+    def relief(
+        self,
+        finest: int,
+        belief: float,
+        monitor: Monitor | None = None,
+        network: DetailNetwork | None = None,
+    ) -> np.ndarray:
+        """Find the relief, R_0 of the module.
+
+        Parameters
+        ----------
+        finest, monitor, network
+            As for `fine_relief`.
+        belief : float
+            What the object's fine changes are: -1 paint, 0 unknown, 1 relief.
+
+        Returns
+        -------
+        (H, W) float32 ndarray
+            Pixels toward the viewer, 0 outside of the mask.
+
+        Raises
+        ------
+        Cancelled
+            If the monitor cancels.
+        """
+        monitor = monitor or Monitor()
+        coarsest = self.levels[-1].mask.shape
+        relief: np.ndarray = np.zeros(tuple(n // 2 for n in coarsest), np.float32)
+        for k, (level, length, slope, gain) in enumerate(self._from_coarsest()):
+            monitor.report("fine relief", k / len(self.levels))
+            relief = 2 * raised(relief)
+            if length <= finest:
+                relief += _band(level, slope, gain, belief, network)
+        whole = self.frame.window.put(relief, self.mask.shape)
+        return np.where(self.mask, whole, np.float32(0))
+
+    def _from_coarsest(self) -> Iterator[tuple[Level, float, np.ndarray, np.ndarray]]:
+        """Each level with the object's length, the slopes and the gains, the coarsest first."""
+        slope, gain = self.slope, self.gain
+        for k in range(len(self.levels) - 1, -1, -1):
+            if k < len(self.levels) - 1:
+                slope, gain = (raised(part.astype(np.float32)) for part in (slope, gain))
+            yield self.levels[k], self.frame.length / 2**k, slope, gain
+
+
+@dataclass(frozen=True)
+class Frame:
     """The object's box with a margin, of a size that can be halved.
 
     `box` are the rows and columns of the mask, `length` the longer side of the box in pixels,
@@ -210,7 +262,7 @@ class _Frame:
     window: Window
 
     @classmethod
-    def around(cls, mask: np.ndarray) -> "_Frame":
+    def around(cls, mask: np.ndarray) -> "Frame":
         box = mask_slices(mask)
         sizes = [one.stop - one.start for one in box]
         halvings = max(0, int(np.ceil(np.log2(max(sizes) / _SOLVED))))
@@ -229,13 +281,14 @@ class _Frame:
 
 
 def _band(
-    image: np.ndarray,
-    mask: np.ndarray,
+    level: Level,
     slope: np.ndarray,
     gain: np.ndarray,
+    belief: float,
     network: DetailNetwork | None,
 ) -> np.ndarray:
     """The band (h, w) of a level, tile by tile; tiles overlap by what the network looks at."""
+    image, mask = level.relative, level.mask
     height, width = mask.shape
     band = np.zeros((height, width), np.float32)
     for top in range(0, height, _TILE):
@@ -247,7 +300,9 @@ def _band(
                 slice(max(one.start - _HALO, 0), min(one.stop + _HALO, size))
                 for one, size in zip(inner, (height, width), strict=True)
             )
-            found = predict_relief(image[outer], mask[outer], slope[outer], gain[outer], network)
+            found = predict_relief(
+                image[outer], mask[outer], slope[outer], gain[outer], belief, network
+            )
             own = tuple(
                 slice(one.start - wide.start, one.stop - wide.start)
                 for one, wide in zip(inner, outer, strict=True)

@@ -9,7 +9,8 @@ Equation: for slopes p, q of a smooth surface under known light, relief r change
 
 Of all slopes that explain a change of log shading d, g d / |g|^2 are the smallest. A convolutional
 network (`encoder_decoder`) sees them (with |g|^2 + .15^2 below), the photo's logarithm without its
-low frequencies, p and q, and g, and returns the finest band of r: what an image of half the size
+low frequencies, p and q, g, and how much of the object's fine changes is believed to be relief
+(`shading.relief_evidence`), and returns the finest band of r: what an image of half the size
 cannot hold,
 
     band(r) = r - U P r
@@ -33,7 +34,7 @@ from ..imaging.blocks import block_means
 from .encoder_decoder import EncoderDecoder
 from .loader import Parameters
 
-INPUTS = 11
+INPUTS = 12
 LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
 MULTIPLE = BLOCK * 2 ** (LEVELS - 1)  # sides of the network's frame
 DARK = 0.01  # of the mean light
@@ -96,6 +97,7 @@ def predict_relief(
     mask: np.ndarray,
     slope: np.ndarray,
     gain: np.ndarray,
+    belief: float,
     network: DetailNetwork | None = None,
 ) -> np.ndarray:
     """Predict the finest band of the relief in a photo.
@@ -110,6 +112,8 @@ def predict_relief(
         Of the smooth surface: dz/dx, dz/dy, x right, y down, z toward the viewer.
     gain : (H, W, 2) ndarray
         Derivatives of log shading by these slopes.
+    belief : float
+        What the object's fine changes are: -1 paint, 0 unknown, 1 relief.
     network : DetailNetwork, optional
         By default the shipped one.
 
@@ -119,7 +123,7 @@ def predict_relief(
         Pixels toward the viewer; 0 outside of the mask, and without what half the size can hold.
     """
     network = network or DetailNetwork.shipped()
-    relief = network(channels_of(image, mask, slope, gain))
+    relief = network(channels_of(image, mask, slope, gain, belief))
     return np.where(mask, band(np.where(mask, relief, 0)), 0)
 
 
@@ -162,7 +166,7 @@ def _raised_rows(values: np.ndarray) -> np.ndarray:
 
 
 def channels_of(
-    image: np.ndarray, mask: np.ndarray, slope: np.ndarray, gain: np.ndarray
+    image: np.ndarray, mask: np.ndarray, slope: np.ndarray, gain: np.ndarray, belief: float
 ) -> np.ndarray:
     """Return the channels of the first layer.
 
@@ -172,6 +176,7 @@ def channels_of(
         Linear, over the object's mean; sides are multiples of `MULTIPLE`.
     mask : (H, W) bool ndarray
     slope, gain : (H, W, 2) ndarray
+    belief : float
         See `predict_relief`.
 
     Returns
@@ -179,7 +184,7 @@ def channels_of(
     (H, W, INPUTS) float32 ndarray
         Log light without low frequencies: mean of the channels, red and blue less green; low
         frequencies of the mean; mask; the normal's x and y; gains; the smallest slopes that explain
-        the mean. All are 0 outside of the mask.
+        the mean; the belief. All are 0 outside of the mask.
     """
     inside = mask.astype(np.float32)
     light = np.where(mask[..., None], image, 0).astype(np.float32)
@@ -202,6 +207,7 @@ def channels_of(
         bound[..., 1],
         least[..., 0],
         least[..., 1],
+        np.full_like(inside, belief),
     ]
     return (np.stack(channels, axis=2) * inside[..., None]).astype(np.float32)
 

@@ -90,6 +90,20 @@ class ReliefRule:
         odds = self.offset + self.correlation * evidence.correlation + self.along * evidence.along
         return float(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
 
+    def belief(self, evidence: Evidence | None) -> float:
+        """Return what the object's fine changes are believed to be.
+
+        Parameters
+        ----------
+        evidence : Evidence or None
+
+        Returns
+        -------
+        float
+            -1 paint, 1 relief; 0 without evidence.
+        """
+        return 0.0 if evidence is None else 2 * self.probability(evidence) - 1
+
     def factor(self, evidence: Evidence | None) -> float:
         """Return the factor of the network's answer.
 
@@ -107,7 +121,7 @@ class ReliefRule:
         return self.low + (self.high - self.low) * self.probability(evidence)
 
 
-RULE = ReliefRule(-1.23, 2.06, 1.69, 0.2, 2.5)
+RULE = ReliefRule(-1.44, 2.65, 1.92, 0.2, 1.2)
 
 
 def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Evidence | None:

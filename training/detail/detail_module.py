@@ -132,7 +132,8 @@ def network_channels(batch: Patch) -> torch.Tensor:
     change = (parts - low)[:, :1] / (bound.square().sum(1, keepdim=True) + WEAK**2)
     least = (bound * change).clamp(-STEEPEST, STEEPEST)
     ones = torch.ones_like(mask)
-    return torch.cat([parts - low, low[:, :1], ones, -slope / length, bound, least], 1) * mask
+    told = batch.belief * ones
+    return torch.cat([parts - low, low[:, :1], ones, -slope / length, bound, least, told], 1) * mask
 
 
 def _low(values: torch.Tensor) -> torch.Tensor:

@@ -8,8 +8,8 @@ normal n, the light is
 darkened in grooves, with a weak gloss, averaged over 2 x 2 fine pixels and photographed
 (`training.world.camera`). The truth is the finest band of the relief's height
 (`isc_core.networks.detail_network.band`): no coarser level of a pyramid can hold it. What the
-network is told of body and light is what a decomposition knows: the smooth normal, and the change
-of log shading with the slope, both with errors.
+network is told of body and light is what a decomposition knows: the smooth normal, the change of
+log shading with the slope, and the share of the fine changes that is relief, all with errors.
 
 Citation: W. Freeman, "The generic viewpoint assumption", Nature 368, 1994, doi:10.1038/368542a0:
 one patch may be paint or relief; the mean over what both would look like is the best answer.
@@ -49,6 +49,9 @@ class Patch(TensorBatch):
         What is known of the smooth surface: dz/dx, dz/dy, x right, y down.
     gain : (B, 2, H, W) tensor
         What is known of the light: the derivatives of log shading by these slopes.
+    belief : (B, 1, 1, 1) tensor
+        What is known of the share of relief in the fine changes of log light: -1 paint alone, 1
+        relief alone.
     height : (B, 1, H, W) tensor
         Pixels toward the viewer: the finest band of the relief.
     """
@@ -57,6 +60,7 @@ class Patch(TensorBatch):
     mask: torch.Tensor
     slope: torch.Tensor
     gain: torch.Tensor
+    belief: torch.Tensor
     height: torch.Tensor
 
 
@@ -133,9 +137,10 @@ class Patches:
         cavity = relief - functional.avg_pool2d(relief, 9, 1, 4)
         depth = [rng.uniform(0, 0.5) * (rng.random() < 0.5) for _ in range(self._batch)]
         shading = shading * torch.exp((_column(depth) * cavity).clamp(-1, 0.1))
+        belief = _belief(rng, shading, albedo)
         mask = _masks(rng, self._batch, fine)
         taken = _taken(rng, albedo * shading + _gloss(rng, normal, light), mask, self._side)
-        return _patch(rng, taken, base_slope, light, relief)
+        return _patch(rng, taken, base_slope, light, belief, relief)
 
     def _cut(self, rng: np.random.Generator, maps: torch.Tensor, side: int) -> torch.Tensor:
         """Turned, scaled pieces (B, 1, side, side) of maps (B, S, S)."""
@@ -195,6 +200,7 @@ def _patch(
     taken: tuple[torch.Tensor, torch.Tensor],
     base_slope: torch.Tensor,
     light: _Light,
+    belief: torch.Tensor,
     relief: torch.Tensor,
 ) -> Patch:
     photo, mask = taken
@@ -205,7 +211,7 @@ def _patch(
     mean = photo.sum((1, 2, 3)) / (3 * mask.sum((1, 2, 3))).clamp(min=1)
     level = torch.from_numpy(np.exp(rng.normal(0, 0.5, len(photo)))).float()
     photo = photo * (level / mean.clamp(min=1e-6))[:, None, None, None]
-    return Patch(photo, mask, known_slope, known, band_of(height))
+    return Patch(photo, mask, known_slope, known, belief, band_of(height))
 
 
 def _column(values: list[float]) -> torch.Tensor:
@@ -295,6 +301,19 @@ def _bent(rng: np.random.Generator, gain: torch.Tensor) -> torch.Tensor:
     turned = torch.stack([c * gain[:, 0] - s * gain[:, 1], s * gain[:, 0] + c * gain[:, 1]], 1)
     bias = torch.from_numpy(rng.normal(0, 0.12, (count, 2))).float()[..., None, None]
     return turned + bias
+
+
+def _belief(rng: np.random.Generator, shading: torch.Tensor, albedo: torch.Tensor) -> torch.Tensor:
+    """The share of relief in the fine changes of log light, as well as an object tells it."""
+    of_relief, of_paint = (
+        band_of(functional.avg_pool2d(torch.log(part).mean(1, keepdim=True), FINE))
+        .square()
+        .mean((1, 2, 3), keepdim=True)
+        for part in (shading, albedo)
+    )
+    share = of_relief / (of_relief + of_paint).clamp(min=1e-12)
+    error = _column([rng.normal(0, rng.choice([0.1, 0.3, 1.0])) for _ in range(len(share))])
+    return (2 * share - 1 + error).clamp(-1, 1)
 
 
 def _smooth_noise(rng: np.random.Generator, like: torch.Tensor, size: float) -> torch.Tensor:

@@ -22,20 +22,21 @@ def patches() -> Patch:
     return Patches(0, 16, SIDE, 12)(np.random.default_rng(0))
 
 
-def _arrays(patch: Patch, k: int) -> tuple[np.ndarray, ...]:
+def _arrays(patch: Patch, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
     photo, slope, gain = (
         part[k].permute(1, 2, 0).numpy() for part in (patch.photo, patch.slope, patch.gain)
     )
-    return photo, patch.mask[k, 0].numpy() > 0.5, slope, gain
+    return photo, patch.mask[k, 0].numpy() > 0.5, slope, gain, float(patch.belief[k])
 
 
 def test_patches_are_finite_and_the_truth_is_a_band(patches: Patch) -> None:
-    for part in (patches.photo, patches.slope, patches.gain, patches.height):
+    for part in (patches.photo, patches.slope, patches.gain, patches.belief, patches.height):
         assert torch.isfinite(part).all()
     assert patches.photo.shape == (16, 3, SIDE, SIDE)
     assert 0 < int((patches.height.abs().amax((1, 2, 3)) > 0).sum()) < 16
     coarse = torch.nn.functional.avg_pool2d(patches.height, 4)
     assert coarse.abs().mean() < 0.4 * patches.height.abs().mean() and patches.photo.min() >= 0
+    assert patches.belief.min() >= -1 and patches.belief.max() <= 1
 
 
 def test_channels_and_bands_are_the_cores(patches: Patch) -> None:
