@@ -10,7 +10,7 @@ detail network's band b_k of level k (`networks.detail_network`),
     height = Z + a R_0
 
 each in the pixels of its level. What the whole object says of relief (`relief_evidence`) is v, from
--1 to 1, and a grows with it. The light and the overall shape do not change: each band is without
+-1 to 1, and a a constant. The light and the overall shape do not change: each band is without
 what the next coarser level holds.
 
 Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
@@ -147,7 +147,7 @@ def fine_relief(
     pyramid = Pyramid.of(diffuse, mask, height, light)
     evidence = pyramid.evidence()
     relief = pyramid.relief(finest, rule.belief(evidence), monitor, network)
-    return relief * np.float32(rule.factor(evidence))
+    return relief * np.float32(rule.factor)
 
 
 @dataclass(frozen=True)

@@ -11,19 +11,20 @@ over the blocks of 8 x 8 pixels inside the object,
     r = log (sum |g| (dy / d along g)^2 / sum |g| (dy / d across g)^2)
 
 averaged over the levels of the photo; relief has r > 0, since it changes log shading by g . grad.
-The probability of relief is logistic in c and r, and the detail network's answer, which knows
-patches alone, is multiplied by
+The probability of relief is logistic in c and r,
 
-    low + (high - low) / (1 + exp(-(w_0 + w_c c + w_r r)))
+    p = 1 / (1 + exp(-(w_0 + w_c c + w_r r)))
 
-The five numbers are fitted to the choice set of rendered bodies by `benchmarks.detail.relief_rule`.
+The detail network, which sees patches alone, is told 2 p - 1, and what it finds is multiplied by
+one factor for all objects. The four numbers are fitted to the choice set of rendered bodies by
+`benchmarks.detail.relief_rule`.
 
 Citation: the direction of the light shows in the spectrum of relief: A. Pentland, "Finding the
 illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et al., "Classifying
 surface texture while simultaneously estimating illumination direction", IJCV 62, 2005,
 doi:10.1007/s11263-005-4635-4.
 
-Limits: one factor for an object, so print beside relief gets a middle one. A pattern of stripes
+Limits: one belief for an object, so print beside relief gets a middle one. A pattern of stripes
 that lies along the light by chance looks like relief. Where the light is the same from everywhere
 there is no evidence.
 """
@@ -60,21 +61,20 @@ class Evidence:
 
 @dataclass(frozen=True)
 class ReliefRule:
-    """How evidence becomes a factor.
+    """How evidence becomes a belief.
 
     Attributes
     ----------
     offset, correlation, along : float
         Weights of the logistic regression.
-    low, high : float
-        Factors of the network's answer for paint and for relief.
+    factor : float
+        Of what the network finds.
     """
 
     offset: float
     correlation: float
     along: float
-    low: float
-    high: float
+    factor: float
 
     def probability(self, evidence: Evidence) -> float:
         """Return the probability of relief.
@@ -100,28 +100,12 @@ class ReliefRule:
         Returns
         -------
         float
-            -1 paint, 1 relief; 0 without evidence.
+            -1 paint, 1 relief; without evidence -1, so that nothing is made up.
         """
-        return 0.0 if evidence is None else 2 * self.probability(evidence) - 1
-
-    def factor(self, evidence: Evidence | None) -> float:
-        """Return the factor of the network's answer.
-
-        Parameters
-        ----------
-        evidence : Evidence or None
-            None: the factor of no evidence, 1 or less.
-
-        Returns
-        -------
-        float
-        """
-        if evidence is None:
-            return min(1.0, self.low)
-        return self.low + (self.high - self.low) * self.probability(evidence)
+        return -1.0 if evidence is None else 2 * self.probability(evidence) - 1
 
 
-RULE = ReliefRule(-1.44, 2.65, 1.92, 0.2, 1.2)
+RULE = ReliefRule(-1.44, 2.65, 1.92, 1.3)
 
 
 def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Evidence | None:

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
-from benchmarks.detail.relief_rule import FACTORS, best_factors, left_out, logistic_weights
+from benchmarks.detail.relief_rule import FACTORS, best_factor, left_out, logistic_weights
 
 
 def test_weights_of_a_known_boundary() -> None:
@@ -23,7 +23,7 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
     assert left_out(features, is_relief)[4] < 0.5
 
 
-def test_factors_stop_where_too_much_is_invented() -> None:
+def test_the_factor_stops_where_too_much_is_invented() -> None:
     factors = np.array(FACTORS)
     gained = (1 - (1 - factors / 3) ** 2)[:, None]
     rows = [
@@ -31,7 +31,8 @@ def test_factors_stop_where_too_much_is_invented() -> None:
         {"explained": gained, "error": 0.011 * factors[:, None] ** 2, "energy": 0 * gained},
     ]
     is_relief = np.array([True, False])
-    low, high, explained, invented = best_factors(rows, is_relief, np.array([1.0, 0.0]))
-    assert high == 3 and low <= 1 and explained[0] > 0.999 and invented[0] <= 0.04
-    low, high, explained, invented = best_factors(rows, is_relief, np.array([1.0, 1.0]))
-    assert np.isclose(high, 1.9) and explained[0] < 0.9
+    factor, explained, invented = best_factor(rows, is_relief)
+    assert np.isclose(factor, 2.1) and 0.9 < explained[0] < 0.92 and invented[0] <= 0.05
+    rows[1]["error"] = 0 * gained
+    factor, explained, invented = best_factor(rows, is_relief)
+    assert np.isclose(factor, 3) and explained[0] > 0.999 and invented[0] == 0
