@@ -174,6 +174,7 @@ def _make_result(
         threads=options.threads,
         transfer=options.transfer,
         camera=options.camera,
+        texture_size=options.texture_size,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -229,6 +230,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.max_size,
         options.samples,
         options.camera,
+        options.texture_size,
     )
     build = BuildOptions(
         size_metres=options.size,

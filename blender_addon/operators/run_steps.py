@@ -111,6 +111,7 @@ def decompose_steps(
         threads=threads,
         transfer=photo.transfer,
         camera=method.camera,
+        texture_size=method.texture_size,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     result = yield from _cached_result(job, place, names, environment)

@@ -29,10 +29,12 @@ from .images import (
     DATA,
     SRGB,
     attach_maps,
+    ensure_coded_texture,
     ensure_image,
     ensure_maps,
     ensure_texture,
     require_color_spaces,
+    scaled_codes,
 )
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
 from .mesh import fill_mesh, front_geometry
@@ -350,7 +352,11 @@ def _material_maps(
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
         normal = ensure_texture(key, "normal_map", result.normal_map, DATA)
-    base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
+    if result.texture is not None:
+        codes = scaled_codes(result.texture, 1 / (1 - share))
+        base_color = ensure_coded_texture(key, "base_color", codes)
+    else:
+        base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
     return MaterialMaps(base_color, maps["specular"], variation, normal)
 
 

@@ -12,12 +12,14 @@ import bpy
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 
+from ..files.png import encode_png
 from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
+_FAST = 1  # compression of large textures
 # Names of the textures in files, by role.
 TEXTURE_NAMES = {
     "base_color": "basecolor",
@@ -128,6 +130,71 @@ def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.t
     return image
 
 
+def ensure_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Image:
+    """Create a texture of sRGB codes, or replace the one of that role everywhere it is used.
+
+    Parameters
+    ----------
+    key, role : str
+        As of `ensure_texture`.
+    codes : (H, W, 3) ndarray of uint8
+        Row 0 at the top.
+
+    Returns
+    -------
+    bpy.types.Image
+        The packed image.
+    """
+    old = find_tagged(bpy.data.images, key, role)
+    image = tag(new_coded_texture(key, role, codes), key, role)
+    if old is not None:
+        _replace(old, image)
+    return image
+
+
+def new_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Image:
+    """Create a packed texture of sRGB codes, without the floats that Blender's pixels are.
+
+    Parameters
+    ----------
+    key, role, codes : str, str, ndarray
+        As of `ensure_coded_texture`.
+
+    Returns
+    -------
+    bpy.types.Image
+        The image, without a tag.
+    """
+    name, data = TEXTURE_NAMES[role], encode_png(codes, _FAST)
+    image = bpy.data.images.new(datablock_name(key, name), 1, 1)
+    image.colorspace_settings.name = SRGB
+    image.file_format = "PNG"
+    image.pack(data=data, data_len=len(data))
+    image.source = "FILE"
+    image.filepath_raw = _texture_path(key, name)
+    return image
+
+
+def scaled_codes(codes: np.ndarray, gain: float) -> np.ndarray:
+    """Multiply colours, given as sRGB codes.
+
+    Parameters
+    ----------
+    codes : ndarray of uint8
+        sRGB.
+    gain : float
+        Factor of the linear values; they are clipped at 1.
+
+    Returns
+    -------
+    ndarray of uint8
+        sRGB.
+    """
+    linear = gain * srgb_to_linear(np.arange(256) / 255)
+    table = np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+    return np.asarray(table[codes])
+
+
 def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
     """Create a packed texture of 8 bits.
 
@@ -156,10 +223,14 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
     else:
         pixels[..., :3] = linear_to_srgb(shares) if space == SRGB else shares
     image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw = f"//{re.sub(r'[^0-9A-Za-z._-]', '_', key)}_{name}.png"
+    image.filepath_raw = _texture_path(key, name)
     image.file_format = "PNG"
     image.pack()
     return image
+
+
+def _texture_path(key: str, name: str) -> str:
+    return f"//{re.sub(r'[^0-9A-Za-z._-]', '_', key)}_{name}.png"
 
 
 def ensure_maps(key: str, result: ResultArrays, every: bool = True) -> dict[str, bpy.types.Image]:

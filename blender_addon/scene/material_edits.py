@@ -27,7 +27,7 @@ import numpy as np
 from isc_core.imaging.srgb import srgb_to_linear
 
 from .dichromatic import DICHROMATIC
-from .images import SRGB, new_texture
+from .images import SRGB, new_coded_texture, new_texture, scaled_codes
 from .nodes import add_node
 from .provenance import KEY, ROLE, tag
 
@@ -63,6 +63,11 @@ class ColorEdit:
     def values(self) -> tuple[float, float, float]:
         """The three numbers."""
         return self.hue, self.saturation, self.gain
+
+    @property
+    def only_scales(self) -> bool:
+        """Whether hue and saturation stay."""
+        return bool(np.abs(np.subtract(self.values[:2], (0.5, 1.0))).max() <= _UNCHANGED)
 
     @property
     def changes_nothing(self) -> bool:
@@ -239,6 +244,15 @@ def linear_colors(image: bpy.types.Image) -> np.ndarray:
     return colors
 
 
+def _codes(image: bpy.types.Image) -> np.ndarray:
+    """(H, W, 3) uint8, row 0 at the top, of an image of 8 bits."""
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    colors = pixels.reshape(height, width, 4)[::-1, :, :3]
+    return (255 * colors + 0.5).astype(np.uint8)
+
+
 def _color_edit(inputs: Any) -> ColorEdit:
     hue, saturation, value, gain, shown, share = (
         float(inputs[name].default_value)
@@ -328,8 +342,11 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
 
 
 def _bake(material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit) -> bpy.types.Image:
-    colors = recolour_reflectance(linear_colors(image), *edit.values)
     key = str(material.get(KEY, material.name))
+    if edit.only_scales and not image.is_float and image.colorspace_settings.name == SRGB:
+        codes = scaled_codes(_codes(image), edit.gain)
+        return tag(new_coded_texture(key, "edited_base_color", codes), key, "edited_base_color")
+    colors = recolour_reflectance(linear_colors(image), *edit.values)
     return tag(new_texture(key, "edited_base_color", colors, SRGB), key, "edited_base_color")
 
 
