@@ -143,6 +143,8 @@ class ResultArrays:
         Its (x, y) in pixels from the left and upper edge of the maps.
     eye : (3,) ndarray or None
         Its place, in metres as `vertices`.
+    encoded : dict of float to bytes
+        PNG files of `texture` times a factor, by factor, where they were made in advance.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -184,6 +186,7 @@ class ResultArrays:
     crop_scale: float
     specular_variation: np.ndarray | None = None
     texture: np.ndarray | None = None
+    encoded: dict[float, bytes] = field(default_factory=dict)
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None

@@ -130,15 +130,15 @@ def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.t
     return image
 
 
-def ensure_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Image:
-    """Create a texture of sRGB codes, or replace the one of that role everywhere it is used.
+def ensure_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
+    """Create a texture of a PNG file, or replace the one of that role everywhere it is used.
 
     Parameters
     ----------
     key, role : str
         As of `ensure_texture`.
-    codes : (H, W, 3) ndarray of uint8
-        Row 0 at the top.
+    data : bytes
+        The file; it has sRGB codes.
 
     Returns
     -------
@@ -146,26 +146,26 @@ def ensure_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Im
         The packed image.
     """
     old = find_tagged(bpy.data.images, key, role)
-    image = tag(new_coded_texture(key, role, codes), key, role)
+    image = tag(new_png_texture(key, role, data), key, role)
     if old is not None:
         _replace(old, image)
     return image
 
 
-def new_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Image:
-    """Create a packed texture of sRGB codes, without the floats that Blender's pixels are.
+def new_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
+    """Create a packed texture of a PNG file; Blender reads its pixels when it needs them.
 
     Parameters
     ----------
-    key, role, codes : str, str, ndarray
-        As of `ensure_coded_texture`.
+    key, role, data : str, str, bytes
+        As of `ensure_png_texture`.
 
     Returns
     -------
     bpy.types.Image
         The image, without a tag.
     """
-    name, data = TEXTURE_NAMES[role], encode_png(codes, _FAST)
+    name = TEXTURE_NAMES[role]
     image = bpy.data.images.new(datablock_name(key, name), 1, 1)
     image.colorspace_settings.name = SRGB
     image.file_format = "PNG"
@@ -175,24 +175,24 @@ def new_coded_texture(key: str, role: str, codes: np.ndarray) -> bpy.types.Image
     return image
 
 
-def scaled_codes(codes: np.ndarray, gain: float) -> np.ndarray:
-    """Multiply colours, given as sRGB codes.
+def scaled_png(codes: np.ndarray, gain: float) -> bytes:
+    """Return a PNG file of colours times a factor.
 
     Parameters
     ----------
-    codes : ndarray of uint8
-        sRGB.
+    codes : (H, W, 3) ndarray of uint8
+        sRGB, row 0 at the top.
     gain : float
         Factor of the linear values; they are clipped at 1.
 
     Returns
     -------
-    ndarray of uint8
-        sRGB.
+    bytes
+        The file, in sRGB.
     """
     linear = gain * srgb_to_linear(np.arange(256) / 255)
     table = np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
-    return np.asarray(table[codes])
+    return encode_png(table[codes], _FAST)
 
 
 def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:

@@ -27,7 +27,7 @@ import numpy as np
 from isc_core.imaging.srgb import srgb_to_linear
 
 from .dichromatic import DICHROMATIC
-from .images import SRGB, new_coded_texture, new_texture, scaled_codes
+from .images import SRGB, new_png_texture, new_texture, scaled_png
 from .nodes import add_node
 from .provenance import KEY, ROLE, tag
 
@@ -140,13 +140,15 @@ def apply_edits(material: bpy.types.Material) -> bool:
     return _can_bake(material, group)
 
 
-def bake_edits(material: bpy.types.Material) -> None:
+def bake_edits(material: bpy.types.Material, plain: bytes | None = None) -> None:
     """Write all edits into the BSDF and its textures.
 
     Parameters
     ----------
     material : bpy.types.Material
         A local material of ISC; nothing changes where there is nothing to write.
+    plain : bytes, optional
+        PNG file of the base colour without its compensation for the specular share.
     """
     if not apply_edits(material):
         return
@@ -161,7 +163,10 @@ def bake_edits(material: bpy.types.Material) -> None:
         target.default_value = (*np.clip(color, 0, 1), 1.0)
     elif not edit.changes_nothing:
         node = _edited_texture(material, source.links[0].from_node)
-        _replace_image(node, _bake(material, source.links[0].from_node.image, edit))
+        share = group.inputs["Specular Share"].default_value
+        if not (edit.only_scales and abs(edit.gain + share - 1) <= _UNCHANGED):
+            plain = None
+        _replace_image(node, _bake(material, source.links[0].from_node.image, edit, plain))
         tree.links.new(node.outputs["Color"], target)
     else:
         tree.links.new(source.links[0].from_socket, target)
@@ -341,11 +346,16 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
     return node
 
 
-def _bake(material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit) -> bpy.types.Image:
+def _bake(
+    material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit, png: bytes | None
+) -> bpy.types.Image:
+    """The edited colours; `png` is their file where that is known."""
     key = str(material.get(KEY, material.name))
-    if edit.only_scales and not image.is_float and image.colorspace_settings.name == SRGB:
-        codes = scaled_codes(_codes(image), edit.gain)
-        return tag(new_coded_texture(key, "edited_base_color", codes), key, "edited_base_color")
+    is_coded = not image.is_float and image.colorspace_settings.name == SRGB
+    if png is None and edit.only_scales and is_coded:
+        png = scaled_png(_codes(image), edit.gain)
+    if png is not None:
+        return tag(new_png_texture(key, "edited_base_color", png), key, "edited_base_color")
     colors = recolour_reflectance(linear_colors(image), *edit.values)
     return tag(new_texture(key, "edited_base_color", colors, SRGB), key, "edited_base_color")
 
