@@ -359,7 +359,9 @@ def _ensure_camera_and_light(
         collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
         if options.light_and_camera and not options.sun:
             ensure_sun(key, collection, result.sun_direction, result.sun_strength)
-    return ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
+    return ensure_camera(
+        key, collection, result, options.size_metres, obj.matrix_basis, options.photo_resolution
+    )
 
 
 def _material_maps(
