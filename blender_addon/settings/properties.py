@@ -227,7 +227,8 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     preset: EnumProperty(
         name="Preset",
         description=(
-            "Detail of the textures, and the time that it takes, the overall shape is the same"
+            "Detail of relief and highlights, and the time that it takes, the overall shape is the "
+            "same"
         ),
         items=_PRESET_ITEMS,
         get=_get_preset,
