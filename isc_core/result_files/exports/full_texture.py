@@ -56,8 +56,9 @@ def full_texture(photo: Photo, d: Decomposition, longest: int = 0) -> np.ndarray
     (H', W', 3) uint8 ndarray or None
         sRGB codes; None where the maps are as fine.
     """
-    sharp = _limited(photo, longest)
-    factor = sharp.scale / float(d.provenance.input.get("scale", 1.0))
+    scale = float(d.provenance.input.get("scale", 1.0))
+    sharp = _limited(photo, longest, max(d.mask.shape) * photo.scale / scale)
+    factor = sharp.scale / scale
     if factor <= 1:
         return None
     height, width = (round(n * factor) for n in d.mask.shape)
@@ -65,14 +66,13 @@ def full_texture(photo: Photo, d: Decomposition, longest: int = 0) -> np.ndarray
     base, _ = base_color(d.reflectance, d.mask, _BLEED)
     mean = base[d.mask].astype(np.float64).mean(0)
     codes[:] = color_codes(mean[None, None])
-    rows, columns = _box(sharp.mask, round((_BLEED + 2) * factor))
+    rows, columns = _box(sharp.mask[:height, :width], round((_BLEED + 2) * factor))
     codes[rows, columns] = color_codes(_texture(sharp, d, base, (rows, columns), factor))
     return codes
 
 
-def _limited(photo: Photo, longest: int) -> Photo:
-    """The photo with a frame of at most that many pixels."""
-    frame = max(photo.mask.shape)
+def _limited(photo: Photo, longest: int, frame: float) -> Photo:
+    """The photo reduced so that the frame of the maps, now `frame` pixels, is `longest` at most."""
     if longest <= 0 or frame <= longest:
         return photo
     return photo.resized_to_object(max(1, int(max(photo.box[2:]) * longest / frame)))

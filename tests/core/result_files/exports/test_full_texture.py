@@ -105,7 +105,7 @@ def test_it_covers_the_frame_of_the_maps(longest: int) -> None:
     wanted = np.clip(maps_color(d)[0], 0, 1)[inside]
     correlation = np.corrcoef(means[inside].ravel(), wanted.ravel())[0, 1]
     assert correlation > 0.97
-    assert max(texture.shape) <= (longest + 4 if longest else max(photo.mask.shape) + 4)
+    assert max(texture.shape) <= (longest or max(photo.mask.shape) + 4)
 
 
 def test_no_seam_along_the_rim() -> None:
