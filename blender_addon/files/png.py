@@ -35,7 +35,7 @@ def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
     filtered = np.zeros((rows, 1 + lines.shape[1] * codes.dtype.itemsize), np.uint8)
     filtered[:, 1:] = lines.view(np.uint8)
     header = struct.pack(">IIBBBBB", columns, rows, depth, _COLOR_TYPES[channels], 0, 0, 0)
-    data = zlib.compress(filtered, compression)
+    data = zlib.compress(filtered.data, compression)
     return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", data) + _chunk(b"IEND", b"")
 
 

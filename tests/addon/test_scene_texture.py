@@ -72,7 +72,9 @@ def test_hue_is_edited_at_full_resolution(blender: Any, fine: ResultArrays) -> N
     from blender_addon.scene.material_edits import bake_edits, dichromatic_node
 
     built = build(fine, specular_from="lobe")
-    dichromatic_node(built.material).inputs["Hue"].default_value = 0.8
+    node = dichromatic_node(built.material)
+    assert node is not None
+    node.inputs["Hue"].default_value = 0.8
     bake_edits(built.material)
     assert tuple(texture(built, "Edited Base Color").size) == tuple(texture(built).size)
 
