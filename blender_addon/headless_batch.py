@@ -138,6 +138,9 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
     for name, least in (("samples", 1), ("max_size", 0), ("threads", 0)):
         if getattr(options, name) < least:
             raise InputError(f"--{name.replace('_', '-')} must be {least} or more")
+    size = options.texture_size
+    if size not in ("photo", "maps") and not (size.isdecimal() and int(size) > 0):
+        raise InputError("--texture-size must be photo, maps or a number of pixels")
     if not 0 < options.size < 1e6:
         raise InputError("--size must be above 0 metres")
     sources = find_sources(options.inputs, options.mask)
@@ -174,6 +177,7 @@ def _make_result(
         threads=options.threads,
         transfer=options.transfer,
         camera=options.camera,
+        texture_size=options.texture_size,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -229,6 +233,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.max_size,
         options.samples,
         options.camera,
+        options.texture_size,
     )
     build = BuildOptions(
         size_metres=options.size,

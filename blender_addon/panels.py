@@ -122,8 +122,8 @@ class _Output(_Panel):
     def draw(self, context: Any) -> None:
         """Draw what is created, and what of the scene may change."""
         settings, column = context.scene.isc, self.property_column()
-        column.prop(settings, "size_metres")
-        column.prop(settings, "specular_from")
+        for name in ("size_metres", "texture_size", "specular_from"):
+            column.prop(settings, name)
         for name in ("back", "triangles", "shadows", "sun", "displacement", "all_maps"):
             column.prop(settings, name)
         column.separator()

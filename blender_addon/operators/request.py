@@ -38,6 +38,8 @@ class MethodSettings:
         Longer side of the object in pixels; 0 keeps the photo's resolution.
     samples : int
         Samples per pixel of Cycles in the scene that is built.
+    texture_size : str
+        Value of `--texture-size`.
     """
 
     model: str = "joint"
@@ -46,6 +48,7 @@ class MethodSettings:
     max_size: int = 512
     samples: int = 64
     camera: str = "auto"
+    texture_size: str = "photo"
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
 from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
 from ..files.result_cache import ResultCache, content_key
+from ..scene.build import with_encoded_texture
 from ..worker.commands import (
     Box,
     DecomposeJob,
@@ -111,6 +112,7 @@ def decompose_steps(
         threads=threads,
         transfer=photo.transfer,
         camera=method.camera,
+        texture_size=method.texture_size,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     result = yield from _cached_result(job, place, names, environment)
@@ -139,6 +141,7 @@ def _cached_result(
         worker = _run_worker(lambda: start_decompose(job, environment), names)
         yield from _in_time(worker, Pace(job.max_size))
         result = yield from _in_thread(partial(read_result, job.output), _READING)
+    result = yield from _in_thread(partial(with_encoded_texture, result), _READING)
     if cache is not None and key:
         yield from _in_thread(partial(cache.trim, key), _READING)
         if place.keep:

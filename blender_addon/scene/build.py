@@ -32,8 +32,10 @@ from .images import (
     attach_maps,
     ensure_image,
     ensure_maps,
+    ensure_png_texture,
     ensure_texture,
     require_color_spaces,
+    scaled_png,
 )
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
 from .mesh import MeshGeometry, fill_mesh, front_geometry
@@ -223,6 +225,26 @@ def build_object(
     return built
 
 
+def with_encoded_texture(result: ResultArrays) -> ResultArrays:
+    """Encode the files of the fine texture in advance; this may run in another thread.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+
+    Returns
+    -------
+    ResultArrays
+        With `encoded`, if it has a fine texture.
+    """
+    if result.texture is None:
+        return result
+    share = _specular_settings(result, BuildOptions()).share
+    encoded = {gain: scaled_png(result.texture, gain) for gain in {1.0, 1 / (1 - share)}}
+    return replace(result, encoded=encoded)
+
+
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     """Find what belongs to an object, camera or sun that ISC made.
 
@@ -347,7 +369,9 @@ def _ensure_camera_and_light(
         collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
         if options.light_and_camera and not options.sun:
             ensure_sun(key, collection, result.sun_direction, result.sun_strength)
-    return ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
+    return ensure_camera(
+        key, collection, result, options.size_metres, obj.matrix_basis, options.photo_resolution
+    )
 
 
 def _material_maps(
@@ -360,8 +384,14 @@ def _material_maps(
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
         normal = ensure_texture(key, "normal_map", result.normal_map, DATA)
-    base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
-    return MaterialMaps(base_color, maps["specular"], variation, normal)
+    if result.texture is not None:
+        gain = 1 / (1 - share)
+        png = result.encoded.get(gain) or scaled_png(result.texture, gain)
+        base_color = ensure_png_texture(key, "base_color", png)
+    else:
+        base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
+    plain = result.encoded.get(1.0)
+    return MaterialMaps(base_color, maps["specular"], variation, normal, plain)
 
 
 def _peak(result: ResultArrays) -> float:

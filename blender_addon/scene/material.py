@@ -43,12 +43,15 @@ class MaterialMaps:
         Spatial factor of the specular level.
     normal : bpy.types.Image or None
         Tangent-space normal map.
+    plain : bytes or None
+        PNG file of the base colour without its compensation for the specular share, if known.
     """
 
     base_color: bpy.types.Image
     specular: bpy.types.Image | None
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
+    plain: bytes | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         material["isc_highlights"] = maps.specular
     if specular.source == "image":
         show_highlights(material)
-    bake_edits(material)
+    bake_edits(material, maps.plain)
     return material
 
 
