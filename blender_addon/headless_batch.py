@@ -16,6 +16,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
 
+from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
 from .operators.messages import join_notes
@@ -25,7 +26,6 @@ from .operators.run_steps import result_notes
 from .operators.worker_run import RunOutput
 from .registration import register
 from .scene.build import BuildOptions
-from .scene.provenance import find_tagged
 from .settings.preferences import read_preferences, worker_environment
 from .worker.commands import DecomposeJob, start_arrays, start_decompose
 from .worker.process import WorkerProcess, WorkerState

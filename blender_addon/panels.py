@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from .datablocks.provenance import KEY, find_tagged
 from .operators.mask import mask_shown_on
 from .operators.messages import NOTE, is_about_mask
 from .operators.result import scene_before
@@ -19,7 +20,6 @@ from .scene.copies import objects_sharing_material
 from .scene.material import shows_highlights
 from .scene.material_edits import dichromatic_node
 from .scene.photo_highlights import can_show_highlights
-from .scene.provenance import KEY, find_tagged
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")

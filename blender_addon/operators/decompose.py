@@ -9,11 +9,11 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..datablocks.provenance import find_tagged
 from ..files.result_arrays import ARRAYS
 from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
-from ..scene.provenance import find_tagged
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .messages import busy_message
 from .modal import WorkerOperator

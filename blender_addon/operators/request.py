@@ -12,9 +12,9 @@ import bpy
 from isc_core.errors import InputError
 from isc_core.photo.names import PHOTO_SUFFIXES
 
+from ..datablocks.provenance import KEY, SOURCE_IMAGE
 from ..files.image_source import ImageSource, inspect_image
 from ..scene.build import OWN_SHADOWS, BuildOptions
-from ..scene.provenance import KEY, SOURCE_IMAGE
 
 _SUFFIXES = (*PHOTO_SUFFIXES, ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"

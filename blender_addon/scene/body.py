@@ -14,9 +14,9 @@ from isc_core.result_files.mesh import interpolated_normals
 from isc_core.result_files.solids.body import Back, Body, continued, make_body
 from isc_core.shading.perspective import view_directions
 
+from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
 from ..files.result_arrays import ResultArrays
 from .camera import camera_of
-from .mesh import MeshGeometry, metres_per_pixel, to_blender
 
 
 def body_geometry(

@@ -11,6 +11,32 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.result_files.solids.body import Back
 
+from ..datablocks.images import (
+    COLOR,
+    DATA,
+    SRGB,
+    attach_maps,
+    ensure_image,
+    ensure_maps,
+    ensure_png_texture,
+    ensure_texture,
+    require_color_spaces,
+    scaled_png,
+)
+from ..datablocks.mesh import MeshGeometry, fill_mesh, front_geometry
+from ..datablocks.provenance import (
+    KEY,
+    PHOTO_HASH,
+    ROLE,
+    SOURCE_IMAGE,
+    datablock_name,
+    find_tagged,
+    is_isc_datablock,
+    photo_hash,
+    require_local,
+    tag,
+    write_provenance,
+)
 from ..files.result_arrays import ResultArrays
 from .body import body_geometry
 from .camera import ensure_camera, eye_of, set_render_size
@@ -25,35 +51,9 @@ from .collection import (
 from .copies import COPY, OBJECT, find_material
 from .displacement import add_displacement, flatten, remove_displacement
 from .hand_edits import remember_mesh
-from .images import (
-    COLOR,
-    DATA,
-    SRGB,
-    attach_maps,
-    ensure_image,
-    ensure_maps,
-    ensure_png_texture,
-    ensure_texture,
-    require_color_spaces,
-    scaled_png,
-)
 from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
-from .mesh import MeshGeometry, fill_mesh, front_geometry
 from .photo_highlights import forget_view
 from .placement import free_place
-from .provenance import (
-    KEY,
-    PHOTO_HASH,
-    ROLE,
-    SOURCE_IMAGE,
-    datablock_name,
-    find_tagged,
-    is_isc_datablock,
-    photo_hash,
-    require_local,
-    tag,
-    write_provenance,
-)
 from .specular_share import specular_share
 from .sun import ensure_sun, relight
 from .world import ensure_world

@@ -13,10 +13,10 @@ from mathutils import Matrix
 
 from isc_core.photo.camera import Camera
 
+from ..datablocks.mesh import metres_per_pixel, to_blender
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
 from .collection import link_object
-from .mesh import metres_per_pixel, to_blender
-from .provenance import datablock_name, find_tagged, tag
 
 _SENSOR = 36.0  # millimetres: Blender's usual sensor
 

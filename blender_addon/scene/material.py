@@ -10,6 +10,9 @@ from typing import Literal
 
 import bpy
 
+from ..datablocks.mesh import UV
+from ..datablocks.nodes import add_node, connect, node_tree
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .material_edits import (
     BASE_COLOR,
@@ -20,10 +23,7 @@ from .material_edits import (
     dichromatic_node,
     forget_edits,
 )
-from .mesh import UV
-from .nodes import add_node, connect, node_tree
 from .photo_highlights import show_highlights
-from .provenance import datablock_name, find_tagged, tag
 
 SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")

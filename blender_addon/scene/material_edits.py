@@ -27,10 +27,10 @@ import numpy as np
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.shading.brdf.ggx import F0
 
+from ..datablocks.images import SRGB, new_png_texture, new_texture, scaled_png
+from ..datablocks.nodes import add_node
+from ..datablocks.provenance import KEY, ROLE, tag
 from .dichromatic import DICHROMATIC, MOST
-from .images import SRGB, new_png_texture, new_texture, scaled_png
-from .nodes import add_node
-from .provenance import KEY, ROLE, tag
 
 SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Principled BSDF",
