@@ -55,7 +55,7 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     preferences = read_preferences(context)
     environment = worker_environment(preferences)
     folder = create_run_folder(preferences.results, request.build.name)
-    place = ResultPlace(folder, preferences.earlier, preferences.results is not None)
+    place = ResultPlace(folder, preferences.earlier, preferences.results is not None, request.build)
     steps = decompose_steps(
         photo, mask, mask_size, request.method, place, preferences.threads, environment
     )

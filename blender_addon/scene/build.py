@@ -38,7 +38,7 @@ from ..datablocks.provenance import (
     write_provenance,
 )
 from ..files.result_arrays import ResultArrays
-from .body import body_geometry
+from .body import body_geometry, prepare_body
 from .camera import ensure_camera, eye_of, set_render_size
 from .camera_background import set_background_photo
 from .collection import (
@@ -225,24 +225,33 @@ def build_object(
     return built
 
 
-def with_encoded_texture(result: ResultArrays) -> ResultArrays:
-    """Encode the files of the fine texture in advance; this may run in another thread.
+def prepared(result: ResultArrays, options: BuildOptions) -> ResultArrays:
+    """Make in advance what takes time and no datablock; this may run in another thread.
 
     Parameters
     ----------
     result : ResultArrays
         The result.
+    options : BuildOptions
+        What will be built.
 
     Returns
     -------
     ResultArrays
-        With `encoded`, if it has a fine texture.
+        With `encoded`, if it has a fine texture, and with `body`, if it will have a back.
+
+    Raises
+    ------
+    InputError
+        If the object is too thin for a mesh.
     """
-    if result.texture is None:
-        return result
-    share = _specular_settings(result, BuildOptions()).share
-    encoded = {gain: scaled_png(result.texture, gain) for gain in {1.0, 1 / (1 - share)}}
-    return replace(result, encoded=encoded)
+    if result.texture is not None:
+        share = _specular_settings(result, options).share
+        encoded = {gain: scaled_png(result.texture, gain) for gain in {1.0, 1 / (1 - share)}}
+        result = replace(result, encoded=encoded)
+    if options.back and not options.displacement:
+        result = replace(result, body=prepare_body(result, options.back, options.triangles))
+    return result
 
 
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:

@@ -51,9 +51,9 @@ def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -
 def test_with_the_photos_highlights_the_texture_is_not_compensated(
     blender: Any, fine: ResultArrays, in_advance: bool
 ) -> None:
-    from blender_addon.scene.build import with_encoded_texture
+    from blender_addon.scene.build import BuildOptions, prepared
 
-    given = with_encoded_texture(replace(fine, specular_level=1.0, roughness=0.3))
+    given = prepared(replace(fine, specular_level=1.0, roughness=0.3), BuildOptions())
     given = given if in_advance else replace(given, encoded={})
     built = build(given, specular_from="image")
     assert fine.texture is not None
