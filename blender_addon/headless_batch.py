@@ -16,6 +16,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
 
+from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
 from .operators.messages import join_notes
@@ -25,7 +26,6 @@ from .operators.run_steps import result_notes
 from .operators.worker_run import RunOutput
 from .registration import register
 from .scene.build import BuildOptions
-from .scene.provenance import find_tagged
 from .settings.preferences import read_preferences, worker_environment
 from .worker.commands import DecomposeJob, start_arrays, start_decompose
 from .worker.process import WorkerProcess, WorkerState
@@ -138,6 +138,9 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
     for name, least in (("samples", 1), ("max_size", 0), ("threads", 0)):
         if getattr(options, name) < least:
             raise InputError(f"--{name.replace('_', '-')} must be {least} or more")
+    size = options.texture_size
+    if size not in ("photo", "maps") and not (size.isdecimal() and int(size) > 0):
+        raise InputError("--texture-size must be photo, maps or a number of pixels")
     if not 0 < options.size < 1e6:
         raise InputError("--size must be above 0 metres")
     sources = find_sources(options.inputs, options.mask)
@@ -174,6 +177,7 @@ def _make_result(
         threads=options.threads,
         transfer=options.transfer,
         camera=options.camera,
+        texture_size=options.texture_size,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -229,6 +233,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.max_size,
         options.samples,
         options.camera,
+        options.texture_size,
     )
     build = BuildOptions(
         size_metres=options.size,

@@ -180,6 +180,15 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         ),
     )
     add(
+        "--texture-size",
+        default="photo",
+        metavar="photo|maps|N",
+        help=(
+            "longest side of the base color texture, the photo's, that of the maps, or at most N "
+            "pixels (default: %(default)s)"
+        ),
+    )
+    add(
         "--threads",
         type=int,
         default=0,

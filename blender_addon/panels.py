@@ -9,6 +9,7 @@ from typing import Any
 
 import bpy
 
+from .datablocks.provenance import KEY, find_tagged
 from .operators.mask import mask_shown_on
 from .operators.messages import NOTE, is_about_mask
 from .operators.result import scene_before
@@ -19,7 +20,6 @@ from .scene.copies import objects_sharing_material
 from .scene.material import shows_highlights
 from .scene.material_edits import dichromatic_node
 from .scene.photo_highlights import can_show_highlights
-from .scene.provenance import KEY, find_tagged
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")
@@ -122,8 +122,8 @@ class _Output(_Panel):
     def draw(self, context: Any) -> None:
         """Draw what is created, and what of the scene may change."""
         settings, column = context.scene.isc, self.property_column()
-        column.prop(settings, "size_metres")
-        column.prop(settings, "specular_from")
+        for name in ("size_metres", "texture_size", "specular_from"):
+            column.prop(settings, name)
         for name in ("back", "triangles", "shadows", "sun", "displacement", "all_maps"):
             column.prop(settings, name)
         column.separator()

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from blender_addon.scene.mesh import MeshGeometry
+from blender_addon.datablocks.mesh import MeshGeometry
 
 
 def close_back(

@@ -16,9 +16,9 @@ from typing import Any, Literal
 import bpy
 import numpy as np
 
+from blender_addon.datablocks.images import COLOR, ensure_image
 from blender_addon.files.result_arrays import ResultArrays
 from blender_addon.scene import BuildOptions, BuiltObject, build_object
-from blender_addon.scene.images import COLOR, ensure_image
 from blender_addon.scene.sun import ensure_sun
 from isc_core.io.exr import read_channels
 

@@ -23,8 +23,8 @@ from pathlib import Path
 
 import numpy as np
 
+from blender_addon.datablocks.mesh import front_geometry
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from blender_addon.scene.mesh import front_geometry
 from isc_core.evaluation.metrics import psnr
 from isc_core.result_files.solids.body import Back, make_body
 from isc_core.result_files.turned_view import View, turned_view

@@ -11,16 +11,17 @@ import numpy as np
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 3: 2, 4: 6}  # by the number of channels
-_COMPRESSION = 6
 
 
-def encode_png(codes: np.ndarray) -> bytes:
+def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
     """Encode an image.
 
     Parameters
     ----------
     codes : (H, W), (H, W, 3) or (H, W, 4) ndarray of uint8 or uint16
         Row 0 at the top.
+    compression : int, optional
+        From 1, fast, to 9, small.
 
     Returns
     -------
@@ -34,7 +35,7 @@ def encode_png(codes: np.ndarray) -> bytes:
     filtered = np.zeros((rows, 1 + lines.shape[1] * codes.dtype.itemsize), np.uint8)
     filtered[:, 1:] = lines.view(np.uint8)
     header = struct.pack(">IIBBBBB", columns, rows, depth, _COLOR_TYPES[channels], 0, 0, 0)
-    data = zlib.compress(filtered.tobytes(), _COMPRESSION)
+    data = zlib.compress(filtered.data, compression)
     return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", data) + _chunk(b"IEND", b"")
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.json_files import read_json
 from isc_core.io.npy import read_arrays
+from isc_core.result_files.solids.body import Body
 
 ARRAYS, DESCRIPTION = "arrays.npz", "decomposition.json"
 
@@ -53,6 +54,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("illumination", "mesh_illumination"), (9, 3)),
     **dict.fromkeys(("origin", "sun_direction", "sun_strength", "sun_ambient"), (3,)),
     "faces": ("F", 3),
+    "texture": ("rows", "columns", 3),
     "environment_map": ("h", "w", 3),
     "photo_size": (2,),
     "principal_point": (2,),
@@ -60,12 +62,41 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
 }
 _DTYPES = {
     "mask": np.dtype(bool),
+    "texture": np.dtype(np.uint8),
     **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
 }
 _CAMERA = ("focal_length", "principal_point", "eye")
-_OPTIONAL, _MAY_BE_NAN = {"specular_variation", *_CAMERA}, {"roughness", "specular_level"}
+_OPTIONAL, _MAY_BE_NAN = (
+    {"specular_variation", "texture", *_CAMERA},
+    {"roughness", "specular_level"},
+)
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
+
+
+@dataclass(frozen=True)
+class PreparedBody:
+    """A mesh that was made ahead, as making it takes a second.
+
+    Attributes
+    ----------
+    back : str
+        As of `BuildOptions`.
+    triangles : int
+        As of `BuildOptions`.
+    body : Body
+        The mesh in pixels.
+    smooth : (V, 3) ndarray
+        Normals of the vertices of its visible side.
+    detail : (H, W, 3) ndarray
+        Tangent-space unit normals.
+    """
+
+    back: str
+    triangles: int
+    body: Body
+    smooth: np.ndarray
+    detail: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -130,12 +161,18 @@ class ResultArrays:
         Map pixels per photo pixel.
     specular_variation : (H, W) ndarray or None
         Spatial factor of the specular level.
+    texture : (rows, columns, 3) ndarray of uint8 or None
+        `base_color` as sRGB codes at the photo's resolution, over the same frame.
     focal_length : float or None
         Of the photo's camera in pixels of the maps; None for an orthographic view.
     principal_point : (2,) ndarray or None
         Its (x, y) in pixels from the left and upper edge of the maps.
     eye : (3,) ndarray or None
         Its place, in metres as `vertices`.
+    encoded : dict of float to bytes
+        PNG files of `texture` times a factor, by factor, where they were made in advance.
+    body : PreparedBody or None
+        A mesh that was made in advance.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -176,6 +213,9 @@ class ResultArrays:
     photo_size: np.ndarray
     crop_scale: float
     specular_variation: np.ndarray | None = None
+    texture: np.ndarray | None = None
+    encoded: dict[float, bytes] = field(default_factory=dict)
+    body: PreparedBody | None = None
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None

@@ -9,11 +9,11 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..datablocks.provenance import find_tagged
 from ..files.result_arrays import ARRAYS
 from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
-from ..scene.provenance import find_tagged
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .messages import busy_message
 from .modal import WorkerOperator
@@ -55,7 +55,7 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     preferences = read_preferences(context)
     environment = worker_environment(preferences)
     folder = create_run_folder(preferences.results, request.build.name)
-    place = ResultPlace(folder, preferences.earlier, preferences.results is not None)
+    place = ResultPlace(folder, preferences.earlier, preferences.results is not None, request.build)
     steps = decompose_steps(
         photo, mask, mask_size, request.method, place, preferences.threads, environment
     )

@@ -14,12 +14,12 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 
 from isc_core.errors import InputError
 
+from ..datablocks.provenance import KEY
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import find_material, make_material_single_user
 from ..scene.material import set_specular_gain
 from ..scene.material_edits import dichromatic_node
 from ..scene.photo_highlights import can_show_highlights, hide_highlights, show_highlights
-from ..scene.provenance import KEY
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
 from .live_edits import settle_edits

@@ -20,10 +20,10 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
+from ..datablocks.provenance import KEY, ROLE
 from ..scene.build import BuiltObject, find_built
 from ..scene.copies import is_copy
 from ..scene.material_edits import specular_level, surface_node
-from ..scene.provenance import KEY, ROLE
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
 from .texture_set import PLASTIC, linked_image, write_texture_set

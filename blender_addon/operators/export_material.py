@@ -23,11 +23,11 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..scene.images import SRGB, new_texture
+from ..datablocks.images import SRGB, new_texture
+from ..datablocks.nodes import node_tree
+from ..datablocks.provenance import SPECULAR_LEVEL
 from ..scene.material import shows_highlights
 from ..scene.material_edits import dichromatic_node, linear_colors, recolour_reflectance
-from ..scene.nodes import node_tree
-from ..scene.provenance import SPECULAR_LEVEL
 
 
 @contextmanager

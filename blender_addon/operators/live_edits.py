@@ -15,10 +15,10 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
+from ..datablocks.provenance import KEY
 from ..scene.material import shows_highlights
 from ..scene.material_edits import apply_edits, bake_edits
 from ..scene.photo_highlights import has_moved, hide_highlights, show_highlights
-from ..scene.provenance import KEY
 
 _PAUSE, _SHOWN = 0.4, 6.0  # seconds: without a change before baking; of a line in the status bar
 _MATERIAL_KINDS = ("MATERIAL", "NODETREE")

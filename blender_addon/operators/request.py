@@ -12,9 +12,9 @@ import bpy
 from isc_core.errors import InputError
 from isc_core.photo.names import PHOTO_SUFFIXES
 
+from ..datablocks.provenance import KEY, SOURCE_IMAGE
 from ..files.image_source import ImageSource, inspect_image
 from ..scene.build import OWN_SHADOWS, BuildOptions
-from ..scene.provenance import KEY, SOURCE_IMAGE
 
 _SUFFIXES = (*PHOTO_SUFFIXES, ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"
@@ -38,6 +38,8 @@ class MethodSettings:
         Longer side of the object in pixels; 0 keeps the photo's resolution.
     samples : int
         Samples per pixel of Cycles in the scene that is built.
+    texture_size : str
+        Value of `--texture-size`.
     """
 
     model: str = "joint"
@@ -46,6 +48,7 @@ class MethodSettings:
     max_size: int = 512
     samples: int = 64
     camera: str = "auto"
+    texture_size: str = "photo"
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -19,6 +19,7 @@ from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
 from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
 from ..files.result_cache import ResultCache, content_key
+from ..scene.build import BuildOptions, prepared
 from ..worker.commands import (
     Box,
     DecomposeJob,
@@ -55,11 +56,14 @@ class ResultPlace:
         Earlier results, to which this one is added; None to use none.
     keep : bool
         Whether a copy of a cached result is kept in the run's folder, without the arrays.
+    build : BuildOptions
+        What will be built of it.
     """
 
     folder: Path
     cache: ResultCache | None = None
     keep: bool = False
+    build: BuildOptions = field(default_factory=BuildOptions)
 
 
 def decompose_steps(
@@ -111,6 +115,7 @@ def decompose_steps(
         threads=threads,
         transfer=photo.transfer,
         camera=method.camera,
+        texture_size=method.texture_size,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     result = yield from _cached_result(job, place, names, environment)
@@ -139,6 +144,7 @@ def _cached_result(
         worker = _run_worker(lambda: start_decompose(job, environment), names)
         yield from _in_time(worker, Pace(job.max_size))
         result = yield from _in_thread(partial(read_result, job.output), _READING)
+    result = yield from _in_thread(partial(prepared, result, place.build), _READING)
     if cache is not None and key:
         yield from _in_thread(partial(cache.trim, key), _READING)
         if place.keep:

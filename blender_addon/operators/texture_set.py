@@ -112,7 +112,11 @@ class _Planes:
             )
         colors = linear_colors(image)[::-1]
         mask = self._map("mask")
-        cover = mask if mask.shape == colors.shape[:2] else np.ones(colors.shape[:2])
+        rows, columns = (
+            (np.arange(size) + 0.5) * of / size
+            for size, of in zip(colors.shape, mask.shape, strict=False)
+        )
+        cover = mask[np.ix_(rows.astype(int), columns.astype(int))]
         return np.dstack([np.clip(colors, 0, 1), cover])
 
     @property

@@ -26,16 +26,20 @@ LIGHT_MODULES = frozenset(
         "isc_core.io.json_files",
         "isc_core.io.npy",
         "isc_core.io.reading_notes",
+        "isc_core.photo.camera",
         "isc_core.photo.names",
         "isc_core.progress",
         "isc_core.result_files.diagnostics_json",
         "isc_core.result_files.diagnostics_text",
         "isc_core.result_files.exports.targets",
         "isc_core.result_files.reading_notes_text",
+        "isc_core.result_files.solids.body",
+        "isc_core.result_files.vertex_normals",
         "isc_core.scene.diagnostics",
         "isc_core.shading.ambient_occlusion",
         "isc_core.shading.brdf.energy",
         "isc_core.shading.brdf.ggx",
+        "isc_core.shading.perspective",
     }
 )
 _BLENDER = {

@@ -5,7 +5,7 @@ updates it. Blender's axes are x right, y away from the viewer, z up: a vector (
 camera frame becomes (x, -z, y).
 """
 
+from ..datablocks.provenance import is_isc_datablock
 from .build import BuildOptions, BuiltObject, build_object, find_built
-from .provenance import is_isc_datablock
 
 __all__ = ["BuildOptions", "BuiltObject", "build_object", "find_built", "is_isc_datablock"]

@@ -16,9 +16,9 @@ from mathutils import Matrix, Vector
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
 
+from ..datablocks.provenance import require_local
 from .build import BuiltObject
 from .collection import use_standard_view
-from .provenance import require_local
 
 CATALOG, CATALOG_PATH = "5d1b3c5e-6a0f-4b57-9d0b-1c5a3f0e8a11", "ISC/Photo Objects"
 _CATALOGS = "blender_assets.cats.txt"

@@ -10,13 +10,13 @@ hides the back.
 
 import numpy as np
 
-from isc_core.result_files.mesh import interpolated_normals
 from isc_core.result_files.solids.body import Back, Body, continued, make_body
+from isc_core.result_files.vertex_normals import interpolated_normals
 from isc_core.shading.perspective import view_directions
 
-from ..files.result_arrays import ResultArrays
+from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
+from ..files.result_arrays import PreparedBody, ResultArrays
 from .camera import camera_of
-from .mesh import MeshGeometry, metres_per_pixel, to_blender
 
 
 def body_geometry(
@@ -47,23 +47,15 @@ def body_geometry(
     InputError
         If the object is too thin for a mesh, or the size is not positive.
     """
-    camera, shape = camera_of(result), result.mask.shape
-    view = (
-        np.array([0.0, 0.0, 1.0])
-        if camera is None
-        else view_directions(camera, (shape[0], shape[1]))
-    )
-    step = metres_per_pixel(result, size_metres)
-    cosine = (result.normal * view).sum(-1)
-    heights = _heights(result)
-    body = make_body(heights, cosine, result.mask, result.mask, Back(back), triangles)
-    vertices = _placed(result, body) * step
-    normal = _continued_normals(result, body)
-    smooth, detail = interpolated_normals(body.visible, normal, view)
+    prepared = result.body
+    if prepared is None or (prepared.back, prepared.triangles) != (back, triangles):
+        prepared = prepare_body(result, back, triangles)
+    body, smooth, detail = prepared.body, prepared.smooth, prepared.detail
+    vertices = _placed(result, body) * metres_per_pixel(result, size_metres)
     normals = _face_normals(vertices, body.faces)
     normals[: len(smooth)] = smooth
     rows, columns = body.pixels.T
-    height, width = shape
+    height, width = result.mask.shape
     uv = np.stack([(body.places[:, 1] + 0.5) / width, 1 - (body.places[:, 0] + 0.5) / height], -1)
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
@@ -75,6 +67,34 @@ def body_geometry(
         to_blender(normals),
     )
     return geometry, ((detail + 1) / 2).astype(np.float32)
+
+
+def prepare_body(result: ResultArrays, back: str, triangles: int) -> PreparedBody:
+    """Make the mesh of a body in pixels; this may run in another thread.
+
+    Parameters
+    ----------
+    result, back, triangles
+        As for `body_geometry`.
+
+    Returns
+    -------
+    PreparedBody
+        The mesh.
+
+    Raises
+    ------
+    InputError
+        If the object is too thin for a mesh.
+    """
+    camera, (height, width) = camera_of(result), result.mask.shape
+    view = np.array([0.0, 0.0, 1.0])
+    if camera is not None:
+        view = view_directions(camera, (height, width))
+    cosine = (result.normal * view).sum(-1)
+    body = make_body(_heights(result), cosine, result.mask, result.mask, Back(back), triangles)
+    smooth, detail = interpolated_normals(body.visible, _continued_normals(result, body), view)
+    return PreparedBody(back, triangles, body, smooth, detail)
 
 
 def _heights(result: ResultArrays) -> np.ndarray:

@@ -11,35 +11,20 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.result_files.solids.body import Back
 
-from ..files.result_arrays import ResultArrays
-from .body import body_geometry
-from .camera import ensure_camera, eye_of, set_render_size
-from .camera_background import set_background_photo
-from .collection import (
-    ensure_collection,
-    ensure_optional_part,
-    ensure_scene,
-    link_object,
-    use_standard_view,
-)
-from .copies import COPY, OBJECT, find_material
-from .displacement import add_displacement, flatten, remove_displacement
-from .hand_edits import remember_mesh
-from .images import (
+from ..datablocks.images import (
     COLOR,
     DATA,
     SRGB,
     attach_maps,
     ensure_image,
     ensure_maps,
+    ensure_png_texture,
     ensure_texture,
     require_color_spaces,
+    scaled_png,
 )
-from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
-from .mesh import MeshGeometry, fill_mesh, front_geometry
-from .photo_highlights import forget_view
-from .placement import free_place
-from .provenance import (
+from ..datablocks.mesh import MeshGeometry, fill_mesh, front_geometry
+from ..datablocks.provenance import (
     KEY,
     PHOTO_HASH,
     ROLE,
@@ -52,6 +37,23 @@ from .provenance import (
     tag,
     write_provenance,
 )
+from ..files.result_arrays import ResultArrays
+from .body import body_geometry, prepare_body
+from .camera import ensure_camera, eye_of, set_render_size
+from .camera_background import set_background_photo
+from .collection import (
+    ensure_collection,
+    ensure_optional_part,
+    ensure_scene,
+    link_object,
+    use_standard_view,
+)
+from .copies import COPY, OBJECT, find_material
+from .displacement import add_displacement, flatten, remove_displacement
+from .hand_edits import remember_mesh
+from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
+from .photo_highlights import forget_view
+from .placement import free_place
 from .specular_share import specular_share
 from .sun import ensure_sun, relight
 from .world import ensure_world
@@ -223,6 +225,35 @@ def build_object(
     return built
 
 
+def prepared(result: ResultArrays, options: BuildOptions) -> ResultArrays:
+    """Make in advance what takes time and no datablock; this may run in another thread.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    options : BuildOptions
+        What will be built.
+
+    Returns
+    -------
+    ResultArrays
+        With `encoded`, if it has a fine texture, and with `body`, if it will have a back.
+
+    Raises
+    ------
+    InputError
+        If the object is too thin for a mesh.
+    """
+    if result.texture is not None:
+        share = _specular_settings(result, options).share
+        encoded = {gain: scaled_png(result.texture, gain) for gain in {1.0, 1 / (1 - share)}}
+        result = replace(result, encoded=encoded)
+    if options.back and not options.displacement:
+        result = replace(result, body=prepare_body(result, options.back, options.triangles))
+    return result
+
+
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     """Find what belongs to an object, camera or sun that ISC made.
 
@@ -347,7 +378,9 @@ def _ensure_camera_and_light(
         collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
         if options.light_and_camera and not options.sun:
             ensure_sun(key, collection, result.sun_direction, result.sun_strength)
-    return ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
+    return ensure_camera(
+        key, collection, result, options.size_metres, obj.matrix_basis, options.photo_resolution
+    )
 
 
 def _material_maps(
@@ -360,8 +393,14 @@ def _material_maps(
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
         normal = ensure_texture(key, "normal_map", result.normal_map, DATA)
-    base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
-    return MaterialMaps(base_color, maps["specular"], variation, normal)
+    if result.texture is not None:
+        gain = 1 / (1 - share)
+        png = result.encoded.get(gain) or scaled_png(result.texture, gain)
+        base_color = ensure_png_texture(key, "base_color", png)
+    else:
+        base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
+    plain = result.encoded.get(1.0)
+    return MaterialMaps(base_color, maps["specular"], variation, normal, plain)
 
 
 def _peak(result: ResultArrays) -> float:

@@ -1,5 +1,6 @@
 """The photo's camera with the photo's frame: orthographic, or a pinhole where its focal length is
-known. A render of the maps' size matches them pixel by pixel.
+known. A render of the maps' size matches them pixel by pixel, or one of the photo's size the photo:
+the last row and column of maps may reach past the photo.
 
 Equation: with a focal length of f pixels and a frame of w x h, Blender's lens is f / max(w, h) of
 the sensor's width, and its shift the distance of the frame's middle from the principal point, over
@@ -12,10 +13,10 @@ from mathutils import Matrix
 
 from isc_core.photo.camera import Camera
 
+from ..datablocks.mesh import metres_per_pixel, to_blender
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
 from .collection import link_object
-from .mesh import metres_per_pixel, to_blender
-from .provenance import datablock_name, find_tagged, tag
 
 _SENSOR = 36.0  # millimetres: Blender's usual sensor
 
@@ -45,6 +46,7 @@ def ensure_camera(
     result: ResultArrays,
     size_metres: float,
     transform: Matrix | None = None,
+    photo_frame: bool = False,
 ) -> bpy.types.Object:
     """Create or update the camera in front of the object.
 
@@ -61,6 +63,8 @@ def ensure_camera(
     transform : Matrix, optional
         Transform of the object, of which location and rotation are used; at the world origin if
         None.
+    photo_frame : bool, optional
+        Whether the frame is the photo's instead of that of the maps.
 
     Returns
     -------
@@ -73,10 +77,9 @@ def ensure_camera(
         data = tag(bpy.data.cameras.new(name), key, "camera")
         camera = tag(bpy.data.objects.new(name, data), key, "camera")
     link_object(camera, collection)
-    if result.focal_length is None:
-        position = _fit_orthographic(camera.data, result, metres_per_pixel(result, size_metres))
-    else:
-        position = _fit_pinhole(camera.data, result, metres_per_pixel(result, size_metres))
+    frame = _photo_frame(result) if photo_frame else result.size
+    fit = _fit_orthographic if result.focal_length is None else _fit_pinhole
+    position = fit(camera.data, result, metres_per_pixel(result, size_metres), frame)
     place = Matrix() if transform is None else Matrix.LocRotScale(*transform.decompose()[:2], None)
     camera.matrix_basis = (
         place @ Matrix.Translation(position) @ Matrix.Rotation(0.5 * np.pi, 4, "X")
@@ -105,11 +108,18 @@ def eye_of(result: ResultArrays, size_metres: float) -> np.ndarray | None:
     return to_blender(result.eye.astype(float)) * scale
 
 
+def _photo_frame(result: ResultArrays) -> tuple[float, float]:
+    """Width and height of the photo in pixels of the maps, which lie at its upper left corner."""
+    width, height = result.photo_size.astype(float) * result.crop_scale
+    whole = max(abs(width - result.size[0]), abs(height - result.size[1])) <= 1
+    return (float(width), float(height)) if whole else result.size
+
+
 def _fit_orthographic(
-    data: bpy.types.Camera, result: ResultArrays, step: float
+    data: bpy.types.Camera, result: ResultArrays, step: float, frame: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Set lens and clipping for pixels of `step` metres; the camera's place."""
-    (width, height), (column, row, _) = result.size, result.origin.astype(float)
+    (width, height), (column, row, _) = frame, result.origin.astype(float)
     # Far enough for everything in the frame: the object's own depth, and objects beside it.
     distance = (
         4 * max(width, height) * step
@@ -123,13 +133,13 @@ def _fit_orthographic(
 
 
 def _fit_pinhole(
-    data: bpy.types.Camera, result: ResultArrays, step: float
+    data: bpy.types.Camera, result: ResultArrays, step: float, frame: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Set lens, shift and clipping for pixels of `step` metres; the camera's place."""
     assert result.focal_length is not None
     assert result.principal_point is not None
     assert result.eye is not None
-    (width, height), (x, y) = result.size, result.principal_point.astype(float)
+    (width, height), (x, y) = frame, result.principal_point.astype(float)
     longest = max(width, height)
     data.type, data.sensor_fit, data.sensor_width = "PERSP", "AUTO", _SENSOR
     data.lens = _SENSOR * result.focal_length / longest

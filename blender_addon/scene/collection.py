@@ -4,7 +4,7 @@ from contextlib import suppress
 
 import bpy
 
-from .provenance import datablock_name, find_tagged, tag
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 
 _PREVIEW_SAMPLES = 32
 

@@ -10,7 +10,7 @@ Limits: while they share everything, the order of their names decides which one 
 
 import bpy
 
-from .provenance import KEY, ROLE, find_tagged, tag
+from ..datablocks.provenance import KEY, ROLE, find_tagged, tag
 
 OBJECT, MATERIAL, COPY = "object", "material", "copy"
 

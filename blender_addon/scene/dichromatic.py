@@ -29,7 +29,7 @@ import bpy
 
 from isc_core.shading.brdf.ggx import F0
 
-from .nodes import add_node, connect
+from ..datablocks.nodes import add_node, connect
 
 VERSION = 3
 MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite

@@ -14,11 +14,11 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
+from ..datablocks.images import DATA, ensure_image
+from ..datablocks.mesh import UV, MeshGeometry, front_geometry, metres_per_pixel
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
 from .camera import eye_of
-from .images import DATA, ensure_image
-from .mesh import UV, MeshGeometry, front_geometry, metres_per_pixel
-from .provenance import datablock_name, find_tagged, tag
 
 MODIFIER = "ISC Displacement"
 

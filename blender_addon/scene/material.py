@@ -10,6 +10,9 @@ from typing import Literal
 
 import bpy
 
+from ..datablocks.mesh import UV
+from ..datablocks.nodes import add_node, connect, node_tree
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .material_edits import (
     BASE_COLOR,
@@ -20,10 +23,7 @@ from .material_edits import (
     dichromatic_node,
     forget_edits,
 )
-from .mesh import UV
-from .nodes import add_node, connect, node_tree
 from .photo_highlights import show_highlights
-from .provenance import datablock_name, find_tagged, tag
 
 SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")
@@ -43,12 +43,15 @@ class MaterialMaps:
         Spatial factor of the specular level.
     normal : bpy.types.Image or None
         Tangent-space normal map.
+    plain : bytes or None
+        PNG file of the base colour without its compensation for the specular share, if known.
     """
 
     base_color: bpy.types.Image
     specular: bpy.types.Image | None
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
+    plain: bytes | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         material["isc_highlights"] = maps.specular
     if specular.source == "image":
         show_highlights(material)
-    bake_edits(material)
+    bake_edits(material, maps.plain)
     return material
 
 

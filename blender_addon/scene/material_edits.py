@@ -27,10 +27,10 @@ import numpy as np
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.shading.brdf.ggx import F0
 
+from ..datablocks.images import SRGB, new_png_texture, new_texture, scaled_png
+from ..datablocks.nodes import add_node
+from ..datablocks.provenance import KEY, ROLE, tag
 from .dichromatic import DICHROMATIC, MOST
-from .images import SRGB, new_texture
-from .nodes import add_node
-from .provenance import KEY, ROLE, tag
 
 SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Principled BSDF",
@@ -67,6 +67,11 @@ class ColorEdit:
     def values(self) -> tuple[float, float, float]:
         """The three numbers."""
         return self.hue, self.saturation, self.gain
+
+    @property
+    def only_scales(self) -> bool:
+        """Whether hue and saturation stay."""
+        return bool(np.abs(np.subtract(self.values[:2], (0.5, 1.0))).max() <= _UNCHANGED)
 
     @property
     def changes_nothing(self) -> bool:
@@ -139,13 +144,15 @@ def apply_edits(material: bpy.types.Material) -> bool:
     return _can_bake(material, group)
 
 
-def bake_edits(material: bpy.types.Material) -> None:
+def bake_edits(material: bpy.types.Material, plain: bytes | None = None) -> None:
     """Write all edits into the BSDF and its textures.
 
     Parameters
     ----------
     material : bpy.types.Material
         A local material of ISC; nothing changes where there is nothing to write.
+    plain : bytes, optional
+        PNG file of the base colour without its compensation for the specular share.
     """
     if not apply_edits(material):
         return
@@ -160,7 +167,10 @@ def bake_edits(material: bpy.types.Material) -> None:
         target.default_value = (*np.clip(color, 0, 1), 1.0)
     elif not edit.changes_nothing:
         node = _edited_texture(material, source.links[0].from_node)
-        _replace_image(node, _bake(material, source.links[0].from_node.image, edit))
+        share = group.inputs["Specular Share"].default_value
+        if not (edit.only_scales and abs(edit.gain + share - 1) <= _UNCHANGED):
+            plain = None
+        _replace_image(node, _bake(material, source.links[0].from_node.image, edit, plain))
         tree.links.new(node.outputs["Color"], target)
     else:
         tree.links.new(source.links[0].from_socket, target)
@@ -279,6 +289,15 @@ def linear_colors(image: bpy.types.Image) -> np.ndarray:
     return colors
 
 
+def _codes(image: bpy.types.Image) -> np.ndarray:
+    """(H, W, 3) uint8, row 0 at the top, of an image of 8 bits."""
+    width, height = image.size
+    pixels = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    colors = pixels.reshape(height, width, 4)[::-1, :, :3]
+    return (255 * colors + 0.5).astype(np.uint8)
+
+
 def _color_edit(inputs: Any) -> ColorEdit:
     hue, saturation, value, gain, shown, share = (
         float(inputs[name].default_value)
@@ -363,9 +382,17 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
     return node
 
 
-def _bake(material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit) -> bpy.types.Image:
-    colors = recolour_reflectance(linear_colors(image), *edit.values)
+def _bake(
+    material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit, png: bytes | None
+) -> bpy.types.Image:
+    """The edited colours; `png` is their file where that is known."""
     key = str(material.get(KEY, material.name))
+    is_coded = not image.is_float and image.colorspace_settings.name == SRGB
+    if png is None and edit.only_scales and is_coded:
+        png = scaled_png(_codes(image), edit.gain)
+    if png is not None:
+        return tag(new_png_texture(key, "edited_base_color", png), key, "edited_base_color")
+    colors = recolour_reflectance(linear_colors(image), *edit.values)
     return tag(new_texture(key, "edited_base_color", colors, SRGB), key, "edited_base_color")
 
 

@@ -10,9 +10,9 @@ from mathutils import Vector
 
 from isc_core.errors import InputError
 
+from ..datablocks.mesh import to_blender
+from ..datablocks.provenance import KEY, datablock_name, find_tagged, tag
 from .collection import link_object
-from .mesh import to_blender
-from .provenance import KEY, datablock_name, find_tagged, tag
 from .world import set_sun_mix
 
 

@@ -14,8 +14,8 @@ from math import radians
 import bpy
 import numpy as np
 
-from .nodes import add_node, connect, node_tree
-from .provenance import datablock_name, find_tagged, tag
+from ..datablocks.nodes import add_node, connect, node_tree
+from ..datablocks.provenance import datablock_name, find_tagged, tag
 
 ROTATION = 90.0  # degrees about Z
 MAPPING, SUN, BACKGROUND = "ISC Rotation", "ISC Sun", "ISC Light"

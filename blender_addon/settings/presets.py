@@ -1,7 +1,8 @@
 """Presets of size, model and samples, from fast to detailed.
 
-The overall shape is solved at 256 pixels in all of them: the presets differ in the textures, in the
-fine relief, and in the time. Times are of photos of 2,400 pixels on two cores.
+The overall shape is solved at 256 pixels in all of them: the presets differ in the maps of light,
+highlights and fine relief, and in the time; the base color has the photo's resolution. Times are of
+photos of 2,400 pixels on two cores.
 """
 
 from dataclasses import dataclass
@@ -33,18 +34,12 @@ class Preset:
 
 
 PRESETS = {
-    "DRAFT": Preset(
-        "Draft", "Textures of 256 pixels, in about 10 s on two cores", 256, "joint", 16
-    ),
+    "DRAFT": Preset("Draft", "Maps of 256 pixels, in about 10 s on two cores", 256, "joint", 16),
     "STANDARD": Preset(
-        "Standard", "Textures of 512 pixels, in about 10 s on two cores", 512, "joint", 64
+        "Standard", "Maps of 512 pixels, in about 10 s on two cores", 512, "joint", 64
     ),
-    "HIGH": Preset(
-        "High", "Textures of 1024 pixels, in about 20 s on two cores", 1024, "joint", 128
-    ),
-    "ULTRA": Preset(
-        "Ultra", "Textures of 2048 pixels, in about 40 s on two cores", 2048, "joint", 256
-    ),
+    "HIGH": Preset("High", "Maps of 1024 pixels, in about 20 s on two cores", 1024, "joint", 128),
+    "ULTRA": Preset("Ultra", "Maps of 2048 pixels, in about 40 s on two cores", 2048, "joint", 256),
 }
 CUSTOM = "CUSTOM"
 

@@ -145,6 +145,13 @@ OWN_SHADOWS_ITEMS = _numbered(
     ),
     ("off", "Off", "Cast no shadows, the object looks as in the photo"),
 )
+TEXTURE_SIZES = _numbered(
+    ("photo", "Photo", "Resolution of the photo"),
+    ("4096", "4K", "At most 4096 pixels"),
+    ("2048", "2K", "At most 2048 pixels"),
+    ("1024", "1K", "At most 1024 pixels"),
+    ("maps", "Maps", "Resolution of shape and highlights, as Size sets it"),
+)
 _PRESET_NAMES = (*PRESETS, CUSTOM)
 _PRESET_ITEMS = _numbered(
     *((name, preset.label, preset.description) for name, preset in PRESETS.items()),
@@ -226,7 +233,8 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     preset: EnumProperty(
         name="Preset",
         description=(
-            "Detail of the textures, and the time that it takes, the overall shape is the same"
+            "Detail of relief and highlights, and the time that it takes, the overall shape is the "
+            "same"
         ),
         items=_PRESET_ITEMS,
         get=_get_preset,
@@ -266,8 +274,8 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     max_size: IntProperty(
         name="Size",
         description=(
-            "Longer side of the object in its textures, in pixels, 0 keeps the photo's "
-            "resolution, time grows with the square"
+            "Longer side of the object in its maps, in pixels, 0 keeps the photo's resolution, "
+            "time grows with the square"
         ),
         default=512,
         min=0,
@@ -283,6 +291,12 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         soft_max=4096,
     )
 
+    texture_size: EnumProperty(
+        name="Texture Size",
+        description="Longest side of the base color texture, never smaller than the maps",
+        items=TEXTURE_SIZES,
+        default="photo",
+    )
     size_metres: FloatProperty(
         name="Object Size",
         description="Longer side of the object in the scene",

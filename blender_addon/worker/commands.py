@@ -66,6 +66,8 @@ class DecomposeJob:
         Value of `--transfer`.
     camera : str
         Value of `--camera`.
+    texture_size : str
+        Value of `--texture-size`.
     """
 
     photo: Path
@@ -78,6 +80,7 @@ class DecomposeJob:
     threads: int = 0
     transfer: str = "auto"
     camera: str = "auto"
+    texture_size: str = "photo"
 
 
 @dataclass(frozen=True)
@@ -152,7 +155,7 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
     """
     words = ["decompose", _absolute(job.photo), "--arrays", "-o", _absolute(job.output)]
     names = ("model", "separator", "illumination", "max_size", "threads", "transfer", "camera")
-    for name in names:
+    for name in (*names, "texture_size"):
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]

@@ -9,7 +9,12 @@ Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (19
 import numpy as np
 
 
-def enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
+def enlarged(
+    layer: np.ndarray,
+    shape: tuple[int, ...],
+    factor: float,
+    start: tuple[int, ...] = (0, 0),
+) -> np.ndarray:
     """Upsample a map of block averages.
 
     Parameters
@@ -20,13 +25,16 @@ def enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: float) -> np.nda
         (H, W) of the result.
     factor : float
         Width and height of a block in pixels, at least 1.
+    start : tuple of int
+        Row and column of the first pixel, where only a part is wanted.
 
     Returns
     -------
     (H, W) or (H, W, C) ndarray
     """
-    for axis, size in enumerate(shape):
-        at = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0, layer.shape[axis] - 1)
+    for axis, (size, first_pixel) in enumerate(zip(shape, start, strict=True)):
+        place = (np.arange(first_pixel, first_pixel + size) + 0.5) / factor - 0.5
+        at = np.clip(place, 0, layer.shape[axis] - 1)
         first = np.minimum(at.astype(np.int64), max(layer.shape[axis] - 2, 0))
         beyond = (
             (at - first)

@@ -31,6 +31,8 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     roughness ()                 of Blender and glTF; NaN if unknown
     specular_level ()            for `base_color`, 1 is plastic (f0 = .04); NaN if unknown
     specular_variation (H, W)    factor of that level, where it varies; else absent
+    texture (h, w, 3) uint8      `base_color` in sRGB codes at the photo's resolution, the frame is
+                                 that of the maps; absent if not asked for, or no finer than they
     photo_size (2,) int32        width and height of the original photo
     crop_scale ()                map pixels per photo pixel
 
@@ -55,7 +57,12 @@ ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
 
 
-def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) -> None:
+def write_arrays(
+    d: Decomposition,
+    path: Path,
+    built: MeshResult | None = None,
+    texture: np.ndarray | None = None,
+) -> None:
     """Write the file; equal results give equal bytes.
 
     Parameters
@@ -64,6 +71,8 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     path : Path
     built : MeshResult, optional
         The mesh of `d`; built here by default.
+    texture : (h, w, 3) uint8 ndarray, optional
+        Of `exports.full_texture`.
 
     Raises
     ------
@@ -73,6 +82,8 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
         If the file cannot be written.
     """
     arrays = arrays_of(d, built or mesh_of(d))
+    if texture is not None:
+        arrays["texture"] = texture
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 

@@ -56,14 +56,14 @@ from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
-from .adaptive_triangles import Triangulation, adaptive_triangles, covered_pixels
+from .adaptive_triangles import Triangulation, adaptive_triangles
 from .glb import TexturedMesh, encode_glb
 from .mesh_options import MeshOptions
+from .vertex_normals import detail_normals, directions_at, facing, flat_normals, mean_normals
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
 _ROWS = 256  # coded at once
-_LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
 
 
 @dataclass(frozen=True)
@@ -245,11 +245,11 @@ def build_mesh(
     vertex_pixel = grid.vertices * stride
     row, column = vertex_pixel.T
     if fewer:
-        smooth = _mean_normals(grid, stride, normal, view)
-        detail, tangents = _detail_normals(grid, stride, normal, smooth, view)
+        smooth = mean_normals(grid, stride, normal, view)
+        detail, tangents = detail_normals(grid, stride, normal, smooth, view)
     else:
-        smooth = _facing(normal[row, column].astype(np.float32), _at(view, row, column))
-        detail, tangents = _flat(mask.shape), None
+        smooth = facing(normal[row, column].astype(np.float32), directions_at(view, row, column))
+        detail, tangents = flat_normals(mask.shape), None
     if camera is None:
         pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
     else:
@@ -458,110 +458,6 @@ def _full_grid(cells: np.ndarray) -> Triangulation:
     upper = np.stack([top_left, bottom_right, top_right], -1)
     used, faces = np.unique(np.stack([lower, upper], 1).reshape(-1), return_inverse=True)
     return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
-
-
-def interpolated_normals(
-    grid: Triangulation, normal: np.ndarray, view: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normals of vertices, and the tangent-space map of what lies between them.
-
-    Parameters
-    ----------
-    grid : Triangulation
-        Over the pixels; a vertex without a triangle has the normal of its pixel.
-    normal : (H, W, 3) ndarray
-        Unit vectors, camera frame.
-    view : (3,) or (H, W, 3) ndarray
-        Unit vectors toward the viewer.
-
-    Returns
-    -------
-    smooth : (V, 3) ndarray
-        Unit vectors.
-    detail : (H, W, 3) ndarray
-        Unit vectors in tangent space.
-    """
-    smooth = _mean_normals(grid, 1, normal, view)
-    alone = np.ones(len(smooth), bool)
-    alone[grid.faces] = False
-    row, column = grid.vertices[alone].T
-    smooth[alone] = _facing(normal[row, column].astype(np.float32), _at(view, row, column))
-    return smooth, _detail_normals(grid, 1, normal, smooth, view)[0]
-
-
-def _mean_normals(
-    grid: Triangulation, stride: int, normal: np.ndarray, view: np.ndarray
-) -> np.ndarray:
-    """Unit normals (V, 3) of the vertices: means of the pixels of their triangles."""
-    sums = np.zeros((len(grid.vertices), 3))
-    for patch in covered_pixels(grid, stride):
-        seen = normal[patch.pixels[..., 0], patch.pixels[..., 1]]
-        part = np.einsum("pk,tpc->tkc", patch.weights, seen).reshape(-1, 3)
-        for axis in range(3):
-            sums[:, axis] += np.bincount(patch.faces.reshape(-1), part[:, axis], len(sums))
-    return _facing(sums.astype(np.float32), _at(view, *(grid.vertices * stride).T))
-
-
-def _detail_normals(
-    grid: Triangulation,
-    stride: int,
-    normal: np.ndarray,
-    smooth: np.ndarray,
-    view: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """The normals (H, W, 3) of the tangent-space map, each pixel's relative to the interpolated
-    normal of the vertices; and the tangents (V, 3) of these.
-    """
-    detail = _flat(normal.shape[:2]).copy()
-    for patch in covered_pixels(grid, stride):
-        row, column = patch.pixels[..., 0], patch.pixels[..., 1]
-        base = np.einsum("pk,tkc->tpc", patch.weights.astype(np.float32), smooth[patch.faces])
-        toward = _at(view, row, column)
-        detail[row, column] = _local(normal[row, column], _facing(base, toward), toward)
-    return detail, _tangents(smooth, _at(view, *(grid.vertices * stride).T))
-
-
-def _at(view: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """The directions of pixels, or the one of all."""
-    return view if view.ndim == 1 else view[row, column]
-
-
-def _flat(shape: tuple[int, ...]) -> np.ndarray:
-    return np.broadcast_to(np.array([0, 0, 1], np.float32), (*shape, 3))
-
-
-def _tangents(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """The unit direction (..., 3) on a surface in which the texture's column grows."""
-    if view.ndim == 1:
-        tangent = np.stack([normal[..., 2], np.zeros_like(normal[..., 0]), -normal[..., 0]], -1)
-    else:  # on the surface, and in the plane of the pixel's row through the camera
-        tangent = np.cross(normal, np.cross((1.0, 0.0, 0.0), view)).astype(normal.dtype)
-    return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))
-
-
-def _local(normal: np.ndarray, base: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """Normals (..., 3) in the frame of tangent, bitangent (in which the texture's row falls) and
-    base.
-    """
-    tangent = _tangents(base, view)
-    frame = tangent, np.cross(base, tangent), base
-    return np.stack([np.einsum("...c,...c->...", normal, axis) for axis in frame], -1)
-
-
-def _facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """Unit vectors that face the viewer; the view itself for zero vectors.
-
-    `view` is (0, 0, 1), or the direction (..., 3) of each.
-    """
-    vectors, view = vectors.copy(), view.astype(vectors.dtype)
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    vectors = np.where(length > 0, vectors / np.where(length > 0, length, 1), view)
-    if view.ndim == 1:
-        vectors[..., 2] = np.maximum(vectors[..., 2], _LEAST_FACING)
-    else:
-        facing = (vectors * view).sum(axis=-1, keepdims=True)
-        vectors += np.maximum(_LEAST_FACING - facing, 0) * view
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
 def color_codes(linear: np.ndarray) -> np.ndarray:

@@ -84,6 +84,7 @@ def save(
     *,
     mesh: MeshOptions | None = None,
     arrays: bool = False,
+    texture: np.ndarray | None = None,
     png: bool = False,
     cover: np.ndarray | None = None,
     monitor: Monitor | None = None,
@@ -97,6 +98,8 @@ def save(
     mesh : MeshOptions, optional
     arrays : bool
         Write `arrays.npz` too.
+    texture : (h, w, 3) uint8 ndarray, optional
+        Fine base colour for `arrays.npz`, see `exports.full_texture`.
     png : bool
         Write the layers as PNG files too, see `layer_pngs`.
     cover : (H, W) ndarray, optional
@@ -135,7 +138,7 @@ def save(
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
-            write_arrays(d, partial / ARRAYS, built)
+            write_arrays(d, partial / ARRAYS, built, texture)
         if png:
             write_layer_pngs(d, partial)
         if cover is not None:

@@ -43,12 +43,17 @@ def world_value(built: BuiltObject) -> None:
     next(node for node in nodes if node.type == "MAPPING").inputs["Rotation"].default_value[2] = 1
 
 
+def lens_shifted(built: BuiltObject) -> None:
+    assert built.camera is not None
+    built.camera.data.shift_x = 0.3
+
+
 CHANGES: dict[str, Callable[[BuiltObject], None]] = {
     "lamp turned": lambda built: turn(bpy.data.objects["lamp"]),
     "lamp brighter": lambda built: setattr(bpy.data.lights["lamp"], "energy", 9.0),
     "lamp removed": lambda built: bpy.data.objects.remove(bpy.data.objects["lamp"]),
     "camera moved": lambda built: turn(built.camera),
-    "lens": lambda built: setattr(built.camera.data, "shift_x", 0.3),
+    "lens": lens_shifted,
     "object turned": lambda built: turn(built.object),
     "sky turned": world_value,
     "sky replaced": lambda built: setattr(built.scene, "world", bpy.data.worlds.new("mine")),

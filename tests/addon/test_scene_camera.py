@@ -81,3 +81,32 @@ def test_the_photo_is_the_background_image(blender: Any, bump_folder: Path) -> N
             "photo",
             "theirs",
         ]
+
+
+@pytest.mark.parametrize("pinhole", [False, True], ids=["orthographic", "pinhole"])
+def test_the_photos_frame_leaves_out_what_maps_have_beyond_it(
+    blender: Any, bump_folder: Path, pinhole: bool
+) -> None:
+    """Maps of 88 x 64 pixels of a photo that is 87.5 x 63.25 of them."""
+    result = replace(
+        read_result(bump_folder), photo_size=np.array([350, 253], np.int32), crop_scale=0.25
+    )
+    if pinhole:
+        result = replace(
+            result,
+            focal_length=120.0,
+            principal_point=np.array([44.0, 32.0], np.float32),
+            eye=np.array([0, 0, 120 * result.metres_per_pixel], np.float32),
+        )
+    step = 0.1 / result.longest_side
+    whole = build(result).camera
+    offset, scale, shift = whole.location.copy(), whole.data.ortho_scale, whole.data.shift_x
+    part = build(result, photo_resolution=True).camera
+    if pinhole:
+        assert part.data.lens == pytest.approx(36 * 120 / 87.5)
+        assert part.data.shift_x == pytest.approx((43.75 - 44) / 87.5)
+        assert part.data.shift_y == pytest.approx((32 - 31.625) / 87.5) and shift == 0
+    else:
+        assert part.data.ortho_scale == pytest.approx(scale * 87.5 / 88)
+        moved = (part.location - offset) / step
+        assert (moved.x, moved.z) == pytest.approx((-0.25, 0.375), abs=1e-3)

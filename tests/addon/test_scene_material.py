@@ -264,7 +264,7 @@ def test_own_nodes_and_animated_edits_are_left_alone(blender: Any, result: Resul
 @pytest.fixture
 def mirror(blender: Any) -> Any:
     """A plane, to be seen at an angle under an even sky of radiance 1."""
-    from blender_addon.scene.nodes import node_tree
+    from blender_addon.datablocks.nodes import node_tree
 
     scene, world = blender.context.scene, blender.data.worlds.new("even")
     scene.world, scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = (

@@ -328,6 +328,7 @@ def test_the_job_reaches_the_command_line(
         threads=2,
         transfer="linear",
         camera="28",
+        texture_size="2048",
     )
     *words, last = ended(start_decompose(asked, environment)).message.split("\n")
     assert last == "--cancel-at-eof"
@@ -342,6 +343,7 @@ def test_the_job_reaches_the_command_line(
         "--threads": "2",
         "--transfer": "linear",
         "--camera": "28",
+        "--texture-size": "2048",
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }

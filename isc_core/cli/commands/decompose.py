@@ -13,6 +13,7 @@ from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
 from ...progress import Monitor, ProgressEvent
 from ...result_files.diagnostics_text import CROPPED, note_lines
+from ...result_files.exports.full_texture import full_texture
 from ...result_files.known_inputs import read_height, read_light
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.reading_notes_text import reading_note_lines
@@ -36,7 +37,7 @@ from ..interface.options import (
 )
 from ..interface.parser import describe, hints
 from ..interface.standard_input import STDIN, photo_file
-from ..interface.values import memory_size, number, positive
+from ..interface.values import MAPS_SIZE, memory_size, number, positive, texture_size
 from ..interface.viewer import show
 
 _EXAMPLES = """  isc decompose cup.png -o cup
@@ -83,6 +84,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
     )
     add_triangles(main)
+    main.add_argument(
+        "--texture-size",
+        type=texture_size,
+        metavar="photo|maps|N",
+        help="with --arrays: longest side of the base colour there, the photo's, that of the maps, "
+        "or N pixels at most (default maps)",
+    )
     add_open(main)
     reading = parser.add_argument_group("reading the photo")
     add_transfer(reading)
@@ -160,6 +168,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
+    if options.texture_size is not None and not options.arrays:
+        raise InputError("--texture-size is that of the arrays: add --arrays, or leave it out")
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     if options.each:
         return _decompose_each(options, settings, prior_set, monitor)
@@ -209,13 +219,17 @@ def _decompose_photo(
         memory=options.memory,
         monitor=monitor.part(0.0, 0.8),
     )
-    writing = monitor.part(0.8, 1.0)
+    writing, texture = monitor.part(0.8, 1.0), None
+    if options.texture_size is not None and options.texture_size != MAPS_SIZE:
+        writing.report("refining the texture", 0.0)
+        texture = full_texture(photo, result, options.texture_size)
     cover = None if photo.found is None else photo.found.cover
     save(
         result,
         output,
         mesh=MeshOptions(triangles=options.triangles),
         arrays=options.arrays,
+        texture=texture,
         png=options.png,
         cover=cover,
         monitor=writing,

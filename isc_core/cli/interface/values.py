@@ -6,6 +6,8 @@ import re
 import sys
 from collections.abc import Callable
 
+MAPS_SIZE = -1  # as `texture_size` returns it
+
 
 def current_name(setting: str) -> Callable[[str], str]:
     """Make the type of an option whose values were renamed.
@@ -32,6 +34,32 @@ def current_name(setting: str) -> Callable[[str], str]:
         return str(current)
 
     return read
+
+
+def texture_size(text: str) -> int:
+    """Parse the longest side of a texture.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    int
+        Pixels, 0 for the photo's, `MAPS_SIZE` for that of the maps.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is none.
+    """
+    names = {"photo": 0, "maps": MAPS_SIZE}
+    if text in names:
+        return names[text]
+    if not text.isascii() or not text.isdecimal() or int(text) == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not photo, maps or a number of pixels")
+    return int(text)
 
 
 def count(text: str) -> int:

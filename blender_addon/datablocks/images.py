@@ -10,12 +10,14 @@ import bpy
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 
+from ..files.png import encode_png
 from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
+_FAST = 1  # compression of large textures
 # Names of the textures in files, by role.
 TEXTURE_NAMES = {
     "base_color": "basecolor",
@@ -126,6 +128,69 @@ def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.t
     return image
 
 
+def ensure_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
+    """Create a texture of a PNG file, or replace the one of that role everywhere it is used.
+
+    Parameters
+    ----------
+    key, role : str
+        As of `ensure_texture`.
+    data : bytes
+        The file; it has sRGB codes.
+
+    Returns
+    -------
+    bpy.types.Image
+        The packed image.
+    """
+    old = find_tagged(bpy.data.images, key, role)
+    image = tag(new_png_texture(key, role, data), key, role)
+    if old is not None:
+        _replace(old, image)
+    return image
+
+
+def new_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
+    """Create a packed texture of a PNG file; Blender reads its pixels when it needs them.
+
+    Parameters
+    ----------
+    key, role, data : str, str, bytes
+        As of `ensure_png_texture`.
+
+    Returns
+    -------
+    bpy.types.Image
+        The image, without a tag.
+    """
+    image = bpy.data.images.new(_texture_name(key, role), 1, 1)
+    image.colorspace_settings.name = SRGB
+    image.file_format = "PNG"
+    image.pack(data=data, data_len=len(data))
+    image.source = "FILE"
+    return image
+
+
+def scaled_png(codes: np.ndarray, gain: float) -> bytes:
+    """Return a PNG file of colours times a factor.
+
+    Parameters
+    ----------
+    codes : (H, W, 3) ndarray of uint8
+        sRGB, row 0 at the top.
+    gain : float
+        Factor of the linear values; they are clipped at 1.
+
+    Returns
+    -------
+    bytes
+        The file, in sRGB.
+    """
+    linear = gain * srgb_to_linear(np.arange(256) / 255)
+    table = np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+    return encode_png(table[codes], _FAST)
+
+
 def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
     """Create a packed texture of 8 bits.
 
@@ -143,13 +208,7 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
         The image, without a tag.
     """
     rows, columns = values.shape[:2]
-    name = TEXTURE_NAMES[role]
-    image = bpy.data.images.new(
-        f"{datablock_name(key, name)[: -len(name) - 1]}_{name}",
-        columns,
-        rows,
-        alpha=values.ndim == 2,
-    )
+    image = bpy.data.images.new(_texture_name(key, role), columns, rows, alpha=values.ndim == 2)
     image.colorspace_settings.name = space
     shares = np.clip(values, 0, 1)
     pixels = np.ones((rows, columns, 4), np.float32)
@@ -162,6 +221,12 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
     image.file_format = "PNG"
     image.pack()
     return image
+
+
+def _texture_name(key: str, role: str) -> str:
+    """The name of an image, from which exporters make that of its file."""
+    name = TEXTURE_NAMES[role]
+    return f"{datablock_name(key, name)[: -len(name) - 1]}_{name}"
 
 
 def ensure_maps(key: str, result: ResultArrays, every: bool = True) -> dict[str, bpy.types.Image]:

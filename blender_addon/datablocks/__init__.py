@@ -1,0 +1,1 @@
+"""Blender's datablocks as ISC marks, finds and fills them; what the modules of `scene` share."""

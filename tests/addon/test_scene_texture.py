@@ -1,0 +1,90 @@
+"""The fine base colour as Blender's texture: the same colours in more pixels, on the same UVs."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
+
+
+def build(result: ResultArrays, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
+
+    return build_object(result, BuildOptions(**options))
+
+
+def texture(built: Any, name: str = "Base Color") -> Any:
+    return built.material.node_tree.nodes[name].image
+
+
+def codes(image: Any) -> np.ndarray:
+    """(H, W, 3) in 0..255, row 0 at the top."""
+    width, height = image.size
+    values = np.empty(width * height * 4, np.float32)
+    image.pixels.foreach_get(values)
+    return np.rint(255 * values.reshape(height, width, 4)[::-1, :, :3]).astype(int)
+
+
+@pytest.fixture
+def fine(bump_folder: Path) -> ResultArrays:
+    """Its texture has three times the resolution of the maps, and stripes that the maps lack."""
+    result = read_result(bump_folder)
+    color = result.base_color.repeat(3, 0).repeat(3, 1)
+    color[::2] *= 0.5
+    values = np.rint(255 * linear_to_srgb(np.clip(color, 0, 1))).astype(np.uint8)
+    return replace(result, texture=values)
+
+
+def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -> None:
+    image = texture(build(fine, specular_from="none"))
+    assert tuple(image.size) == (3 * fine.size[0], 3 * fine.size[1])
+    assert image.packed_file is not None and image.colorspace_settings.name == "sRGB"
+    assert fine.texture is not None and np.array_equal(codes(image), fine.texture)
+
+
+@pytest.mark.parametrize("in_advance", [False, True])
+def test_with_the_photos_highlights_the_texture_is_not_compensated(
+    blender: Any, fine: ResultArrays, in_advance: bool
+) -> None:
+    from blender_addon.scene.build import BuildOptions, prepared
+
+    given = prepared(replace(fine, specular_level=1.0, roughness=0.3), BuildOptions())
+    given = given if in_advance else replace(given, encoded={})
+    built = build(given, specular_from="image")
+    assert fine.texture is not None
+    off = np.abs(codes(texture(built, "Edited Base Color")) - fine.texture.astype(int))
+    assert off.max() <= (0 if in_advance else 2)
+    assert codes(texture(built)).mean() > fine.texture.mean() + 0.5, "for highlights of a lobe"
+
+
+def test_building_again_with_maps_replaces_it(blender: Any, fine: ResultArrays) -> None:
+    build(fine)
+    image = texture(build(replace(fine, texture=None)))
+    assert tuple(image.size) == fine.size
+
+
+def test_hue_is_edited_at_full_resolution(blender: Any, fine: ResultArrays) -> None:
+    from blender_addon.scene.material_edits import bake_edits, dichromatic_node
+
+    built = build(fine, specular_from="lobe")
+    node = dichromatic_node(built.material)
+    assert node is not None
+    node.inputs["Hue"].default_value = 0.8
+    bake_edits(built.material)
+    assert tuple(texture(built, "Edited Base Color").size) == tuple(texture(built).size)
+
+
+def test_a_texture_of_another_kind_is_refused(bump_folder: Path, tmp_path: Path) -> None:
+    arrays = dict(np.load(bump_folder / "arrays.npz"))
+    folder = tmp_path / "bump"
+    folder.mkdir()
+    (folder / "decomposition.json").write_bytes((bump_folder / "decomposition.json").read_bytes())
+    for wrong in (np.zeros((4, 4, 3), np.float32), np.zeros((4, 4), np.uint8)):
+        np.savez(folder / "arrays.npz", **{**arrays, "texture": wrong})
+        with pytest.raises(InputError, match="texture"):
+            read_result(folder)
