@@ -158,7 +158,7 @@ class Pyramid:
     ----------
     mask : (H, W) bool ndarray
         Of the photo.
-    frame : Frame
+    frame : _Frame
         The part of the photo that is looked at.
     levels : list of Level
         The finest first.
@@ -167,7 +167,7 @@ class Pyramid:
     """
 
     mask: np.ndarray
-    frame: "Frame"
+    frame: "_Frame"
     levels: list[Level]
     slope: np.ndarray
     gain: np.ndarray
@@ -187,7 +187,7 @@ class Pyramid:
         -------
         Pyramid
         """
-        frame = Frame.around(mask)
+        frame = _Frame.around(mask)
         inside = np.where(mask[..., None], diffuse, 0).astype(np.float32)
         levels = [Level(frame.window.cut(inside, 0), frame.window.cut(mask, False))]
         for _ in range(frame.halvings):
@@ -249,7 +249,7 @@ class Pyramid:
 
 
 @dataclass(frozen=True)
-class Frame:
+class _Frame:
     """The object's box with a margin, of a size that can be halved.
 
     `box` are the rows and columns of the mask, `length` the longer side of the box in pixels,
@@ -262,7 +262,7 @@ class Frame:
     window: Window
 
     @classmethod
-    def around(cls, mask: np.ndarray) -> "Frame":
+    def around(cls, mask: np.ndarray) -> "_Frame":
         box = mask_slices(mask)
         sizes = [one.stop - one.start for one in box]
         halvings = max(0, int(np.ceil(np.log2(max(sizes) / _SOLVED))))
