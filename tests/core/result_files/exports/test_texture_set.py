@@ -16,7 +16,8 @@ from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
 from isc_core.photo.grabcut import encoded_mask
 from isc_core.result_files.exports import texture_set
 from isc_core.result_files.exports.soft_alpha import object_cover
-from isc_core.result_files.exports.texture_set import TARGETS, texture_files, write_texture_set
+from isc_core.result_files.exports.targets import TARGETS
+from isc_core.result_files.exports.texture_set import texture_files, write_texture_set
 from isc_core.result_files.mesh import MeshResult, build_mesh
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.scene.decomposition import Decomposition
