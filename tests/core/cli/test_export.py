@@ -56,7 +56,7 @@ def test_the_mesh_has_as_many_triangles_as_asked_for(result: Path, tmp_path: Pat
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--textures", "godot", "-o", "out"], "invalid choice: 'godot'"),
+        (["--textures", "maya", "-o", "out"], "invalid choice: 'maya'"),
         (["--format", "fbx", "-o", "out.fbx"], "invalid choice: 'fbx'"),
         (["-o", "out"], "one of the arguments --textures --format is required"),
         (["--textures", "unity", "--format", "obj", "-o", "out"], "not allowed with"),
