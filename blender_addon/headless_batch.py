@@ -135,7 +135,7 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
     """
     if options.output is None and options.render is None and options.results is None:
         raise InputError("no output: give -o OUT.blend, --render OUT.png or --results DIR")
-    for name, least in (("samples", 1), ("max_size", 0), ("threads", 0)):
+    for name, least in (("samples", 1), ("max_size", 0), ("threads", 0), ("triangles", 0)):
         if getattr(options, name) < least:
             raise InputError(f"--{name.replace('_', '-')} must be {least} or more")
     size = options.texture_size

@@ -216,6 +216,7 @@ def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
         (["none.png", "-o", "x.blend"], "none.png: no such photo or folder"),
         (["RESULT"], "no output: give"),
         (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
+        (["RESULT", "-o", "x.blend", "--triangles", "-4"], "--triangles must be 0 or more"),
         (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
         (
