@@ -38,7 +38,15 @@ from isc_core.evaluation.metrics import psnr
 from isc_core.result_files.contact_sheet import MapPanel, edit_sheet
 from isc_core.shading.environment_map import shading_under
 
-from .closed_loop_cases import PHOTOS, RENDERED, CaseOptions, LoopCase, RelitTruth, loop_cases
+from .closed_loop_cases import (
+    PHOTOS,
+    RENDERED,
+    CaseOptions,
+    LoopCase,
+    RelitTruth,
+    add_case_arguments,
+    loop_cases,
+)
 from .renders import RenderVariant, render
 
 USUAL_FILTER = 1.5  # pixels: Blender's default
@@ -565,20 +573,7 @@ def main(arguments: list[str] | None = None) -> int:
         prog="python -m benchmarks.blender.closed_loop",
         description="Compare renders of imported results with the photo.",
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
-    parser.add_argument("--photos", type=Path, help="folder of the real photos")
-    parser.add_argument(
-        "--names", nargs="+", help=f"objects to measure: {', '.join(RENDERED + PHOTOS)}"
-    )
-    parser.add_argument(
-        "--size",
-        type=int,
-        default=256,
-        help="long side of the objects in pixels (default: %(default)s)",
-    )
-    parser.add_argument(
-        "--samples", type=int, default=64, help="samples of Cycles per pixel (default: %(default)s)"
-    )
+    add_case_arguments(parser, size=256, samples=64)
     parser.add_argument("--fresh", action="store_true", help="render again what exists")
     try:
         measure(parser.parse_args(arguments))

@@ -11,6 +11,7 @@ Limits: the scale between reflectance and light cannot be known from one photo; 
 right up to one gain at best.
 """
 
+import argparse
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -114,6 +115,35 @@ class CaseOptions:
     photos: Path | None
     size: int = 256
     samples: int = 256
+
+
+def add_case_arguments(parser: argparse.ArgumentParser, size: int, samples: int) -> None:
+    """Add the options of programs that measure cases.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    size, samples : int
+        Defaults.
+    """
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--photos", type=Path, help="folder of the real photos")
+    parser.add_argument(
+        "--names", nargs="+", help=f"objects to measure: {', '.join(RENDERED + PHOTOS)}"
+    )
+    parser.add_argument(
+        "--size",
+        type=int,
+        default=size,
+        help="long side of the objects in pixels (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--samples",
+        type=int,
+        default=samples,
+        help="samples of Cycles per pixel (default: %(default)s)",
+    )
 
 
 def loop_cases(options: CaseOptions, names: Iterable[str]) -> Iterator[LoopCase]:

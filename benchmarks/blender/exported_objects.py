@@ -40,7 +40,14 @@ from isc_core.evaluation.metrics import psnr
 from synth.light_rigs.placing import toward
 
 from .closed_loop import white
-from .closed_loop_cases import PHOTOS, RENDERED, CaseOptions, LoopCase, loop_cases
+from .closed_loop_cases import (
+    PHOTOS,
+    RENDERED,
+    CaseOptions,
+    LoopCase,
+    add_case_arguments,
+    loop_cases,
+)
 from .read_back import read_back, shown
 from .renders import render_scene
 
@@ -268,15 +275,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="python -m benchmarks.blender.exported_objects",
         description="Measure exported objects read back, and highlights of a new lamp.",
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
-    parser.add_argument("--photos", type=Path, help="folder of the real photos")
-    parser.add_argument(
-        "--names", nargs="+", help=f"objects to measure: {', '.join(RENDERED + PHOTOS)}"
-    )
-    parser.add_argument("--size", type=int, default=128, help="pixels (default: %(default)s)")
-    parser.add_argument(
-        "--samples", type=int, default=32, help="samples per pixel (default: %(default)s)"
-    )
+    add_case_arguments(parser, size=128, samples=32)
     try:
         measure(parser.parse_args(arguments))
     except InputError as error:

@@ -82,7 +82,6 @@ def ensure_image(
         The packed image.
     """
     rows, columns = values.shape[:2]
-    old = find_tagged(bpy.data.images, key, role)
     image = bpy.data.images.new(
         datablock_name(key, role.replace("_", " ")),
         columns,
@@ -97,9 +96,7 @@ def ensure_image(
         pixels[..., 3] = alpha[::-1]
     image.pixels.foreach_set(pixels.ravel())
     image.pack()
-    if old is not None:
-        _replace(old, image)
-    return tag(image, key, role)
+    return _put_in_place(image, key, role)
 
 
 def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
@@ -121,11 +118,7 @@ def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.t
     bpy.types.Image
         The packed image.
     """
-    old = find_tagged(bpy.data.images, key, role)
-    image = tag(new_texture(key, role, values[::-1], space), key, role)
-    if old is not None:
-        _replace(old, image)
-    return image
+    return _put_in_place(new_texture(key, role, values[::-1], space), key, role)
 
 
 def ensure_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
@@ -143,11 +136,7 @@ def ensure_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
     bpy.types.Image
         The packed image.
     """
-    old = find_tagged(bpy.data.images, key, role)
-    image = tag(new_png_texture(key, role, data), key, role)
-    if old is not None:
-        _replace(old, image)
-    return image
+    return _put_in_place(new_png_texture(key, role, data), key, role)
 
 
 def new_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
@@ -225,8 +214,7 @@ def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.type
 
 def _texture_name(key: str, role: str) -> str:
     """The name of an image, from which exporters make that of its file."""
-    name = TEXTURE_NAMES[role]
-    return f"{datablock_name(key, name)[: -len(name) - 1]}_{name}"
+    return datablock_name(key, TEXTURE_NAMES[role], "_")
 
 
 def ensure_maps(key: str, result: ResultArrays, every: bool = True) -> dict[str, bpy.types.Image]:
@@ -272,9 +260,15 @@ def attach_maps(obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None
             del obj[f"isc_map_{name}"]
 
 
-def _replace(old: bpy.types.Image, new: bpy.types.Image) -> None:
-    """A generated image loses its pixels when resized in place, so it is replaced instead."""
-    name = old.name
-    old.user_remap(new)
-    bpy.data.images.remove(old)
-    new.name = name
+def _put_in_place(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
+    """Tag a new image, which replaces the one of that role everywhere it is used.
+
+    A generated image loses its pixels when resized in place, so it is replaced instead.
+    """
+    old = find_tagged(bpy.data.images, key, role)
+    if old is not None:
+        name = old.name
+        old.user_remap(image)
+        bpy.data.images.remove(old)
+        image.name = name
+    return tag(image, key, role)

@@ -96,7 +96,7 @@ def is_isc_datablock(block: Any) -> bool:
     return block is not None and KEY in block
 
 
-def datablock_name(key: str, suffix: str = "") -> str:
+def datablock_name(key: str, suffix: str = "", before: str = " ") -> str:
     """Return the key and a suffix; a long key is shortened so that the suffix remains.
 
     Parameters
@@ -104,14 +104,16 @@ def datablock_name(key: str, suffix: str = "") -> str:
     key : str
         Name of the photo.
     suffix : str, optional
-        What follows the key after a space; "" for the key alone.
+        What follows the key; "" for the key alone.
+    before : str, optional
+        What stands between them.
 
     Returns
     -------
     str
         Name of at most 63 bytes in UTF-8.
     """
-    end = f" {suffix}" if suffix else ""
+    end = f"{before}{suffix}" if suffix else ""
     room = _NAME_BYTES - len(end.encode())
     return key.encode("utf-8", "replace")[:room].decode("utf-8", "ignore") + end
 

@@ -26,8 +26,6 @@ from isc_core.errors import InputError
 
 from .result_arrays import ARRAYS, ResultArrays, read_result
 
-_CHUNK = 1 << 20
-
 
 @dataclass(frozen=True)
 class ResultCache:
@@ -137,11 +135,8 @@ def content_key(files: Sequence[Path | None], settings: Iterable[object], core: 
 
 
 def _file_digest(path: Path) -> bytes:
-    digest = hashlib.sha256()
     with path.open("rb") as stream:
-        while chunk := stream.read(_CHUNK):
-            digest.update(chunk)
-    return digest.digest()
+        return hashlib.file_digest(stream, "sha256").digest()
 
 
 def _size(folder: Path) -> int:

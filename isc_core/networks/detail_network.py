@@ -9,7 +9,7 @@ Equation: for slopes p, q of a smooth surface under known light, relief r change
 
 Of all slopes that explain a change of log shading d, g d / |g|^2 are the smallest. A convolutional
 network (`encoder_decoder`) sees them (with |g|^2 + .15^2 below), the photo's logarithm without its
-low frequencies, p and q, g, and how much of the object's fine changes is believed to be relief
+low frequencies, p and q, g, and what the object as a whole says of relief
 (`shading.relief_evidence`), and returns the finest band of r: what an image of half the size
 cannot hold,
 

@@ -91,7 +91,7 @@ class ReliefRule:
         return float(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
 
     def belief(self, evidence: Evidence | None) -> float:
-        """Return what the object's fine changes are believed to be.
+        """Return how likely the object's fine changes are relief.
 
         Parameters
         ----------
