@@ -26,6 +26,7 @@ from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_file, require_writable_file
 from ..io.decoders import MIN_SIDE
 from ..io.limits import USUAL, Limits
+from ..io.png import encode_png
 from .masks import check_mask, tidy_mask
 from .reading import read_linear
 
@@ -204,10 +205,7 @@ def encoded_mask(mask: np.ndarray) -> bytes:
     -------
     bytes
     """
-    import cv2
-
-    codes = np.rint(255 * mask.astype(np.float32)).astype(np.uint8)
-    return bytes(cv2.imencode(".png", codes)[1].tobytes())
+    return encode_png(np.rint(255 * mask.astype(np.float32)).astype(np.uint8), compression=1)
 
 
 def check_mask_path(photo_path: str | Path, out_path: str | Path) -> None:
