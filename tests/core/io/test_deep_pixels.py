@@ -80,7 +80,7 @@ def test_a_png_whose_pixels_end_early_is_damaged(tmp_path: Path) -> None:
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_other_programs_read_the_png(channels: int, kind: type, compression: int) -> None:
     cv2 = pytest.importorskip("cv2")
-    stored = samples(12, 9, channels).astype(kind)
+    stored: np.ndarray = samples(12, 9, channels).astype(kind)
     data = encode_png(stored, compression)
     seen = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     order = [2, 1, 0, 3][:channels] if channels > 1 else [0]
@@ -101,7 +101,7 @@ def test_tiff_of_tifffile(
     tifffile = pytest.importorskip("tifffile")
     predicted &= kind == "u2"  # tifffile alone does not write that of floats
     stored = (samples(37, 41, 3) // 2).astype(kind)
-    options = {"tile": (16, 32)} if tiled else {"rowsperstrip": 7}
+    options: dict[str, object] = {"tile": (16, 32)} if tiled else {"rowsperstrip": 7}
     options |= {"compression": packed, "predictor": predicted, "byteorder": order}
     for planar in ("contig", "separate"):
         pixels = stored if planar == "contig" else np.moveaxis(stored, 2, 0).copy()
