@@ -29,9 +29,7 @@ IMAGE_LIBRARIES = {
 EDGES = (
     "io/exr.py",
     "io/decoders/",
-    "photo/masks.py",
     "photo/mask_overlay.py",
-    "photo/grabcut.py",
     "result_files/",
 )
 RENDERERS = {"mitsuba", "drjit"}

@@ -11,8 +11,8 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.io.png import encode_png
 
-from ..files.png import encode_png
 from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.io.png import encode_png
 from isc_core.result_files.exports.targets import PACKED, TARGETS
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 
-from ..files.png import encode_png
 from ..scene.build import BuiltObject
 from ..scene.material_edits import LEVEL_FACTOR, linear_colors, specular_level, surface_node
 

@@ -122,7 +122,6 @@ def install(archive: Path, report: dict[str, Any]) -> None:
     loaded = {name.partition(".")[0] for name in sys.modules} & {
         "scipy",
         "numba",
-        "cv2",
         "OpenEXR",
         "trimesh",
         "PIL",

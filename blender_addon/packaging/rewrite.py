@@ -25,6 +25,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.io.atomic",
         "isc_core.io.json_files",
         "isc_core.io.npy",
+        "isc_core.io.png",
         "isc_core.io.reading_notes",
         "isc_core.photo.camera",
         "isc_core.photo.names",

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from isc_core.errors import InputError
 
-# On macOS, OpenCV's wheels require version 13. On Linux, wheels require glibc 2.28, as Blender.
+# On Linux, wheels require glibc 2.28, as Blender.
 _PIP_PLATFORMS = {
     "linux-x64": (
         "manylinux_2_28_x86_64",

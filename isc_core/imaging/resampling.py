@@ -78,6 +78,32 @@ def resample_inside(
     return (mean if values.ndim == 3 else mean[..., 0]), share
 
 
+def resampled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Resample all of an image, each axis by averages where it shrinks and linearly where it grows.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) float32 ndarray
+    shape : tuple of int
+        (h, w) of the result.
+
+    Returns
+    -------
+    (h, w) or (h, w, C) float32 ndarray
+    """
+    rows, columns = values.shape[:2]
+    down, right = (
+        _weights(old, new).astype(np.float32)
+        for old, new in zip((rows, columns), shape, strict=True)
+    )
+    lines = down @ np.ascontiguousarray(values, np.float32).reshape(rows, -1)
+    planes = lines.reshape(shape[0], columns, -1)
+    result = np.empty((*shape, planes.shape[2]), np.float32)
+    for c in range(planes.shape[2]):
+        result[..., c] = (right @ np.ascontiguousarray(planes[..., c].T)).T
+    return result.reshape(*shape, *values.shape[2:])
+
+
 def resample_height(
     height: np.ndarray, shape: tuple[int, ...], factor: float | None = None
 ) -> np.ndarray:

@@ -27,7 +27,7 @@ _SURE = 0.97  # probability from which the network is trusted, away from the out
 _LIKELY = 0.8  # the same on the middle line of the thing
 _LINE = 5  # pixels: no point of the middle line lies less deep than others as near
 _BAND = 0.03  # of the part's longer side: as far off as the network's outline may be
-_ITERATIONS = 2
+_ITERATIONS = 1
 _EPSILON = 1e-3  # of the guided filter, for sRGB codes in [0, 1]
 
 

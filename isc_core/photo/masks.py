@@ -6,6 +6,7 @@ from scipy.ndimage import label
 from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
+from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import MIN_SIDE, Raster
 from ..io.decoders.raster import as_rgb
@@ -209,8 +210,4 @@ def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
     """
     if values.shape[:2] == (height, width):
         return values
-    import cv2  # takes a while, and most masks have the photo's size
-
-    grows = width > values.shape[1] or height > values.shape[0]
-    how = cv2.INTER_LINEAR if grows else cv2.INTER_AREA
-    return np.asarray(cv2.resize(np.ascontiguousarray(values), (width, height), interpolation=how))
+    return resampled(values, (height, width))

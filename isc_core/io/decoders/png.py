@@ -1,6 +1,5 @@
 """PNG files of 8 and 16 bits per channel, and writing them."""
 
-import errno
 import io
 import struct
 import zlib
@@ -10,23 +9,24 @@ import numpy as np
 from PIL import PngImagePlugin
 
 from ..limits import Limits
+from ..png import encode_png, png_chunk
 from .colour.png_chunks import COLOUR_CHUNKS, profile_chunk, space_of_chunks
 from .exif import with_focal_length
-from .opencv import decode_opencv
 from .pillow import decode_pillow, exif_orientation
+from .png_halves import deep_codes
 from .raster import Raster, as_rgb, check_size, raster_of_codes
 
 # Writers split the pixels into chunks of 4 KiB or more.
 _CHUNKS, _CHUNK_BYTES = 1000, 512
 _HEADER = 33  # bytes of the signature and of IHDR, behind which a profile stands
 _GREY = (0, 4)  # colour types
+_KEPT = (b"IHDR", b"PLTE", b"tRNS", b"eXIf", b"IDAT", b"IEND")
 
 
 def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a PNG.
 
-    16 bits go through OpenCV, because Pillow reduces RGB to 8. The checksum of each chunk is
-    verified first, which decoders skip.
+    The checksum of each chunk is verified first, which decoders skip.
 
     Parameters
     ----------
@@ -51,18 +51,19 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
     space, notes = space_of_chunks(chunks, 1 if kind in _GREY else 3, path)
     if bits == 16:
-        codes, orientation = decode_opencv(plain), exif_orientation(image)
-        raster = raster_of_codes(codes, 65535, orientation, space=space, notes=notes)
+        codes = _with_alpha(deep_codes(data[16:29], chunks[b"IDAT"]), chunks.get(b"tRNS", b""))
+        raster = raster_of_codes(codes, 65535, exif_orientation(image), space=space, notes=notes)
         return with_focal_length(raster, image)
     return decode_pillow(image, path, limits, space=space, notes=notes)
 
 
 def _plain_png(data: bytes) -> tuple[bytes, dict[bytes, bytes]]:
-    """The PNG reduced to pixels, transparency and EXIF, and what its colour chunks hold.
+    """The PNG reduced to pixels, transparency and EXIF, and what its chunks hold, those of pixels
+    as one.
 
     Raises ValueError for a wrong checksum, a missing end, or far more chunks than pixels take.
     """
-    kept, colours, at = [data[:8]], {}, 8
+    kept, pixels, held, at = [data[:8]], list[bytes](), dict[bytes, bytes](), 8
     for _ in range(_CHUNKS + len(data) // _CHUNK_BYTES):
         (length,) = struct.unpack(">I", data[at : at + 4])
         chunk = data[at : at + 12 + length]
@@ -72,14 +73,29 @@ def _plain_png(data: bytes) -> tuple[bytes, dict[bytes, bytes]]:
             or zlib.crc32(chunk[4:-4]) != struct.unpack(">I", chunk[-4:])[0]
         ):
             raise ValueError("a PNG chunk is damaged")
-        if kind in (b"IHDR", b"PLTE", b"tRNS", b"eXIf", b"IDAT", b"IEND"):
+        if kind in _KEPT:
             kept.append(chunk)
-        if kind in COLOUR_CHUNKS:
-            colours[kind] = chunk[8:-4]
+        if kind == b"IDAT":
+            pixels.append(chunk[8:-4])
+        elif kind in _KEPT or kind in COLOUR_CHUNKS:
+            held[kind] = chunk[8:-4]
         if kind == b"IEND":
-            return b"".join(kept), colours
+            return b"".join(kept), held | {b"IDAT": b"".join(pixels)}
         at += 12 + length
     raise ValueError("too many PNG chunks")
+
+
+def _with_alpha(codes: np.ndarray, transparent: bytes) -> np.ndarray:
+    """Codes of 16 bits, where grey with alpha is RGBA, and one transparent colour is alpha.
+
+    One transparent grey stays grey.
+    """
+    if codes.ndim == 3 and codes.shape[2] == 2:
+        return codes[..., [0, 0, 0, 1]]
+    if codes.ndim == 2 or codes.shape[2] == 4 or len(transparent) != 6:
+        return codes
+    alpha = np.where((codes == np.frombuffer(transparent, ">u2")).all(axis=2), 0, 65535)
+    return np.dstack([codes, alpha.astype(np.uint16)])
 
 
 def write_png(path: Path, raster: Raster) -> None:
@@ -97,25 +113,12 @@ def write_png(path: Path, raster: Raster) -> None:
         If the file cannot be written.
     """
     assert raster.peak is not None, "floats have no codes"
-    kind = raster.values.dtype
-    planes = (
-        as_rgb(raster.values)[..., ::-1]
-        if raster.alpha is not None or raster.values.shape[2] == 3
-        else raster.values
-    )
+    kind, planes = raster.values.dtype, raster.values
     if raster.alpha is not None:
-        planes = np.concatenate(
-            [planes, np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)[..., None]],
-            axis=2,
-        )
-    import cv2  # takes a tenth of a second, and is not needed to read
-
-    done, data = cv2.imencode(".png", np.ascontiguousarray(planes))
-    if not done:
-        raise OSError(errno.EIO, "the PNG could not be encoded")
-    written = data.tobytes()
+        alpha = np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)
+        planes = np.dstack([as_rgb(planes), alpha])
+    written = encode_png(planes, compression=1)
     if raster.space is not None and raster.space.profile:
-        chunk = b"iCCP" + profile_chunk(raster.space.profile)
-        framed = struct.pack(">I", len(chunk) - 4) + chunk + struct.pack(">I", zlib.crc32(chunk))
-        written = written[:_HEADER] + framed + written[_HEADER:]
+        chunk = png_chunk(b"iCCP", profile_chunk(raster.space.profile))
+        written = written[:_HEADER] + chunk + written[_HEADER:]
     path.write_bytes(written)

@@ -10,18 +10,19 @@ from ...errors import InputError
 from ..limits import Limits
 from .colour.icc import space_of_profile
 from .exif import with_focal_length
-from .opencv import decode_opencv
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
+from .tiff_samples import sample_type, tiff_samples
 
-# Number and default of BitsPerSample, SamplesPerPixel, PhotometricInterpretation, SampleFormat,
-# ExtraSamples.
-_TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
+# Number and default of BitsPerSample, SamplesPerPixel, PhotometricInterpretation, ExtraSamples and
+# Orientation.
+_TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (338, 0), (274, 1))
 _PROFILE = 34675
+_GREY_OR_RGB = {1: (1,), 2: (3, 4)}  # samples by PhotometricInterpretation
 
 
 def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a TIFF: 8 bits by Pillow, others by OpenCV, which apply the orientation.
+    """Decode a TIFF.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
     stream.seek(tags.next)
     tags.load(stream)
     check_size(path, limits, int(tags[256]), int(tags[257]))
-    bits, samples, photometric, stores, extra = (
+    bits, samples, photometric, extra, orientation = (
         int(np.ravel(tags.get(tag, n))[0]) for tag, n in _TIFF_TAGS
     )
     if photometric == 5:
@@ -58,23 +59,17 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         return decode_pillow(
             TiffImagePlugin.TiffImageFile(io.BytesIO(data)), path, limits, oriented=True
         )
-    pixels = decode_opencv(data)
-    fits = (pixels.dtype == np.uint16 and stores == 1 and bits == 16) or pixels.dtype.kind == "f"
-    if (
-        not fits
-        or photometric not in (1, 2, 32844, 32845)
-        or samples != (pixels.shape[2] if pixels.ndim == 3 else 1)
-    ):
+    if sample_type(tags) is None or samples not in _GREY_OR_RGB.get(photometric, ()):
         raise InputError(
             f"{path}: a TIFF with {samples} channels of {bits} bits of this kind is not "
             "supported: save it as a 16-bit RGB PNG"
         )
-    if pixels.dtype.kind == "f":
-        pixels = pixels.astype(np.float32)
+    pixels = tiff_samples(data, tags)
+    pixels = pixels.astype(np.float32 if pixels.dtype.kind == "f" else np.uint16, copy=False)
     space, notes = (
-        space_of_profile(bytes(tags[_PROFILE]), 1 if pixels.ndim == 2 else 3)
+        space_of_profile(bytes(tags[_PROFILE]), 1 if samples == 1 else 3)
         if _PROFILE in tags
         else (None, ())
     )
-    raster = raster_of_codes(pixels, 65535, premultiplied=extra == 1, space=space, notes=notes)
+    raster = raster_of_codes(pixels, 65535, orientation, extra == 1, space, notes)
     return with_focal_length(raster, data)

@@ -7,6 +7,7 @@ from isc_core.imaging.resampling import (
     nearest_samples,
     resample_height,
     resample_inside,
+    resampled,
     resampled_shape,
 )
 
@@ -114,3 +115,20 @@ def test_there_and_back() -> None:
     height = 10 * np.sin(i / 11) * np.cos(j / 13)
     back = resample_height(resample_height(height, (120, 128)), (60, 64))
     np.testing.assert_allclose(back[4:-4, 4:-4], height[4:-4, 4:-4], atol=0.02)
+
+
+@pytest.mark.parametrize("shape", [(7, 9), (40, 51), (13, 40)])
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_a_whole_image_has_the_values_of_another_program(
+    shape: tuple[int, int], channels: tuple[int, ...]
+) -> None:
+    cv2 = pytest.importorskip("cv2")
+    values = np.random.default_rng(0).random((20, 26, *channels), np.float32)
+    out = resampled(values, shape)
+    assert out.shape == (*shape, *channels) and out.dtype == np.float32
+    assert out.mean() == pytest.approx(values.mean(), abs=0.02)
+    if shape != (13, 40):  # the other program does not average where only one axis shrinks
+        how = cv2.INTER_AREA if shape[0] < 20 else cv2.INTER_LINEAR
+        np.testing.assert_allclose(
+            out, cv2.resize(values, shape[::-1], interpolation=how), atol=1e-6
+        )

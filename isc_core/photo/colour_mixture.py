@@ -1,0 +1,140 @@
+"""Gaussian mixtures of colours.
+
+Equation: the density of a colour z is sum_k w_k N(z; m_k, C_k). Colours are sorted into components
+by splitting: the component whose colours spread most along one axis is cut in two at its mean,
+across that axis, until there are enough. Later each colour goes to the component under which it is
+most likely.
+
+Citation: M. Orchard, C. Bouman, "Color quantization of images", IEEE Transactions on Signal
+Processing 39 (1991), doi:10.1109/78.107417.
+
+Limits: colours are sorted hard, not by shares, as in GrabCut.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+COMPONENTS = 5
+_NOISE = 0.1  # added to the variances of codes, so that plain colours have some
+_TINY = 1e-12
+
+
+@dataclass(frozen=True)
+class ColourMixture:
+    """A mixture of K Gaussians.
+
+    Attributes
+    ----------
+    shares : (K,) ndarray
+        Sum to 1; 0 for a component without colours.
+    means : (K, 3) ndarray
+    roots : (K, 3, 3) ndarray
+        Lower triangular; root @ root.T is the inverse of a covariance.
+    """
+
+    shares: np.ndarray
+    means: np.ndarray
+    roots: np.ndarray
+
+    @staticmethod
+    def fitted(colours: np.ndarray, owners: np.ndarray) -> "ColourMixture":
+        """Fit components to colours.
+
+        Parameters
+        ----------
+        colours : (N, 3) ndarray
+            N > 0.
+        owners : (N,) int ndarray
+            Component of each, below `COMPONENTS`.
+
+        Returns
+        -------
+        ColourMixture
+        """
+        moments = [_moments(colours, owners, k) for k in range(COMPONENTS)]
+        counts, means, covariances = (np.stack(parts) for parts in zip(*moments, strict=True))
+        inverse = np.linalg.inv(covariances + _NOISE * np.eye(3))
+        return ColourMixture(counts / counts.sum(), means, np.linalg.cholesky(inverse))
+
+    def costs(self, colours: np.ndarray) -> np.ndarray:
+        """Return the negative logarithms of w_k N(z; m_k, C_k), but for a constant.
+
+        Parameters
+        ----------
+        colours : (N, 3) ndarray
+
+        Returns
+        -------
+        (K, N) ndarray
+        """
+        result = np.empty((len(self.means), len(colours)))
+        for k, (mean, root) in enumerate(zip(self.means, self.roots, strict=True)):
+            x, y, z = (colours[:, c] - mean[c] for c in range(3))
+            scaled = [x * root[0, j] + y * root[1, j] + z * root[2, j] for j in range(3)]
+            constant = np.log(max(self.shares[k], _TINY)) + np.log(np.diag(root)).sum()
+            result[k] = 0.5 * (scaled[0] ** 2 + scaled[1] ** 2 + scaled[2] ** 2) - constant
+        return result
+
+    def cost(self, colours: np.ndarray) -> np.ndarray:
+        """Return the negative logarithms of the densities, but for a constant.
+
+        Parameters
+        ----------
+        colours : (N, 3) ndarray
+
+        Returns
+        -------
+        (N,) ndarray
+        """
+        each = self.costs(colours)
+        least = each.min(axis=0)
+        lowest: np.ndarray = least - np.log(np.exp(least - each).sum(axis=0))
+        return lowest
+
+
+def split_colours(colours: np.ndarray) -> np.ndarray:
+    """Sort colours into components.
+
+    Parameters
+    ----------
+    colours : (N, 3) ndarray
+        N > 0.
+
+    Returns
+    -------
+    (N,) int ndarray
+        Component of each.
+    """
+    owners = np.zeros(len(colours), int)
+    axes = [_axis(colours, owners, 0)]
+    for new in range(1, COMPONENTS):
+        widest = int(np.argmax([spread for spread, _, _ in axes]))
+        _, axis, mean = axes[widest]
+        beyond = sum((colours[:, c] - mean[c]) * axis[c] for c in range(3)) > 0
+        owners[(owners == widest) & beyond] = new
+        axes[widest] = _axis(colours, owners, widest)
+        axes.append(_axis(colours, owners, new))
+    return owners
+
+
+def _axis(
+    colours: np.ndarray, owners: np.ndarray, component: int
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Sum of squares along the longest axis of a component, this axis, and its mean."""
+    count, mean, covariance = _moments(colours, owners, component)
+    values, vectors = np.linalg.eigh(covariance)
+    return count * float(values[-1]), vectors[:, -1], mean
+
+
+def _moments(
+    colours: np.ndarray, owners: np.ndarray, component: int
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Count, mean and covariance of a component's colours, summed in one order."""
+    chosen = colours[owners == component]
+    if not len(chosen):
+        return 0, np.zeros(3), np.eye(3)
+    mean = chosen.mean(axis=0)
+    apart = chosen - mean
+    products = [(apart[:, a] * apart[:, b]).mean() for a in range(3) for b in range(3)]
+    return len(chosen), mean, np.reshape(products, (3, 3))
