@@ -23,7 +23,18 @@ ERRORS = ("shading", "reflectance")
 
 
 def errors_of(scene: RefinementScene, d: Decomposition) -> tuple[float, ...]:
-    """Return the errors of a result of a scene, by `ERRORS`."""
+    """Return the errors of a result of a scene.
+
+    Parameters
+    ----------
+    scene : RefinementScene
+    d : Decomposition
+
+    Returns
+    -------
+    tuple of float
+        By `ERRORS`.
+    """
     mask = scene.truth["mask"]
     return tuple(scaled_mse(scene.truth[name][mask], getattr(d, name)[mask]) for name in ERRORS)
 

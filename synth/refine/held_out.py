@@ -47,7 +47,18 @@ def held_out_blocks(mask: np.ndarray, seed: int) -> np.ndarray:
 
 
 def fitted_weight(mask: np.ndarray, blocks: np.ndarray) -> np.ndarray:
-    """Return weights (H, W): 1 for pixels of the mask that are not held out, else 0."""
+    """Return 1 for pixels of the mask that are not held out, else 0.
+
+    Parameters
+    ----------
+    mask : (H, W) ndarray of bool
+    blocks : (B, 2) ndarray of int
+        Of `held_out_blocks`.
+
+    Returns
+    -------
+    (H, W) ndarray of float64
+    """
     weight = mask.astype(float)
     for row, column in blocks:
         weight[row : row + BLOCK, column : column + BLOCK] = 0

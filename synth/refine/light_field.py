@@ -36,7 +36,17 @@ class LightField:
 
     @staticmethod
     def around(start: np.ndarray) -> "LightField":
-        """Return the environments near `start`, a (rows, 2 rows, 3) ndarray above 0."""
+        """Return the environments near a given one.
+
+        Parameters
+        ----------
+        start : (rows, 2 rows, 3) ndarray
+            Radiance, > 0.
+
+        Returns
+        -------
+        LightField
+        """
         towards = directions(len(start)).reshape(-1, 3)
         near = np.einsum("jk,bk->jb", towards, sphere_directions(_BUMPS)) - 1
         bumps = np.exp(_CONCENTRATION * near)
@@ -49,12 +59,32 @@ class LightField:
         return self.bumps.shape[1] + 3
 
     def radiance(self, unknowns: np.ndarray) -> np.ndarray:
-        """Return the environment (J, 3) of unknowns (size,)."""
+        """Return the environment of some unknowns.
+
+        Parameters
+        ----------
+        unknowns : (size,) ndarray
+
+        Returns
+        -------
+        (J, 3) ndarray
+        """
         change = np.einsum("jb,b->j", self.bumps, unknowns[:-3])
         return np.exp(self.log_start + change[:, None] + _TINT * unknowns[-3:])
 
     def adjoint(self, radiance: np.ndarray, gradient: np.ndarray) -> np.ndarray:
-        """Return the gradient (size,) of the unknowns from that of the radiance, both (J, 3)."""
+        """Return the gradient of the unknowns from that of the radiance.
+
+        Parameters
+        ----------
+        radiance : (J, 3) ndarray
+            Of the unknowns.
+        gradient : (J, 3) ndarray
+
+        Returns
+        -------
+        (size,) ndarray
+        """
         along = radiance * gradient
         return np.concatenate(
             [np.einsum("jb,j->b", self.bumps, along.sum(axis=1)), _TINT * along.sum(axis=0)]

@@ -39,13 +39,36 @@ class ReflectanceTerms:
     weights: Weights
 
     def log_reflectance(self, shading: np.ndarray) -> np.ndarray:
-        """Return log reflectance (H, W, 3) for the shading (N, 3) of the mask's pixels."""
+        """Return the log reflectance under a shading.
+
+        Parameters
+        ----------
+        shading : (N, 3) ndarray
+            Of the mask's pixels, > 0.
+
+        Returns
+        -------
+        (H, W, 3) ndarray
+        """
         result = np.zeros(self.log_diffuse.shape)
         result[self.mask] = self.log_diffuse[self.mask] - np.log(shading)
         return result
 
     def cost(self, shading: np.ndarray, pixel_weight: np.ndarray) -> tuple[float, np.ndarray]:
-        """Return g, and its gradient (N, 3) by the shading, for weights (H, W) of the pixels."""
+        """Compute g.
+
+        Parameters
+        ----------
+        shading : (N, 3) ndarray
+            Of the mask's pixels, > 0.
+        pixel_weight : (H, W) ndarray
+
+        Returns
+        -------
+        cost : float
+        gradient : (N, 3) ndarray
+            With respect to the shading.
+        """
         values = self.log_reflectance(shading)
         smooth, pull = smoothness_cost(values, pixel_weight, self.priors, self.weights.smoothness)
         parsimony, absolute, more = palette_cost(values, pixel_weight, self.priors, self.weights)
@@ -91,6 +114,15 @@ def shading_of(transport: np.ndarray, radiance: np.ndarray) -> np.ndarray:
     """Return the shading (N, 3) under an environment (J, 3), at least a thousandth of its mean.
 
     Sums are in a fixed order, so that the same input gives the same bytes on any number of threads.
+
+    Parameters
+    ----------
+    transport : (N, J) ndarray
+    radiance : (J, 3) ndarray
+
+    Returns
+    -------
+    (N, 3) ndarray
     """
     shading = np.einsum("nj,jc->nc", transport, radiance)
     return np.maximum(shading, 1e-3 * shading.mean())

@@ -115,7 +115,7 @@ def command(words: list[str]) -> list[str]:
     """Run `isc refine`, whether or not its entry point is installed."""
     parser = argparse.ArgumentParser()
     command_module.declare(parser)
-    options = parser.parse_args(words)
+    options = parser.parse_args(words, argparse.Namespace(quiet=False))
     return command_module.run(options, Monitor())
 
 
