@@ -173,10 +173,14 @@ def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     from ..shading.environment_map import environment_from_shading
 
     mesh_light, sun = built.illumination(d.illumination), explain_shading(d)
+    if d.environment is None:
+        sky = environment_from_shading(mesh_light, viewer=d.viewer)
+    else:
+        sky = d.environment / built.reflectance_scale
     return {
         "illumination": d.illumination,
         "mesh_illumination": mesh_light,
-        "sky": environment_from_shading(mesh_light, viewer=d.viewer),
+        "sky": sky,
         "sun_direction": sun.light.direction,
         "sun_strength": sun.light.irradiance / built.reflectance_scale,
         "sun_ambient": sun.light.ambient / built.reflectance_scale,

@@ -4,7 +4,8 @@ A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomp
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
 that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
 mask was found in the photo. With a fitted lobe, `maps.exr` has one more layer, `lobe`: the specular
-image that the fit predicts; where errors can be expected, `expected_error` has them. A separation's
+image that the fit predicts; where errors can be expected, `expected_error` has them. A refined
+result has one more layer, `visibility`, and its light as `environment.exr`. A separation's
 folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
 completely or not at all (see `io.atomic`).
 """
@@ -48,6 +49,7 @@ LAYERS = {
     "confidence": "Y",
 }
 LOBE = {"lobe": "RGB"}
+VISIBILITY = {"visibility": "RGB"}
 EXPECTED_ERROR = ("expected_error.normal", "expected_error.reflectance")
 SINGLE = {
     "diffuse": "RGB",
@@ -65,10 +67,12 @@ DECOMPOSITION_FILES = (
     *(f"maps/{name}.exr" for name in SINGLE),
 )
 MASK = "mask.png"
+ENVIRONMENT = "environment.exr"
 _RESULT_FILES = (
     *DECOMPOSITION_FILES,
     ARRAYS,
     MASK,
+    ENVIRONMENT,
     *LAYER_PNGS,
 )  # including files written on demand
 _PREVIEW_COMPRESSION = 2  # of 9: a third of the time of the usual 6 for 16 % more bytes
@@ -121,6 +125,8 @@ def save(
         channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
     if (error := decomposition.expected_error) is not None:
         channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
+    if decomposition.visibility is not None:
+        channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
     if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     # The pool inside the folder: the preview is done, or has failed, before the folder is removed.
@@ -128,6 +134,9 @@ def save(
         monitor.report("writing maps", 0.0)
         preview = pool.submit(_write_preview, decomposition, partial / "preview.png")
         write_channels(partial / "maps.exr", channels)
+        if decomposition.environment is not None:
+            planes = _planes(decomposition.environment, list("RGB"))
+            write_channels(partial / ENVIRONMENT, planes)
         (partial / "maps").mkdir()
         for name, letters in SINGLE.items():
             values = getattr(decomposition, name)
@@ -192,6 +201,8 @@ def load(folder: Path | str) -> Decomposition:
         brdf=_brdf(description, channels, folder),
         expected_error=_expected_error(channels, folder / "maps.exr"),
         camera=_camera(description, folder),
+        visibility=_visibility(channels, folder / "maps.exr"),
+        environment=_environment(folder / ENVIRONMENT),
     )
 
 
@@ -422,6 +433,25 @@ def _expected_error(channels: Mapping[str, np.ndarray], path: Path) -> ExpectedE
         return None
     maps = _layers(channels, dict.fromkeys(EXPECTED_ERROR, ""), path)
     return ExpectedError(*(maps[name] for name in EXPECTED_ERROR))
+
+
+def _visibility(channels: Mapping[str, np.ndarray], path: Path) -> np.ndarray | None:
+    """None where nothing was refined."""
+    if "visibility.R" not in channels:
+        return None
+    return np.asarray(_layers(channels, VISIBILITY, path)["visibility"])
+
+
+def _environment(path: Path) -> np.ndarray | None:
+    """The light as an image; None where nothing was refined."""
+    if not path.is_file():
+        return None
+    channels = read_channels(path)
+    missing = [name for name in "RGB" if name not in channels]
+    radiance = None if missing else np.stack([channels[name] for name in "RGB"], -1)
+    if radiance is None or radiance.shape[1] != 2 * len(radiance) or not (radiance >= 0).all():
+        raise InputError(f"{path} is no environment map: it is damaged; refine the result again")
+    return radiance
 
 
 def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:

@@ -2,7 +2,8 @@
 
 Inside the mask `image = diffuse + specular + residual`, `diffuse = reflectance * shading` (both to
 1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), and normals have unit
-length. `result_files.result_folder` writes and reads their files.
+length. With a `visibility`, as after `isc refine`, `shading = exp(SH(normal)) * visibility`.
+`result_files.result_folder` writes and reads their files.
 """
 
 from dataclasses import dataclass, field
@@ -91,7 +92,7 @@ class IdentityErrors:
         tests = (
             (self.image, 1e-5, "image = diffuse + specular + residual"),
             (self.shading_product, 1e-5, "diffuse = reflectance * shading"),
-            (self.sh, 1e-4, "shading = exp(SH(normal))"),
+            (self.sh, 1e-4, "shading = exp(SH(normal)) * visibility"),
             (self.normal_length, 1e-4, "normals of length 1"),
         )
         return tuple(
@@ -130,6 +131,12 @@ class Decomposition:
         How wrong normals and reflectance probably are; None where it is not known.
     camera : Camera or None
         Pinhole camera of the maps; None for an orthographic view.
+    visibility : (H, W, 3) ndarray of float32 or None
+        Shading over exp(SH(normal)): cast shadows, and what no such light can say; > 0, may exceed
+        1; 1 outside the mask. None: 1 everywhere.
+    environment : (rows, 2 rows, 3) ndarray of float32 or None
+        Radiance of the light, see `shading.environment_map`; None where only the coefficients are
+        known.
     """
 
     image: np.ndarray
@@ -147,6 +154,8 @@ class Decomposition:
     brdf: LobeFit | None = None
     expected_error: ExpectedError | None = None
     camera: Camera | None = None
+    visibility: np.ndarray | None = None
+    environment: np.ndarray | None = None
 
     @property
     def view(self) -> np.ndarray:
@@ -188,6 +197,8 @@ class Decomposition:
         layers = inside["diffuse"] + inside["specular"] + inside["residual"]
         with np.errstate(over="ignore"):  # an absurd light: then the identity is violated anyway
             expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
+            if self.visibility is not None:
+                expected = expected * self.visibility[self.mask]
         return IdentityErrors(
             image=_worst(inside["image"] - layers) / scale,
             shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"])

@@ -10,3 +10,6 @@ SYNTH = CommandEntry(
 VALIDATE = CommandEntry(
     "validate", "measure every stage on rendered scenes", f"{__name__}.validate", "synth"
 )
+REFINE = CommandEntry(
+    "refine", "another light for a result, with cast shadows", f"{__name__}.refine", "synth"
+)

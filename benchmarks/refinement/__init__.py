@@ -1,0 +1,1 @@
+"""Measurements of `isc refine` on rendered scenes that no fit has seen."""

@@ -1,0 +1,156 @@
+"""Rendered scenes for the refinement: truth, the result that the refinement starts from, and the
+truth under a new light.
+
+Scene k has its own object, albedo, GGX lobe and light, drawn from (`SEED`, k). Of three scenes, two
+have one or two lamps that cast shadows (directional, point or small panel) and one has smooth
+light. Objects are those of `synth.shapes` with parts that shade each other, and some that have
+none. FOLDER keeps what was rendered and decomposed.
+
+Scenes below `CHOSEN_ON` were used to choose constants; those from there on are for reports.
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.decomposition.pipeline import decompose
+from isc_core.photo import Photo, PhotoSource
+from isc_core.result_files.result_folder import load, save
+from isc_core.scene.decomposition import Decomposition
+from synth.albedos import make_albedo
+from synth.capture.recipe import camera_around
+from synth.capture.truth import GroundTruth, exposed, render_truth
+from synth.light_rigs import make_lights
+from synth.light_rigs.placing import ambient, places, toward, white
+from synth.rendering import RenderOptions
+from synth.scene import Scene
+from synth.scene.lights import DirectionalLight, Light, panel_toward_origin
+from synth.scene.materials import Material
+from synth.shapes import make_shape
+
+SEED, CHOSEN_ON = 29, 100
+LAMPS, SMOOTH = ("directional", "small", "point"), "sh"
+_SHAPES = ("displaced", "blobby", "lathe", "extruded", "height_field")
+_ALBEDOS = ("patches", "print", "uniform", "noise")
+_ALPHAS = (0.08, 0.4)
+_SAMPLES, _LEVEL, _BEAM = 64, 0.6, 12.0
+
+
+@dataclass(frozen=True)
+class RefinementScene:
+    """A rendered scene.
+
+    Attributes
+    ----------
+    number : int
+        Number of the scene.
+    light : str
+        Kind of light, one of `LAMPS` or `SMOOTH`.
+    truth : dict of str to ndarray
+        True maps by name; `lamp` (3,), the direction of the strongest lamp, or zeros; `alpha` and
+        `strength` of the lobe; `new_image`, the object under `new_lamp` (3,) and `new_ambient`.
+    start : Decomposition
+        What the refinement starts from.
+    folder : Path
+        Its result folder.
+    """
+
+    number: int
+    light: str
+    truth: dict[str, np.ndarray]
+    start: Decomposition
+    folder: Path
+
+
+def scene_of(folder: Path, number: int, size: int) -> RefinementScene:
+    """Read a scene; render and decompose it if it is missing.
+
+    Parameters
+    ----------
+    folder : Path
+        Where scenes are kept.
+    number : int
+        Number of the scene.
+    size : int
+        Side of the image in pixels.
+
+    Returns
+    -------
+    RefinementScene
+        The scene.
+    """
+    place = folder / f"scene{number:04d}_{size}"
+    truth = place / "truth.npz"
+    if not truth.exists():
+        place.mkdir(parents=True, exist_ok=True)
+        maps = _rendered(number, size)
+        save(decompose(_photo(maps, size), name=place.name), place / "start")
+        np.savez(truth, **maps)
+    with np.load(truth, allow_pickle=False) as stored:
+        maps = {name: stored[name] for name in stored.files}
+    start = place / "start"
+    return RefinementScene(number, str(maps["light"]), maps, load(start), start)
+
+
+def _photo(maps: dict[str, np.ndarray], size: int) -> Photo:
+    mask = maps["mask"]
+    source = PhotoSource("", (size, size), 32, "linear", "file")
+    return Photo(np.maximum(maps["image"], 0), mask, 1e-4, np.zeros_like(mask), source)
+
+
+def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng([SEED, number])
+    kind = SMOOTH if number % 3 == 2 else LAMPS[(number // 3 + number % 3) % len(LAMPS)]
+    mesh = make_shape(_SHAPES[number % len(_SHAPES)], rng)
+    low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
+    mesh = replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
+    alpha = float(np.exp(rng.uniform(*np.log(_ALPHAS))))
+    strength = float(rng.uniform(0.6, 1.5))
+    albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)
+    material = Material(albedo, "ggx", alpha, strength)
+    lights, lamp = _lights(kind, rng)
+    scene = Scene(mesh, material, lights, camera_around(mesh, size, 0.88))
+    options = RenderOptions(_SAMPLES, number)
+    scene, truth = exposed(scene, render_truth(scene, options), _LEVEL)
+    new_lamp = toward(rng.uniform(25, 60), rng.uniform(-180, 180))
+    beam = DirectionalLight(new_lamp, np.full(3, np.pi))
+    around = ambient(rng, 0.2, 0.2)
+    _, new = exposed(scene, render_truth(replace(scene, lights=(beam, around)), options), _LEVEL)
+    return _arrays(truth) | {
+        "light": np.array(kind),
+        "lamp": lamp,
+        "alpha": np.array(alpha),
+        "strength": np.array(strength),
+        "new_image": new.image,
+        "new_environment": new.environment,
+        "new_lamp": new_lamp,
+    }
+
+
+def _arrays(truth: GroundTruth) -> dict[str, np.ndarray]:
+    names = ("image", "diffuse", "reflectance", "shading", "normal", "height", "mask")
+    maps = {name: getattr(truth, name) for name in (*names, "environment", "illumination")}
+    return maps | {"specular": np.maximum(truth.specular, 0)}
+
+
+def _lights(kind: str, rng: np.random.Generator) -> tuple[tuple[Light, ...], np.ndarray]:
+    """The lights, and the direction (3,) of the strongest lamp; zeros for smooth light."""
+    if kind == SMOOTH:
+        return make_lights(kind, rng), np.zeros(3)
+    fill = ambient(rng, 0.1, 0.35)
+    if kind == "small":
+        place, _ = places(rng)[0]
+        panel = panel_toward_origin(
+            tuple(_BEAM * place), (2.0, 2.0), tuple(np.pi * _BEAM**2 / 4 * white(rng))
+        )
+        return (panel, fill), place
+    lamps = tuple(light for light in make_lights(kind, rng) if not _is_ambient(light))
+    strongest = lamps[0]
+    where = getattr(strongest, "direction", None)
+    where = getattr(strongest, "position", None) if where is None else where
+    return (*lamps, fill), np.asarray(where) / np.linalg.norm(np.asarray(where))
+
+
+def _is_ambient(light: Light) -> bool:
+    return hasattr(light, "radiance") and not hasattr(light, "centre")

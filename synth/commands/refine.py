@@ -1,0 +1,99 @@
+"""`isc refine`: the light of a result refined by rendering."""
+
+import argparse
+import hashlib
+import os
+from pathlib import Path
+
+from isc_core.cli.interface.parser import describe, hints
+from isc_core.cli.interface.values import count
+from isc_core.errors import InputError
+from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Decomposition
+
+_EXAMPLES = """  isc refine cup -o cup_refined
+  isc refine cup --photo cup.jpg -o cup_refined"""
+
+
+def declare(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the command.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    """
+    describe(
+        parser,
+        run,
+        "Fits an environment to a result whose shadows the recovered shape casts, traced by "
+        "Mitsuba. The result keeps its shape, layers and lobe; shading, reflectance and light "
+        "change only if pixels that the fit has not seen are explained better.",
+        examples=_EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder written by isc decompose"
+    )
+    parser.add_argument(
+        "--photo", type=Path, metavar="PHOTO", help="check that RESULT is of this photo"
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="output folder"
+    )
+    parser.add_argument(
+        "--seed", type=count, default=0, metavar="S", help="of the held-out pixels (default: 0)"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Run the command; inputs are checked before the work begins.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If the result or the photo cannot be used, or the output cannot be written.
+    Cancelled
+        If the user cancels.
+    """
+    from isc_core.result_files.result_folder import load, require_writable_result, save
+
+    from ..refine.refine import RefineOptions, refine
+    from ..scene.variant import load_mitsuba
+
+    load_mitsuba()
+    if os.path.realpath(options.output) == os.path.realpath(options.result):
+        raise InputError("the refined result cannot replace its start: choose another folder")
+    require_writable_result(options.output, inputs=(options.photo,))
+    start = load(options.result)
+    if options.photo is not None:
+        _require_same(options.photo, start)
+    done = refine(start, RefineOptions(seed=options.seed), monitor.part(0, 0.9))
+    save(done.result, options.output, monitor=monitor.part(0.9, 1.0))
+    outcome = (
+        f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
+        if done.kept
+        else "the start stays: a new light does not explain held-out pixels better"
+    )
+    return [outcome, *hints(options, f"wrote {options.output}")]
+
+
+def _require_same(photo: Path, start: Decomposition) -> None:
+    recorded = str(start.provenance.input.get("sha256", ""))
+    try:
+        found = hashlib.sha256(photo.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"cannot read the photo {photo}: {error.strerror}") from error
+    if not recorded:
+        raise InputError("the result has no checksum of its photo: leave out --photo")
+    if found != recorded:
+        raise InputError(f"the result is not of {photo} (another checksum): give its own photo")

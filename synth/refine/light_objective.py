@@ -1,0 +1,128 @@
+"""The objective of the light: probable reflectance, and a light near the start.
+
+Equation: f(x) = g(log D - log T E(x)) + r / 2 |x|^2, g the smoothness, parsimony and absolute terms
+of SIRFS. df/dE = -T' (dg/dA / S).
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: the diffuse image is taken as exact.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from isc_core.sirfs.priors.priors import Priors
+from isc_core.sirfs.reflectance import palette_cost, smoothness_cost
+from isc_core.sirfs.settings import Weights
+
+from .light_field import LightField
+
+
+@dataclass(frozen=True)
+class ReflectanceTerms:
+    """The terms g of a diffuse image.
+
+    Attributes
+    ----------
+    log_diffuse : (H, W, 3) ndarray
+        0 outside the mask.
+    mask : (H, W) ndarray of bool
+    priors : Priors
+        For three channels.
+    weights : Weights
+    """
+
+    log_diffuse: np.ndarray
+    mask: np.ndarray
+    priors: Priors
+    weights: Weights
+
+    def log_reflectance(self, shading: np.ndarray) -> np.ndarray:
+        """Return the log reflectance under a shading.
+
+        Parameters
+        ----------
+        shading : (N, 3) ndarray
+            Of the mask's pixels, > 0.
+
+        Returns
+        -------
+        (H, W, 3) ndarray
+        """
+        result = np.zeros(self.log_diffuse.shape)
+        result[self.mask] = self.log_diffuse[self.mask] - np.log(shading)
+        return result
+
+    def cost(self, shading: np.ndarray, pixel_weight: np.ndarray) -> tuple[float, np.ndarray]:
+        """Compute g.
+
+        Parameters
+        ----------
+        shading : (N, 3) ndarray
+            Of the mask's pixels, > 0.
+        pixel_weight : (H, W) ndarray
+
+        Returns
+        -------
+        cost : float
+        gradient : (N, 3) ndarray
+            With respect to the shading.
+        """
+        values = self.log_reflectance(shading)
+        smooth, pull = smoothness_cost(values, pixel_weight, self.priors, self.weights.smoothness)
+        parsimony, absolute, more = palette_cost(values, pixel_weight, self.priors, self.weights)
+        return smooth + parsimony + absolute, -(pull + more)[self.mask] / shading
+
+
+class LightObjective:
+    """f as a function for `isc_core.numerics.lbfgs`: ``(x, gradient_out) -> loss``.
+
+    Parameters
+    ----------
+    terms : ReflectanceTerms
+    field : LightField
+    transport : (N, J) ndarray
+        T.
+    pixel_weight : (H, W) ndarray
+        0 for pixels that are held out.
+    strictness : float
+        r, > 0.
+    """
+
+    def __init__(
+        self,
+        terms: ReflectanceTerms,
+        field: LightField,
+        transport: np.ndarray,
+        pixel_weight: np.ndarray,
+        strictness: float,
+    ) -> None:
+        self._terms, self._field, self._strictness = terms, field, strictness
+        self._transport, self._pixel_weight = transport, pixel_weight
+
+    def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
+        radiance = self._field.radiance(x)
+        shading = shading_of(self._transport, radiance)
+        cost, pull = self._terms.cost(shading, self._pixel_weight)
+        to_radiance = np.einsum("nj,nc->jc", self._transport, pull)
+        gradient[:] = self._field.adjoint(radiance, to_radiance) + self._strictness * x
+        return cost + self._strictness / 2 * float(np.square(x).sum())
+
+
+def shading_of(transport: np.ndarray, radiance: np.ndarray) -> np.ndarray:
+    """Return the shading (N, 3) under an environment (J, 3), at least a thousandth of its mean.
+
+    Sums are in a fixed order, so that the same input gives the same bytes on any number of threads.
+
+    Parameters
+    ----------
+    transport : (N, J) ndarray
+    radiance : (J, 3) ndarray
+
+    Returns
+    -------
+    (N, 3) ndarray
+    """
+    shading = np.einsum("nj,jc->nc", transport, radiance)
+    return np.maximum(shading, 1e-3 * shading.mean())

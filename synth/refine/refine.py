@@ -1,0 +1,191 @@
+"""`refine`: a result with a light whose shadows its own shape casts, or as it was.
+
+Equation: see the package. With the new shading S = T E, the light of the result is the best fit L
+of log shading without shadows, visibility = S / exp(SH(normal; L)), and reflectance = diffuse / S,
+so that every identity of a result holds.
+
+Limits: see the package.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from isc_core.decomposition.shape import exposure_normalisation, tempered
+from isc_core.errors import InputError
+from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
+from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.environment_map import environment_from_shading
+from isc_core.shading.spherical_harmonics import real_sh
+from isc_core.sirfs.priors.prior_file import shipped_priors
+from isc_core.sirfs.settings import isc_weights
+
+from ..capture.truth import fit_light
+from .held_out import explains_better, fitted_weight, held_out_blocks
+from .light_field import LightField
+from .light_objective import LightObjective, ReflectanceTerms, shading_of
+from .transport import Transport, light_transport
+
+_DARKEST = 1e-4  # of the diffuse image, white being 1
+_LIKELY = ("photo", "natural", "laboratory")
+
+
+@dataclass(frozen=True)
+class RefineOptions:
+    """Options of a refinement.
+
+    Attributes
+    ----------
+    rows : int
+        Of the environment, which is twice as wide; 8 to 32.
+    strictness : float
+        Weight r of the change of the light, > 0.
+    steps : int
+        At most so many steps of the optimiser, > 0.
+    seed : int
+        Of the choice of the held-out blocks.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
+    """
+
+    rows: int = 16
+    strictness: float = 0.5
+    steps: int = 60
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 8 <= self.rows <= 32 or not self.strictness > 0 or self.steps < 1 or self.seed < 0:
+            raise InputError(
+                "rows has to be 8 to 32, strictness above 0, steps at least 1, seed at least 0"
+            )
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """The outcome of a refinement.
+
+    Attributes
+    ----------
+    result : Decomposition
+        Refined, or the start.
+    kept : bool
+        Whether it is refined.
+    before, after : float
+        The objective.
+    """
+
+    result: Decomposition
+    kept: bool
+    before: float
+    after: float
+
+
+def refine(
+    d: Decomposition, options: RefineOptions | None = None, monitor: Monitor | None = None
+) -> Refinement:
+    """Refine the light of a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+    options : RefineOptions, optional
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    Refinement
+        `kept` is False, and the result the start but for a note in its settings, where the
+        objective did not fall or held-out pixels are not explained better.
+
+    Raises
+    ------
+    InputError
+        If the result is refined already, its light is zero, or Mitsuba is missing.
+    Cancelled
+        If the user cancels.
+    """
+    options, monitor = options or RefineOptions(), monitor or Monitor()
+    _check(d)
+    transport = light_transport(d, options.rows, monitor.part(0, 0.3))
+    start = environment_from_shading(d.illumination, options.rows, viewer=d.viewer)
+    field = LightField.around(np.maximum(start, 1e-4 * start.mean()))
+    terms, gain = _terms(d)
+    blocks = held_out_blocks(d.mask, options.seed)
+    objective = LightObjective(
+        terms,
+        field,
+        gain * transport.shadowed,
+        fitted_weight(d.mask, blocks),
+        options.strictness,
+    )
+    x = np.zeros(field.size)
+    before = terms.cost(gain * d.shading[d.mask].astype(float), fitted_weight(d.mask, blocks))[0]
+    fitting = monitor.part(0.3, 1.0)
+
+    def each(step: int, loss: float) -> None:
+        fitting.report("fitting the light", min(step / options.steps, 1.0), f"loss {loss:.3f}")
+
+    limits = LbfgsOptions(iterations=options.steps, loss_tolerance=1e-4)
+    after = minimise(objective, x, limits, NumpyAlgebra(), each).loss
+    radiance = field.radiance(x)
+    shading = shading_of(transport.shadowed, radiance)
+    kept = after < before and explains_better(
+        terms, blocks, gain * d.shading[d.mask].astype(float), gain * shading
+    )
+    result = _refined(d, transport, radiance, shading) if kept else d
+    note = {"kept": kept, "before": before, "after": after, **options.__dict__}
+    return Refinement(_noted(result, note), kept, before, after)
+
+
+def _check(d: Decomposition) -> None:
+    if d.visibility is not None:
+        raise InputError("the result is refined already: give the one that isc decompose wrote")
+    if not (d.shading[d.mask] > 0).all():
+        raise InputError("the light of the result is zero somewhere: decompose the photo again")
+
+
+def _terms(d: Decomposition) -> tuple[ReflectanceTerms, float]:
+    """The reflectance terms of the diffuse image at the exposure of photos, and the factor that
+    brings it there.
+    """
+    kind = str(d.provenance.settings.get("illumination", _LIKELY[0]))
+    kind = kind if kind in _LIKELY else _LIKELY[0]
+    gain = exposure_normalisation(d.image, d.mask)
+    light = np.maximum(gain * tempered(d.diffuse.astype(float)), _DARKEST)
+    log_diffuse = np.where(d.mask[..., None], np.log(light), 0.0)
+    return ReflectanceTerms(
+        log_diffuse, d.mask, shipped_priors(kind, 3), isc_weights(kind, 3)
+    ), gain
+
+
+def _refined(
+    d: Decomposition, transport: Transport, radiance: np.ndarray, shading: np.ndarray
+) -> Decomposition:
+    normal = d.normal[d.mask].astype(float)
+    illumination, _ = fit_light(normal, shading_of(transport.unshadowed, radiance))
+    smooth = np.exp(np.einsum("nk,kc->nc", real_sh(normal), illumination))
+    visibility = np.ones(d.shading.shape, np.float32)
+    visibility[d.mask] = shading / smooth
+    new_shading = np.zeros_like(d.shading)
+    new_shading[d.mask] = shading
+    reflectance = np.zeros_like(d.reflectance)
+    reflectance[d.mask] = d.diffuse[d.mask] / new_shading[d.mask]
+    rows = int(np.sqrt(len(radiance) / 2))
+    return replace(
+        d,
+        shading=new_shading,
+        reflectance=reflectance,
+        illumination=illumination,
+        visibility=visibility,
+        environment=radiance.reshape(rows, 2 * rows, 3).astype(np.float32),
+    )
+
+
+def _noted(d: Decomposition, note: dict[str, Any]) -> Decomposition:
+    settings = {**d.provenance.settings, "refine": note}
+    return replace(d, provenance=replace(d.provenance, settings=settings))

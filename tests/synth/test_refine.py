@@ -1,0 +1,186 @@
+"""The refinement of a light: transport, gradients, held-out blocks, identities and the command."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("mitsuba")
+
+from isc_core.errors import InputError
+from isc_core.progress import Monitor
+from isc_core.result_files.result_folder import load, save
+from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.shading.environment_map import environment_from_shading, shading_under
+from isc_core.shading.spherical_harmonics import real_sh
+from isc_core.sirfs.priors.prior_file import shipped_priors
+from isc_core.sirfs.settings import isc_weights
+from synth.commands import refine as command_module
+from synth.refine.held_out import BLOCK, explains_better, fitted_weight, held_out_blocks
+from synth.refine.light_field import LightField
+from synth.refine.light_objective import LightObjective, ReflectanceTerms
+from synth.refine.refine import RefineOptions, refine
+from synth.refine.transport import light_transport
+
+LIGHT = np.zeros((9, 3))
+LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
+
+
+def dome(size: int = 48, *, wall: bool = False) -> Decomposition:
+    """A flat dome, or a floor with a wall along the middle, of one colour."""
+    y, x = np.mgrid[:size, :size] + 0.5 - size / 2
+    mask = np.hypot(x, y) < 0.45 * size
+    height = np.where(np.abs(x) < 2, 15.0, 0.0) if wall else np.sqrt(size**2 - x**2 - y**2)
+    normal = np.zeros((size, size, 3), np.float32)
+    normal[..., 2] = 1
+    if not wall:
+        normal[mask] = (np.stack([x, -y, height], -1) / size)[mask]
+    shading = np.zeros((size, size, 3), np.float32)
+    shading[mask] = np.exp(real_sh(normal[mask].astype(float)) @ LIGHT)
+    reflectance = np.where(mask[..., None], np.float32(0.5), np.float32(0)) * np.ones(3, np.float32)
+    diffuse = reflectance * shading
+    zero = np.zeros_like(diffuse)
+    return Decomposition(
+        diffuse, diffuse, zero, zero, reflectance, shading, normal,
+        np.where(mask, height, 0).astype(np.float32), mask, mask.astype(np.float32), LIGHT,
+        Provenance(input={"sha256": "0" * 64}),
+    )  # fmt: skip
+
+
+def objective(d: Decomposition) -> tuple[LightObjective, LightField]:
+    light = np.where(d.mask[..., None], np.log(np.maximum(d.diffuse, 1e-4)), 0).astype(float)
+    light += np.where(d.mask[..., None], np.random.default_rng(0).normal(0, 0.1, light.shape), 0)
+    terms = ReflectanceTerms(light, d.mask, shipped_priors("photo", 3), isc_weights("photo", 3))
+    field = LightField.around(np.maximum(environment_from_shading(LIGHT, 8), 1e-3))
+    transport = light_transport(d, 8).shadowed.astype(float)
+    return LightObjective(terms, field, transport, d.mask.astype(float), 0.1), field
+
+
+def test_without_shadows_the_transport_is_the_shading_of_the_environment() -> None:
+    d = dome()
+    environment = np.random.default_rng(1).uniform(0.1, 1, (8, 16, 3))
+    found = light_transport(d, 8).unshadowed @ environment.reshape(-1, 3)
+    assert np.allclose(found, shading_under(environment, d.normal[d.mask].astype(float)), rtol=1e-4)
+
+
+def test_a_convex_surface_shades_nothing_and_a_wall_shades_the_far_side() -> None:
+    convex = light_transport(dome(), 8)
+    assert convex.shadowed.sum() > 0.98 * convex.unshadowed.sum()
+    d = dome(wall=True)
+    found = light_transport(d, 8)
+    across = np.nonzero(d.mask)[1] - d.mask.shape[1] / 2
+    near = (across < -3) & (across > -12)
+    share = found.shadowed[near].sum(0) / np.maximum(found.unshadowed[near].sum(0), 1e-9)
+    # In front of the floor's plane: azimuths just past right, and just before left.
+    from_right, from_left = share.reshape(8, 16)[3:5, 4], share.reshape(8, 16)[3:5, 11]
+    assert from_right.max() < 0.5 < 0.9 < from_left.min()
+
+
+def test_the_gradient_is_that_of_finite_differences() -> None:
+    function, field = objective(dome())
+    rng = np.random.default_rng(2)
+    x, step = rng.normal(0, 0.2, field.size), rng.normal(0, 1, field.size)
+    gradient, spare = np.empty_like(x), np.empty_like(x)
+    function(x, gradient)
+    along = (function(x + 1e-5 * step, spare) - function(x - 1e-5 * step, spare)) / 2e-5
+    assert along == pytest.approx(float(gradient @ step), rel=1e-3)
+
+
+def test_held_out_blocks_lie_inside_and_do_not_count() -> None:
+    mask = dome().mask
+    blocks = held_out_blocks(mask, 0)
+    weight = fitted_weight(mask, blocks)
+    assert len(blocks) and (mask & (weight == 0)).sum() == len(blocks) * BLOCK**2
+    assert np.array_equal(blocks, held_out_blocks(mask, 0))
+    assert not np.array_equal(blocks, held_out_blocks(mask, 1))
+
+
+def test_the_shading_that_the_image_is_made_of_explains_it_better() -> None:
+    d = dome(128)
+    n = d.normal[d.mask].astype(float)
+    true = np.exp(2 * n[:, :1]) * np.ones(3)
+    light = np.zeros(d.diffuse.shape)
+    light[d.mask] = np.log(true)
+    terms = ReflectanceTerms(light, d.mask, shipped_priors("photo", 3), isc_weights("photo", 3))
+    blocks, flat = held_out_blocks(d.mask, 0), np.ones_like(true)
+    assert explains_better(terms, blocks, flat, true)
+    assert not explains_better(terms, blocks, true, flat)
+    assert not explains_better(terms, blocks, true, true)
+    assert not explains_better(terms, blocks[:2], flat, true)
+
+
+def command(words: list[str]) -> list[str]:
+    """Run `isc refine`, whether or not its entry point is installed."""
+    parser = argparse.ArgumentParser()
+    command_module.declare(parser)
+    options = parser.parse_args(words, argparse.Namespace(quiet=False))
+    return command_module.run(options, Monitor())
+
+
+def shadowed_dome() -> Decomposition:
+    """A dome whose image has more contrast than its shading explains."""
+    d = dome(96)
+    factor = np.exp(1.5 * d.normal[..., :1]).astype(np.float32)
+    diffuse = np.where(d.mask[..., None], d.diffuse * factor, 0).astype(np.float32)
+    return replace(d, image=diffuse, diffuse=diffuse, reflectance=d.reflectance * factor)
+
+
+@pytest.mark.slow
+def test_a_refined_result_keeps_every_identity_and_its_files(tmp_path: Path) -> None:
+    start = shadowed_dome()
+    done = refine(start)
+    assert done.kept and done.after < done.before
+    d = done.result
+    assert d.visibility is not None and d.environment is not None
+    assert not d.identity_errors().broken()
+    assert np.array_equal(d.diffuse, start.diffuse) and np.array_equal(d.normal, start.normal)
+    inside = np.log(d.reflectance[d.mask])
+    assert inside.std(0).max() < 0.5 * np.log(start.reflectance[d.mask]).std(0).max()
+    save(d, tmp_path / "refined")
+    again = load(tmp_path / "refined")
+    assert np.array_equal(again.visibility, d.visibility)  # type: ignore[arg-type]
+    assert np.array_equal(again.environment, d.environment)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="refined already"):
+        refine(again)
+
+
+@pytest.mark.slow
+def test_the_start_stays_where_there_is_nothing_to_gain() -> None:
+    start = dome(96)
+    done = refine(start)
+    assert not done.kept
+    assert np.array_equal(done.result.shading, start.shading)
+    assert done.result.visibility is None
+
+
+@pytest.mark.slow
+def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
+    save(shadowed_dome(), tmp_path / "start")
+    for name in ("first", "second"):
+        command([str(tmp_path / "start"), "-o", str(tmp_path / name)])
+    for file in ("maps.exr", "environment.exr", "decomposition.json"):
+        first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "second"))
+        assert first == second
+
+
+def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
+    start, output, photo = tmp_path / "start", tmp_path / "out", tmp_path / "photo.png"
+    save(dome(), start)
+    photo.write_bytes(b"another photo")
+    cases = [
+        ([str(tmp_path / "none"), "-o", str(output)], "not a result folder"),
+        ([str(start), "-o", str(start)], "cannot replace its start"),
+        ([str(start), "--photo", str(photo), "-o", str(output)], "another checksum"),
+        ([str(start), "--photo", str(tmp_path / "no.png"), "-o", str(output)], "cannot read"),
+    ]
+    for words, message in cases:
+        with pytest.raises(InputError, match=message):
+            command(words)
+        assert not output.exists()
+    dark = dome()
+    with pytest.raises(InputError, match="light of the result is zero"):
+        refine(replace(dark, shading=np.zeros_like(dark.shading)))
+    with pytest.raises(InputError, match="strictness above 0"):
+        RefineOptions(strictness=0)
