@@ -39,6 +39,30 @@ def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
     return _SIGNATURE + _chunk(b"IHDR", header) + _chunk(b"IDAT", data) + _chunk(b"IEND", b"")
 
 
+def decode_png(data: bytes) -> np.ndarray:
+    """Decode an image that `encode_png` has written.
+
+    Parameters
+    ----------
+    data : bytes
+        The file; 8 bits.
+
+    Returns
+    -------
+    (H, W), (H, W, 3) or (H, W, 4) ndarray of uint8
+        Row 0 at the top.
+    """
+    start = len(_SIGNATURE) + 8
+    columns, rows, depth, color_type = struct.unpack(">IIBB", data[start : start + 10])
+    assert depth == 8
+    channels = next(number for number, kind in _COLOR_TYPES.items() if kind == color_type)
+    length, _ = struct.unpack(">I4s", data[start + 17 : start + 25])
+    lines = zlib.decompress(data[start + 25 : start + 25 + length])
+    codes = np.frombuffer(lines, np.uint8).reshape(rows, 1 + columns * channels)[:, 1:]
+    shape = (rows, columns) if channels == 1 else (rows, columns, channels)
+    return codes.reshape(shape)
+
+
 def _chunk(kind: bytes, data: bytes) -> bytes:
     checksum = zlib.crc32(kind + data)
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", checksum)
