@@ -102,6 +102,7 @@ def stage(
         mesh = _copy(base)
         blocks.mesh = mesh.session_uid
         fill_mesh(mesh, arrays)
+        yield
         complete = True
         return blocks
     finally:

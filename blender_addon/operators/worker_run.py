@@ -50,7 +50,7 @@ RunSteps = Generator[WorkerUpdate, None, RunOutput]
 ImportSteps = Generator[None, None, str]
 """Imports an output in short steps and returns one line on it; raises `InputError`."""
 
-IMPORT_SECONDS = 0.02  # of steps at a time
+IMPORT_SECONDS = 0.005  # of steps at a time; a longer one is alone
 
 _REMOVE_SECONDS = 5.0
 
