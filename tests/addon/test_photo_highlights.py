@@ -157,6 +157,8 @@ def test_with_a_window_baking_waits_until_the_slider_rests(
         rendering = "RENDER"
         assert started[0]() is not None and link.is_valid, "it waits for a render to end"
         rendering = ""
+        assert started[0]() is not None, "a thread computes the colors"
+        live_edits._bakes[built.material.session_uid].file.result()
         assert started[0]() is None
     (link,) = surface.inputs["Base Color"].links
     assert link.from_node.type == "TEX_IMAGE"
