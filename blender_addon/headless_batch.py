@@ -25,7 +25,7 @@ from .operators.result import build_as_undo_step
 from .operators.run_steps import result_notes
 from .operators.worker_run import RunOutput
 from .registration import register
-from .scene.build import BuildOptions
+from .scene.preparation import BuildOptions
 from .settings.preferences import read_preferences, worker_environment
 from .worker.commands import DecomposeJob, start_arrays, start_decompose
 from .worker.process import WorkerProcess, WorkerState

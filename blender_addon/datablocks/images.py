@@ -4,7 +4,13 @@ Blender counts rows from below, the maps from above. Maps are float32: colours "
 everything else "Non-Color", so that the values are used unchanged; packed, they are 32-bit OpenEXR,
 and saving the file loses nothing. Textures are what other programs read: PNG of 8 bits, colours
 coded as sRGB, everything else "Non-Color". Exporters name files by the images' names.
+
+Files are encoded here, in any thread, and not by Blender, which takes seconds for large images and
+does it while the window waits. Blender decodes one when it is drawn for the first time.
 """
+
+import zlib
+from dataclasses import dataclass
 
 import bpy
 import numpy as np
@@ -13,11 +19,13 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.png import encode_png
 
+from ..files.exr import encode_exr
 from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
 _FAST = 1  # compression of large textures
+_CHECKSUM = "isc_file_crc32"
 # Names of the textures in files, by role.
 TEXTURE_NAMES = {
     "base_color": "basecolor",
@@ -58,17 +66,33 @@ def require_color_spaces(*names: str) -> None:
         )
 
 
-def ensure_image(
-    key: str, role: str, values: np.ndarray, space: str, alpha: np.ndarray | None = None
-) -> bpy.types.Image:
-    """Create an image, or replace the one of that role everywhere it is used.
+@dataclass(frozen=True)
+class ImageFile:
+    """The file of an image.
+
+    Attributes
+    ----------
+    data : bytes
+        PNG or OpenEXR.
+    space : str
+        Name of the colour space.
+    is_png : bool
+        Whether it is PNG.
+    alpha_is_data : bool
+        Whether alpha is a channel like the others, and no opacity.
+    """
+
+    data: bytes
+    space: str
+    is_png: bool = True
+    alpha_is_data: bool = False
+
+
+def map_file(values: np.ndarray, space: str, alpha: np.ndarray | None = None) -> ImageFile:
+    """Return the file of a map; this may run in another thread.
 
     Parameters
     ----------
-    key : str
-        Name of the photo.
-    role : str
-        Purpose of the image.
     values : (H, W) or (H, W, 3) ndarray
         Pixels, row 0 at the top.
     space : str
@@ -78,90 +102,40 @@ def ensure_image(
 
     Returns
     -------
-    bpy.types.Image
-        The packed image.
+    ImageFile
+        OpenEXR with 32 bits.
     """
-    rows, columns = values.shape[:2]
-    image = bpy.data.images.new(
-        datablock_name(key, role.replace("_", " ")),
-        columns,
-        rows,
-        alpha=alpha is not None,
-        float_buffer=True,
-    )
-    image.colorspace_settings.name = space
-    pixels = np.ones((rows, columns, 4), np.float32)
-    pixels[..., :3] = (values if values.ndim == 3 else values[..., None])[::-1]
     if alpha is not None:
-        pixels[..., 3] = alpha[::-1]
-    image.pixels.foreach_set(pixels.ravel())
-    image.pack()
-    return _put_in_place(image, key, role)
+        values = np.concatenate([values, alpha[..., None]], -1)
+    return ImageFile(encode_exr(values), space, is_png=False)
 
 
-def ensure_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
-    """Create a texture, or replace the one of that role everywhere it is used.
+def texture_file(values: np.ndarray, space: str) -> ImageFile:
+    """Return the file of a texture; this may run in another thread.
 
     Parameters
     ----------
-    key : str
-        Name of the photo.
-    role : str
-        One of `TEXTURE_NAMES`.
     values : (H, W) or (H, W, 3) ndarray
-        Pixels in [0, 1], row 0 at the top; others are clipped. Colours are linear Rec.709.
+        Pixels in [0, 1], row 0 at the top; others are clipped. Colours are linear Rec.709. A map of
+        single values is stored in alpha, too, where glTF has the specular level.
     space : str
         `SRGB` for colours, else `DATA`.
 
     Returns
     -------
-    bpy.types.Image
-        The packed image.
+    ImageFile
+        PNG of 8 bits.
     """
-    return _put_in_place(new_texture(key, role, values[::-1], space), key, role)
+    shares = np.clip(values, 0, 1)
+    coded = linear_to_srgb(shares) if space == SRGB else shares
+    codes = np.rint(255 * coded).astype(np.uint8)
+    if values.ndim == 2:
+        codes = np.repeat(codes[..., None], 4, -1)
+    return ImageFile(encode_png(codes, _FAST), space, alpha_is_data=values.ndim == 2)
 
 
-def ensure_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
-    """Create a texture of a PNG file, or replace the one of that role everywhere it is used.
-
-    Parameters
-    ----------
-    key, role : str
-        As of `ensure_texture`.
-    data : bytes
-        The file; it has sRGB codes.
-
-    Returns
-    -------
-    bpy.types.Image
-        The packed image.
-    """
-    return _put_in_place(new_png_texture(key, role, data), key, role)
-
-
-def new_png_texture(key: str, role: str, data: bytes) -> bpy.types.Image:
-    """Create a packed texture of a PNG file; Blender reads its pixels when it needs them.
-
-    Parameters
-    ----------
-    key, role, data : str, str, bytes
-        As of `ensure_png_texture`.
-
-    Returns
-    -------
-    bpy.types.Image
-        The image, without a tag.
-    """
-    image = bpy.data.images.new(_texture_name(key, role), 1, 1)
-    image.colorspace_settings.name = SRGB
-    image.file_format = "PNG"
-    image.pack(data=data, data_len=len(data))
-    image.source = "FILE"
-    return image
-
-
-def scaled_png(codes: np.ndarray, gain: float) -> bytes:
-    """Return a PNG file of colours times a factor.
+def scaled_file(codes: np.ndarray, gain: float) -> ImageFile:
+    """Return the file of colours times a factor; this may run in another thread.
 
     Parameters
     ----------
@@ -172,103 +146,177 @@ def scaled_png(codes: np.ndarray, gain: float) -> bytes:
 
     Returns
     -------
-    bytes
-        The file, in sRGB.
+    ImageFile
+        PNG in sRGB.
     """
     linear = gain * srgb_to_linear(np.arange(256) / 255)
     table = np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
-    return encode_png(table[codes], _FAST)
+    return coded_file(table[codes])
 
 
-def new_texture(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
-    """Create a packed texture of 8 bits.
+def coded_file(codes: np.ndarray) -> ImageFile:
+    """Return the file of colours; this may run in another thread.
 
     Parameters
     ----------
-    key, role, space : str
-        As of `ensure_texture`.
-    values : (H, W) or (H, W, 3) ndarray
-        As of `ensure_texture`, but row 0 at the bottom. A map of single values is stored in alpha,
-        too, where glTF has the specular level.
+    codes : (H, W, 3) ndarray of uint8
+        sRGB, row 0 at the top.
+
+    Returns
+    -------
+    ImageFile
+        PNG.
+    """
+    return ImageFile(encode_png(codes, _FAST), SRGB)
+
+
+def new_image(file: ImageFile) -> bpy.types.Image:
+    """Create a packed image; Blender reads its pixels when it needs them.
+
+    Parameters
+    ----------
+    file : ImageFile
+        The file.
 
     Returns
     -------
     bpy.types.Image
-        The image, without a tag.
+        The image, without a tag or a name of its own.
     """
-    rows, columns = values.shape[:2]
-    image = bpy.data.images.new(_texture_name(key, role), columns, rows, alpha=values.ndim == 2)
-    image.colorspace_settings.name = space
-    shares = np.clip(values, 0, 1)
-    pixels = np.ones((rows, columns, 4), np.float32)
-    if values.ndim == 2:
-        pixels[:] = shares[..., None]
+    image = bpy.data.images.new("isc", 1, 1)
+    image.colorspace_settings.name = file.space
+    image.file_format = "PNG" if file.is_png else "OPEN_EXR"
+    if file.alpha_is_data:
         image.alpha_mode = "CHANNEL_PACKED"
-    else:
-        pixels[..., :3] = linear_to_srgb(shares) if space == SRGB else shares
-    image.pixels.foreach_set(pixels.ravel())
-    image.file_format = "PNG"
-    image.pack()
+    image.pack(data=file.data, data_len=len(file.data))
+    image.source = "FILE"
+    image[_CHECKSUM] = f"{zlib.crc32(file.data):08x}"  # as text: numbers have a sign
     return image
 
 
-def _texture_name(key: str, role: str) -> str:
-    """The name of an image, from which exporters make that of its file."""
-    return datablock_name(key, TEXTURE_NAMES[role], "_")
+def own_file(image: bpy.types.Image) -> bytes:
+    """Return the file of an image, if `new_image` made it and it has not been painted on.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        Any image.
+
+    Returns
+    -------
+    bytes
+        The file; b"" for other images.
+    """
+    if _CHECKSUM not in image or image.is_dirty or len(image.packed_files) != 1:
+        return b""
+    data = bytes(image.packed_file.data)
+    return data if f"{zlib.crc32(data):08x}" == image[_CHECKSUM] else b""
 
 
-def ensure_maps(key: str, result: ResultArrays, every: bool = True) -> dict[str, bpy.types.Image]:
-    """Create or replace the images of maps.
+def put_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
+    """Name and tag an image, which replaces the one of that role everywhere it is used.
+
+    A generated image loses its pixels when resized in place, so it is replaced instead.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        A new image.
+    key : str
+        Name of the photo.
+    role : str
+        Purpose of the image.
+
+    Returns
+    -------
+    bpy.types.Image
+        The same image.
+    """
+    name, old = image_name(key, role), find_tagged(bpy.data.images, key, role)
+    if old is not None:
+        name = old.name
+        old.user_remap(image)
+        bpy.data.images.remove(old)
+    image.name = name
+    return tag(image, key, role)
+
+
+def ensure_image(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
+    """Create the image of a map, or replace the one of that role everywhere it is used.
+
+    Parameters
+    ----------
+    key, role : str
+        As of `put_image`.
+    values, space : ndarray, str
+        As of `map_file`.
+
+    Returns
+    -------
+    bpy.types.Image
+        The packed image.
+    """
+    return put_image(new_image(map_file(values, space)), key, role)
+
+
+def image_name(key: str, role: str) -> str:
+    """Return the name of an image, from which exporters make that of its file.
+
+    Parameters
+    ----------
+    key, role : str
+        As of `put_image`.
+
+    Returns
+    -------
+    str
+        The name.
+    """
+    if role in TEXTURE_NAMES:
+        return datablock_name(key, TEXTURE_NAMES[role], "_")
+    return datablock_name(key, role.replace("_", " "))
+
+
+def map_files(result: ResultArrays, every: bool = True) -> dict[str, ImageFile]:
+    """Return the files of maps; this may run in another thread.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    every : bool, optional
+        Whether all of `MAPS` are made, or those of `USED_MAPS`.
+
+    Returns
+    -------
+    dict of str to ImageFile
+        The files by map name.
+    """
+    return {
+        name: map_file(getattr(result, name), space)
+        for name, space in MAPS.items()
+        if every or name in USED_MAPS
+    }
+
+
+def attach_maps(key: str, obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
+    """Store the images as custom properties, so that they are saved and appended with the object.
 
     Parameters
     ----------
     key : str
         Name of the photo.
-    result : ResultArrays
-        The result.
-    every : bool, optional
-        Whether all of `MAPS` are created, or those of `USED_MAPS`; the others are then removed.
-
-    Returns
-    -------
-    dict of str to bpy.types.Image
-        The images by map name.
-    """
-    maps = {}
-    for name, space in MAPS.items():
-        if every or name in USED_MAPS:
-            maps[name] = ensure_image(key, name, getattr(result, name), space)
-        elif (old := find_tagged(bpy.data.images, key, name)) is not None:
-            bpy.data.images.remove(old)  # of an earlier result
-    return maps
-
-
-def attach_maps(obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
-    """Store the images as custom properties, so that they are saved and appended with the object.
-
-    Parameters
-    ----------
     obj : bpy.types.Object
-        The object; gets the properties `isc_map_...`, and loses those of other maps.
+        The object; gets the properties `isc_map_...`, and loses those of other maps, whose images
+        are removed.
     maps : dict of str to bpy.types.Image
         The images by map name.
     """
     for name in MAPS:
         if name in maps:
             obj[f"isc_map_{name}"] = maps[name]
-        elif f"isc_map_{name}" in obj:
+            continue
+        if f"isc_map_{name}" in obj:
             del obj[f"isc_map_{name}"]
-
-
-def _put_in_place(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
-    """Tag a new image, which replaces the one of that role everywhere it is used.
-
-    A generated image loses its pixels when resized in place, so it is replaced instead.
-    """
-    old = find_tagged(bpy.data.images, key, role)
-    if old is not None:
-        name = old.name
-        old.user_remap(image)
-        bpy.data.images.remove(old)
-        image.name = name
-    return tag(image, key, role)
+        if (old := find_tagged(bpy.data.images, key, name)) is not None:
+            bpy.data.images.remove(old)  # of an earlier result

@@ -46,6 +46,38 @@ class MeshGeometry:
     normals: np.ndarray | None
 
 
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh as Blender stores it, so that filling one takes milliseconds.
+
+    Attributes
+    ----------
+    positions : (3 V,) ndarray of float32
+        Metres.
+    corners, corner_edges : (L,) ndarray of int32
+        Vertex and edge of each corner.
+    starts : (F,) ndarray of int32
+        First corner of each face.
+    edges : (2 E,) ndarray of int32
+        Vertices of each edge.
+    uv : (2 L,) ndarray of float32
+        Texture coordinates of the corners.
+    confidence : (V,) ndarray of float32
+        Confidence in [0, 1].
+    normals : (3 V,) or (3 L,) ndarray of float32, or None
+        Unit normals per vertex or per corner; None for smooth shading.
+    """
+
+    positions: np.ndarray
+    corners: np.ndarray
+    corner_edges: np.ndarray
+    starts: np.ndarray
+    edges: np.ndarray
+    uv: np.ndarray
+    confidence: np.ndarray
+    normals: np.ndarray | None
+
+
 def to_blender(vectors: np.ndarray) -> np.ndarray:
     """Convert vectors of the camera frame to Blender's axes.
 
@@ -115,34 +147,87 @@ def metres_per_pixel(result: ResultArrays, size_metres: float) -> float:
     return size_metres / result.longest_side
 
 
-def fill_mesh(mesh: bpy.types.Mesh, geometry: MeshGeometry) -> None:
+def mesh_arrays(geometry: MeshGeometry) -> MeshArrays:
+    """Return a mesh as Blender stores it; this may run in another thread.
+
+    Parameters
+    ----------
+    geometry : MeshGeometry
+        The mesh.
+
+    Returns
+    -------
+    MeshArrays
+        Its arrays.
+    """
+    corners, starts = geometry.corners.astype(np.int32), geometry.starts.astype(np.int32)
+    following = np.arange(1, len(corners) + 1)
+    following[np.append(starts[1:], len(corners)) - 1] = starts
+    ends = corners[following]
+    low, high = np.minimum(corners, ends).astype(np.int64), np.maximum(corners, ends)
+    count = len(geometry.vertices)
+    edges, corner_edges = np.unique(low * count + high, return_inverse=True)
+    return MeshArrays(
+        positions=_flat(geometry.vertices),
+        corners=corners,
+        corner_edges=corner_edges.astype(np.int32),
+        starts=starts,
+        edges=np.stack([edges // count, edges % count], -1).astype(np.int32).ravel(),
+        uv=_flat(geometry.uv[corners]),
+        confidence=_flat(geometry.confidence),
+        normals=None if geometry.normals is None else _flat(geometry.normals),
+    )
+
+
+def fill_mesh(mesh: bpy.types.Mesh, arrays: MeshArrays) -> None:
     """Replace the geometry, UV, normals and attributes of a mesh; its materials stay.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
         The mesh.
-    geometry : MeshGeometry
+    arrays : MeshArrays
         The new geometry.
     """
     mesh.clear_geometry()
-    mesh.vertices.add(len(geometry.vertices))
-    mesh.loops.add(len(geometry.corners))
-    mesh.polygons.add(len(geometry.starts))
-    mesh.vertices.foreach_set("co", _flat(geometry.vertices))
-    mesh.loops.foreach_set("vertex_index", geometry.corners)
-    mesh.polygons.foreach_set("loop_start", geometry.starts)
-    mesh.update(calc_edges=True)
-    mesh.uv_layers.new(name=UV, do_init=False).uv.foreach_set(
-        "vector", _flat(geometry.uv[geometry.corners])
-    )
+    mesh.vertices.add(len(arrays.positions) // 3)
+    mesh.edges.add(len(arrays.edges) // 2)
+    mesh.loops.add(len(arrays.corners))
+    mesh.polygons.add(len(arrays.starts))
+    mesh.polygons.foreach_set("loop_start", arrays.starts)
+    # By their attributes these are copied whole, otherwise one by one.
+    mesh.attributes["position"].data.foreach_set("vector", arrays.positions)
+    for name, values in (
+        (".edge_verts", arrays.edges),
+        (".corner_vert", arrays.corners),
+        (".corner_edge", arrays.corner_edges),
+    ):
+        mesh.attributes[name].data.foreach_set("value", values)
+    mesh.update()
+    mesh.uv_layers.new(name=UV, do_init=False).uv.foreach_set("vector", arrays.uv)
     confidence = mesh.attributes.new(CONFIDENCE, "FLOAT", "POINT")
-    confidence.data.foreach_set("value", _flat(geometry.confidence))
-    if geometry.normals is not None:
-        domain = "POINT" if len(geometry.normals) == len(geometry.vertices) else "CORNER"
+    confidence.data.foreach_set("value", arrays.confidence)
+    if arrays.normals is not None:
+        domain = "POINT" if len(arrays.normals) == len(arrays.positions) else "CORNER"
         mesh.attributes.new(NORMAL, "FLOAT_VECTOR", domain).data.foreach_set(
-            "vector", _flat(geometry.normals)
+            "vector", arrays.normals
         )
+
+
+def replace_mesh(old: bpy.types.Mesh, new: bpy.types.Mesh) -> None:
+    """Put a mesh in the place of another one, which is removed, in all of its objects.
+
+    Parameters
+    ----------
+    old : bpy.types.Mesh
+        The mesh so far.
+    new : bpy.types.Mesh
+        The new mesh; gets its name.
+    """
+    name, new.use_fake_user = old.name, old.use_fake_user
+    old.user_remap(new)
+    bpy.data.meshes.remove(old)
+    new.name = name
 
 
 def _flat(values: np.ndarray) -> np.ndarray:

@@ -16,7 +16,6 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.json_files import read_json
 from isc_core.io.npy import read_arrays
-from isc_core.result_files.solids.body import Body
 
 ARRAYS, DESCRIPTION = "arrays.npz", "decomposition.json"
 
@@ -72,31 +71,6 @@ _OPTIONAL, _MAY_BE_NAN = (
 )
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
-
-
-@dataclass(frozen=True)
-class PreparedBody:
-    """A mesh that was made ahead, as making it takes a second.
-
-    Attributes
-    ----------
-    back : str
-        As of `BuildOptions`.
-    triangles : int
-        As of `BuildOptions`.
-    body : Body
-        The mesh in pixels.
-    smooth : (V, 3) ndarray
-        Normals of the vertices of its visible side.
-    detail : (H, W, 3) ndarray
-        Tangent-space unit normals.
-    """
-
-    back: str
-    triangles: int
-    body: Body
-    smooth: np.ndarray
-    detail: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -169,10 +143,6 @@ class ResultArrays:
         Its (x, y) in pixels from the left and upper edge of the maps.
     eye : (3,) ndarray or None
         Its place, in metres as `vertices`.
-    encoded : dict of float to bytes
-        PNG files of `texture` times a factor, by factor, where they were made in advance.
-    body : PreparedBody or None
-        A mesh that was made in advance.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -214,8 +184,6 @@ class ResultArrays:
     crop_scale: float
     specular_variation: np.ndarray | None = None
     texture: np.ndarray | None = None
-    encoded: dict[float, bytes] = field(default_factory=dict)
-    body: PreparedBody | None = None
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None
@@ -236,7 +204,7 @@ class ResultArrays:
     @property
     def longest_side(self) -> int:
         """Longer side of the mask's bounding box in pixels; it has the size given in metres."""
-        return int((np.ptp(np.argwhere(self.mask), axis=0) + 1).max())
+        return max(int(np.ptp(np.flatnonzero(self.mask.any(axis)))) + 1 for axis in (0, 1))
 
 
 def read_result(folder: Path | str) -> ResultArrays:

@@ -18,10 +18,11 @@ from ..settings.preferences import create_run_folder, read_preferences, worker_e
 from .messages import busy_message
 from .modal import WorkerOperator
 from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
-from .result import build_as_undo_step
+from .result import build_in_steps
 from .run_steps import ResultPlace, decompose_steps
 from .viewport import started_in
 from .worker_run import (
+    ImportSteps,
     RunOutput,
     WorkerRun,
     active_run,
@@ -55,14 +56,15 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     preferences = read_preferences(context)
     environment = worker_environment(preferences)
     folder = create_run_folder(preferences.results, request.build.name)
-    place = ResultPlace(folder, preferences.earlier, preferences.results is not None, request.build)
+    keep, with_photo = preferences.results is not None, not request.image
+    place = ResultPlace(folder, preferences.earlier, keep, request.build, with_photo)
     steps = decompose_steps(
         photo, mask, mask_size, request.method, place, preferences.threads, environment
     )
     view = started_in(context)
 
-    def finish(context: Any, output: RunOutput) -> str:
-        message = build_as_undo_step(context, output, request, view)
+    def finish(context: Any, output: RunOutput) -> ImportSteps:
+        message = yield from build_in_steps(context, output, request, view)
         if output.path.is_relative_to(folder):
             # By far the largest file; the scene holds its content now.
             (output.path / ARRAYS).unlink(missing_ok=True)

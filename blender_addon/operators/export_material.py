@@ -23,11 +23,12 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..datablocks.images import SRGB, new_texture
+from ..datablocks.images import SRGB, image_name, new_image, texture_file
 from ..datablocks.nodes import node_tree
 from ..datablocks.provenance import SPECULAR_LEVEL
+from ..scene.color_bake import linear_colors, recolour_reflectance
 from ..scene.material import shows_highlights
-from ..scene.material_edits import dichromatic_node, linear_colors, recolour_reflectance
+from ..scene.material_edits import dichromatic_node
 
 
 @contextmanager
@@ -138,4 +139,6 @@ def _fill(plain: bpy.types.Material, obj: bpy.types.Object, material: bpy.types.
 def _bake(image: bpy.types.Image, hue: float, saturation: float, gain: float) -> bpy.types.Image:
     """The edited reflectance, 8 bits, sRGB."""
     edited = recolour_reflectance(linear_colors(image), hue, saturation, gain)
-    return new_texture("plain", "base_color", edited, SRGB)
+    baked = new_image(texture_file(edited[::-1], SRGB))
+    baked.name = image_name("plain", "base_color")
+    return baked

@@ -2,25 +2,40 @@
 
 After each update of the scene, edits are written into the material (`scene.material_edits`), and
 highlights of the photo that no longer belong to what is seen are turned off
-(`scene.photo_highlights`). Baking waits until no slider has moved for a moment; without a window,
-and before a file is saved or exported, it happens at once.
+(`scene.photo_highlights`). Baking waits until no slider has moved for a moment, and computes the
+colours in a thread, which a later edit stops; without a window, and before a file is saved or
+exported, it happens at once.
 
 glTF's exporter asks for `prepare_export` and `finish_export` through the functions of the package
 that are named after its interface.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from threading import Event
 from typing import Any
 
 import bpy
 from bpy.app.handlers import persistent
 
+from ..datablocks.images import ImageFile
 from ..datablocks.provenance import KEY
+from ..scene.color_bake import edited_file
 from ..scene.material import shows_highlights
-from ..scene.material_edits import apply_edits, bake_edits
+from ..scene.material_edits import (
+    PendingBake,
+    apply_edits,
+    bake_edits,
+    begin_bake,
+    color_state,
+    finish_bake,
+)
 from ..scene.photo_highlights import has_moved, hide_highlights, show_highlights
 
-_PAUSE, _SHOWN = 0.4, 6.0  # seconds: without a change before baking; of a line in the status bar
+# Seconds: without a change before baking; between two looks at bakes; of a line in the status bar.
+_PAUSE, _POLL, _SHOWN = 0.4, 0.05, 6.0
 _MATERIAL_KINDS = ("MATERIAL", "NODETREE")
 _VIEW_KINDS = ("OBJECT", "LIGHT", "CAMERA", "WORLD", "NODETREE", "SCENE")
 _HIDDEN_FOR_EXPORT = "isc_hidden_for_export"
@@ -36,9 +51,33 @@ def remove_handlers() -> None:
     """Stop following edits."""
     bpy.app.handlers.save_pre.remove(_before_saving)
     bpy.app.handlers.depsgraph_update_post.remove(_after_update)
+    _stop_bakes()
     for timer in (_bake_when_idle, _clear_status):
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
+
+
+@dataclass(frozen=True)
+class _RunningBake:
+    """Colours that a thread computes.
+
+    Attributes
+    ----------
+    state : str
+        What they depend on, see `PendingBake`.
+    stop : Event
+        Set when they are no longer needed.
+    file : Future
+        The colours; None if stopped.
+    """
+
+    state: str
+    stop: Event
+    file: Future[ImageFile | None]
+
+
+# By Blender's number of the material, which an undo does not change.
+_bakes: dict[int, _RunningBake] = {}
 
 
 def settle_edits(material: bpy.types.Material) -> None:
@@ -53,7 +92,10 @@ def settle_edits(material: bpy.types.Material) -> None:
         return
     if bpy.app.background:
         bake_edits(material)
-    else:
+        return
+    running = _bakes.get(material.session_uid)
+    if running is None or running.state != color_state(material):
+        _drop(material.session_uid)
         _restart(_bake_when_idle, _PAUSE)
 
 
@@ -63,7 +105,7 @@ def prepare_export() -> None:
         if shows_highlights(material):
             hide_highlights(material)
             material[_HIDDEN_FOR_EXPORT] = True
-        bake_edits(material)
+        _bake_now(material)
 
 
 def finish_export() -> None:
@@ -72,7 +114,7 @@ def finish_export() -> None:
         if _HIDDEN_FOR_EXPORT in material:
             del material[_HIDDEN_FOR_EXPORT]
             show_highlights(material)
-            bake_edits(material)
+            _bake_now(material)
 
 
 def _materials() -> Iterator[bpy.types.Material]:
@@ -97,14 +139,56 @@ def _after_update(scene: Any, depsgraph: Any) -> None:
 @persistent
 def _before_saving(*_: Any) -> None:
     for material in _materials():
-        bake_edits(material)
+        _bake_now(material)
+
+
+def _bake_now(material: bpy.types.Material) -> None:
+    """Bake all edits of a material; waits for the colours that a thread computes."""
+    running = _bakes.get(material.session_uid)
+    if running is not None and running.state == color_state(material):
+        _take(material, running)
+    _drop(material.session_uid)
+    bake_edits(material)
 
 
 def _bake_when_idle() -> float | None:
+    """Begin bakes in threads, and take those that are done; stays registered while some go on."""
     if bpy.app.is_job_running("RENDER"):
         return _PAUSE
-    _before_saving()
-    return None
+    present = {material.session_uid: material for material in _materials()}
+    for number, running in list(_bakes.items()):
+        material = present.get(number)
+        if material is None or running.state != color_state(material):
+            _drop(number)
+        elif running.file.done():
+            _take(material, running)
+            _drop(number)
+    for number, material in present.items():
+        if number not in _bakes and (pending := begin_bake(material)) is not None:
+            _bakes[number] = _begin(pending)
+    return _POLL if _bakes else None
+
+
+def _begin(pending: PendingBake) -> _RunningBake:
+    stop, pool = Event(), ThreadPoolExecutor(1)
+    file = pool.submit(partial(edited_file, pending.source, pending.edit, stop.is_set))
+    pool.shutdown(wait=False)
+    return _RunningBake(pending.state, stop, file)
+
+
+def _take(material: bpy.types.Material, running: _RunningBake) -> None:
+    if (file := running.file.result()) is not None:
+        finish_bake(material, running.state, file)
+
+
+def _drop(number: int) -> None:
+    if (running := _bakes.pop(number, None)) is not None:
+        running.stop.set()
+
+
+def _stop_bakes() -> None:
+    for number in list(_bakes):
+        _drop(number)
 
 
 def _tell(line: str) -> None:

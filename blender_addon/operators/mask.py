@@ -26,6 +26,7 @@ from .photo_canvas import PhotoCanvas, shown_photo
 from .request import find_by_full_name
 from .run_steps import mask_steps
 from .worker_run import (
+    ImportSteps,
     RunOutput,
     RunSteps,
     WorkerRun,
@@ -121,8 +122,9 @@ def mask_run(
     photo, scene = inspect_image(context.scene.isc.image), context.scene.name_full
     folder = create_run_folder(None, "mask")
 
-    def finish(context: Any, output: RunOutput) -> str:
+    def finish(context: Any, output: RunOutput) -> ImportSteps:
         del context
+        yield
         load_mask(output.path, photo.name, scene)
         remove_folder(folder)
         return "Mask found: check it, then press Create Object"

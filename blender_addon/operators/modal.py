@@ -18,6 +18,7 @@ from .messages import progress_message, stage_text, write_report
 from .worker_run import RunState, WorkerRun, active_run, begin_run, cancel_active_run
 
 POLL_SECONDS = 0.1
+_IMPORT_PAUSE = 0.01  # between two parts of an import
 _PANEL_EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}
 
 
@@ -31,6 +32,7 @@ class WorkerOperator:
     report: Any  # from bpy.types.Operator
     _timer: Any = None
     _run: WorkerRun | None = None
+    _hurries = False
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run.
@@ -121,6 +123,8 @@ class WorkerOperator:
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
         if not advance_run(context, run):
+            if run.status.state == RunState.READY:
+                self._hurry(context)
             return {"PASS_THROUGH"}
         self._stop_timer(context)
         return self._report_outcome(run)
@@ -148,7 +152,8 @@ class WorkerOperator:
 
     def _wait(self, context: Any, run: WorkerRun) -> set[str]:
         while not advance_run(context, run):
-            time.sleep(POLL_SECONDS / 2)
+            if run.status.state != RunState.READY:
+                time.sleep(POLL_SECONDS / 2)
         return self._report_outcome(run)
 
     def _report_outcome(self, run: WorkerRun) -> set[str]:
@@ -157,6 +162,14 @@ class WorkerOperator:
             message += f" (see the text {write_report(run.title, message, log).name})"
         self.report({"ERROR" if state == RunState.FAILED else "INFO"}, message)
         return {"FINISHED"} if state == RunState.DONE else {"CANCELLED"}
+
+    def _hurry(self, context: Any) -> None:
+        """Import in steps that follow each other closely."""
+        if not self._hurries:
+            self._stop_timer(context)
+            manager = context.window_manager
+            self._timer = manager.event_timer_add(_IMPORT_PAUSE, window=context.window)
+            self._hurries = True
 
     def _stop_timer(self, context: Any) -> None:
         if self._timer is not None:
@@ -190,7 +203,8 @@ def advance_run(context: Any, run: WorkerRun) -> bool:
     run.record_call(time.perf_counter() - began)
     if ready and not editing:
         run.import_result(context)
-        update_display(context, run)
+        if run.ended:
+            update_display(context, run)
     return run.ended
 
 

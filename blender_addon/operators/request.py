@@ -14,7 +14,7 @@ from isc_core.photo.names import PHOTO_SUFFIXES
 
 from ..datablocks.provenance import KEY, SOURCE_IMAGE
 from ..files.image_source import ImageSource, inspect_image
-from ..scene.build import OWN_SHADOWS, BuildOptions
+from ..scene.preparation import OWN_SHADOWS, BuildOptions
 
 _SUFFIXES = (*PHOTO_SUFFIXES, ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"

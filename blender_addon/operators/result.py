@@ -11,8 +11,16 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_result
-from ..scene.build import BuiltObject, build_object, find_built
+from ..files.result_arrays import ARRAYS, DESCRIPTION, read_result
+from ..scene.build import (
+    BuiltObject,
+    StagedObject,
+    build_object,
+    find_built,
+    place_object,
+    stage_object,
+)
+from ..scene.preparation import prepare
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .modal import WorkerOperator
 from .request import (
@@ -24,17 +32,19 @@ from .request import (
 )
 from .run_steps import arrays_steps
 from .viewport import activate, show, started_in
-from .worker_run import RunOutput, WorkerRun, require_no_active_run
+from .worker_run import ImportSteps, RunOutput, WorkerRun, require_no_active_run
 
-# Results that a run has read in a thread, until they are built: operators take plain values only.
-_read: dict[str, ResultArrays] = {}
+# Objects whose datablocks are made, until they are placed: operators take plain values only.
+_staged: dict[str, StagedObject] = {}
 _CAME_FROM = "isc_came_from"
 
 
-def build_as_undo_step(
+def build_in_steps(
     context: Any, output: RunOutput, request: DecomposeRequest | None = None, view: int = 0
-) -> str:
-    """Build the result of a folder as one undo step, and show it.
+) -> ImportSteps:
+    """Build the result of a folder in short steps, as one undo step, and show it.
+
+    Until the last step the scene is as before, and nothing is left if the steps are closed.
 
     Parameters
     ----------
@@ -59,25 +69,55 @@ def build_as_undo_step(
     """
     del context
     request = request or _panel_request(bpy.context.scene)
-    before = set(bpy.data.objects)
-    folder = str(output.path)
-    if output.result is not None:
-        _read[folder] = output.result
+    folder, photo = str(output.path), find_by_full_name(bpy.data.images, request.image)
+    prepared = output.prepared or prepare(
+        read_result(output.path), request.build, with_photo=photo is None
+    )
+    _staged[folder] = yield from stage_object(prepared, photo=photo)
+    before = {obj.session_uid for obj in bpy.data.objects}
     try:
         # From Python, an operator pushes an undo step only if told to.
         bpy.ops.isc.build_result("EXEC_DEFAULT", True, directory=folder, request=request.to_json())
     except RuntimeError as error:
         raise InputError(str(error).strip().splitlines()[0].removeprefix("Error: ")) from error
     finally:
-        _read.pop(folder, None)
+        _staged.pop(folder).blocks.discard()
     built = find_built(bpy.context.object)
     if built is None:
         return "the object is in the scene"
-    if built.object in before:
+    if built.object.session_uid in before:
         return f"{built.object.name} updated"
     show(bpy.context, built, request.build.own_scene, view)
     where = f"in the scene {built.scene.name}" if request.build.own_scene else "at the 3D cursor"
     return f"{built.object.name} created {where}"
+
+
+def build_as_undo_step(
+    context: Any, output: RunOutput, request: DecomposeRequest | None = None, view: int = 0
+) -> str:
+    """Build the result of a folder as one undo step and in one call, and show it.
+
+    Parameters
+    ----------
+    context, output, request, view
+        As of `build_in_steps`.
+
+    Returns
+    -------
+    str
+        Where the object is, one line.
+
+    Raises
+    ------
+    InputError
+        If the result cannot be built.
+    """
+    steps = build_in_steps(context, output, request, view)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return str(stop.value)
 
 
 class ISC_OT_build_result(bpy.types.Operator):
@@ -114,10 +154,14 @@ class ISC_OT_build_result(bpy.types.Operator):
             request = (
                 request_from_json(self.request) if self.request else _panel_request(context.scene)
             )
-            result = _read.get(self.directory) or read_result(Path(self.directory))
+            staged = _staged.get(self.directory)
             scene = find_by_full_name(bpy.data.scenes, request.scene) or context.scene
             photo = find_by_full_name(bpy.data.images, request.image)
-            built = build_object(result, request.build, scene=scene, photo=photo)
+            if staged is not None:
+                built = place_object(staged, scene=scene, photo=photo)
+            else:
+                result = read_result(Path(self.directory))
+                built = build_object(result, request.build, scene=scene, photo=photo)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -224,7 +268,7 @@ class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
         return WorkerRun(
             f"Import {folder.name}",
             arrays_steps(folder, environment),
-            lambda context, output: build_as_undo_step(context, output, view=view),
+            lambda context, output: build_in_steps(context, output, view=view),
             create_run_folder(None, "import"),
         )
 

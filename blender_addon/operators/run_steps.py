@@ -19,7 +19,7 @@ from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
 from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
 from ..files.result_cache import ResultCache, content_key
-from ..scene.build import BuildOptions, prepared
+from ..scene.preparation import BuildOptions, PreparedObject, prepare
 from ..worker.commands import (
     Box,
     DecomposeJob,
@@ -58,12 +58,15 @@ class ResultPlace:
         Whether a copy of a cached result is kept in the run's folder, without the arrays.
     build : BuildOptions
         What will be built of it.
+    with_photo : bool
+        Whether the masked photo of the result becomes an image.
     """
 
     folder: Path
     cache: ResultCache | None = None
     keep: bool = False
     build: BuildOptions = field(default_factory=BuildOptions)
+    with_photo: bool = False
 
 
 def decompose_steps(
@@ -97,7 +100,7 @@ def decompose_steps(
     Returns
     -------
     RunOutput
-        The result folder, and the result as it was read from there.
+        The result folder, and what is built of it.
     """
     folder = place.folder
     photo_path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
@@ -118,13 +121,14 @@ def decompose_steps(
         texture_size=method.texture_size,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
-    result = yield from _cached_result(job, place, names, environment)
+    prepared = yield from _cached_result(job, place, names, environment)
     for exported in (photo_path, mask_path):
         # Exported copies are no longer needed; the user's own files are not in the run's folder.
         if exported is not None and exported.parent == folder:
             exported.unlink(missing_ok=True)
-    notes = tuple(translate_message(note, {}) for note in result_notes(result.folder))
-    return RunOutput(result.folder, notes, result)
+    result = prepared.result.folder
+    notes = tuple(translate_message(note, {}) for note in result_notes(result))
+    return RunOutput(result, notes, prepared)
 
 
 def _cached_result(
@@ -132,9 +136,10 @@ def _cached_result(
     place: ResultPlace,
     names: Mapping[str, str],
     environment: WorkerEnvironment,
-) -> Generator[WorkerUpdate, None, ResultArrays]:
-    """The result of a job: an earlier one of the same content, or a worker's."""
-    cache, key, result = place.cache, "", None
+) -> Generator[WorkerUpdate, None, PreparedObject]:
+    """What is built of a job's result: an earlier one of the same content, or a worker's."""
+    cache, key = place.cache, ""
+    result: ResultArrays | None = None
     if cache is not None:
         key = yield from _in_thread(partial(_job_key, job, environment), _LOOKING)
     if cache is not None and key:
@@ -144,14 +149,16 @@ def _cached_result(
         worker = _run_worker(lambda: start_decompose(job, environment), names)
         yield from _in_time(worker, Pace(job.max_size))
         result = yield from _in_thread(partial(read_result, job.output), _READING)
-    result = yield from _in_thread(partial(prepared, result, place.build), _READING)
+    prepared = yield from _in_thread(
+        partial(prepare, result, place.build, with_photo=place.with_photo), _READING
+    )
     if cache is not None and key:
         yield from _in_thread(partial(cache.trim, key), _READING)
         if place.keep:
             kept = place.folder / RESULT
             yield from _in_thread(partial(_copy_result, job.output, kept), _READING)
-            result = replace(result, folder=kept)
-    return result
+            prepared = replace(prepared, result=replace(prepared.result, folder=kept))
+    return prepared
 
 
 def _job_key(job: DecomposeJob, environment: WorkerEnvironment) -> str:

@@ -26,7 +26,8 @@ from isc_core.result_files.exports.targets import PACKED, TARGETS
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 
 from ..scene.build import BuiltObject
-from ..scene.material_edits import LEVEL_FACTOR, linear_colors, specular_level, surface_node
+from ..scene.color_bake import linear_colors
+from ..scene.material_edits import LEVEL_FACTOR, specular_level, surface_node
 
 FORMATS = ("PNG8", "PNG16", "EXR")
 PLASTIC = 0.5  # of a specular texture, as in Blender and Unreal

@@ -20,7 +20,7 @@ from typing import Any
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import ResultArrays
+from ..scene.preparation import PreparedObject
 from ..worker.process import WorkerProcess, WorkerState, WorkerUpdate
 from .messages import busy_message
 
@@ -35,17 +35,22 @@ class RunOutput:
         File or folder.
     notes : tuple of str
         Notes on the result; those that advise something begin with "note: ".
-    result : ResultArrays or None
-        What was read from the folder, if it was read.
+    prepared : PreparedObject or None
+        What is built of the folder, if it was read.
     """
 
     path: Path
     notes: tuple[str, ...] = ()
-    result: ResultArrays | None = None
+    prepared: PreparedObject | None = None
 
 
 RunSteps = Generator[WorkerUpdate, None, RunOutput]
 """Yields progress and returns the output; raises `InputError` or `WorkerFailed`."""
+
+ImportSteps = Generator[None, None, str]
+"""Imports an output in short steps and returns one line on it; raises `InputError`."""
+
+IMPORT_SECONDS = 0.005  # of steps at a time; a longer one is alone
 
 _REMOVE_SECONDS = 5.0
 
@@ -117,8 +122,8 @@ class WorkerRun:
     steps : RunSteps
         The work.
     finish : callable
-        Called with Blender's context and the output; imports the result and returns one line on
-        it. It decides what is kept of the folder.
+        Called with Blender's context and the output; the steps that import the result. They decide
+        what is kept of the folder; closed before their end, they leave the scene as it was.
     folder : Path
         The run's own folder, deleted unless the run succeeds.
 
@@ -131,13 +136,17 @@ class WorkerRun:
     status : RunStatus
         Current status.
     longest_call_ms : float
-        Longest call except that of `finish`, in milliseconds.
+        Longest call, in milliseconds.
     import_ms : float
-        Duration of `finish`, in milliseconds.
+        Time from the first step of `finish` to its last, in milliseconds.
     """
 
     def __init__(
-        self, title: str, steps: RunSteps, finish: Callable[[Any, RunOutput], str], folder: Path
+        self,
+        title: str,
+        steps: RunSteps,
+        finish: Callable[[Any, RunOutput], ImportSteps],
+        folder: Path,
     ) -> None:
         self.title = title
         self.folder = folder
@@ -147,6 +156,8 @@ class WorkerRun:
         self._steps = steps
         self._finish = finish
         self._output: RunOutput | None = None
+        self._importing: ImportSteps | None = None
+        self._import_began = 0.0
 
     @property
     def ended(self) -> bool:
@@ -180,7 +191,7 @@ class WorkerRun:
         self.longest_call_ms = max(self.longest_call_ms, 1e3 * seconds)
 
     def import_result(self, context: Any) -> RunStatus:
-        """Import the result of a run that is ready: the one call that may take longer.
+        """Import a part of the result of a run that is ready, for `IMPORT_SECONDS`.
 
         Parameters
         ----------
@@ -190,16 +201,24 @@ class WorkerRun:
         Returns
         -------
         RunStatus
-            The new status.
+            The new status; READY until the last part is imported.
         """
         if self.status.state != RunState.READY or self._output is None:
             return self.status
         began = time.perf_counter()
         with self._ended_by_errors():
-            outcome = self._finish(context, self._output)
-            self.status = replace(self.status, notes=self._output.notes)
-            self._end(RunState.DONE, outcome)
-        self.import_ms = 1e3 * (time.perf_counter() - began)
+            if self._importing is None:
+                self._importing, self._import_began = self._finish(context, self._output), began
+            try:
+                next(self._importing)
+                while time.perf_counter() - began < IMPORT_SECONDS:
+                    next(self._importing)
+            except StopIteration as stop:
+                self.status = replace(self.status, notes=self._output.notes)
+                self._end(RunState.DONE, stop.value)
+        now = time.perf_counter()
+        self.record_call(now - began)
+        self.import_ms = 1e3 * (now - self._import_began)
         return self.status
 
     def cancel(self) -> RunStatus:
@@ -252,6 +271,8 @@ class WorkerRun:
 
     def _end(self, state: RunState, message: str, log: str = "") -> None:
         self._steps.close()
+        if self._importing is not None:
+            self._importing.close()
         self.status = replace(self.status, state=state, stage="", message=message, log=log)
         if state != RunState.DONE:
             remove_folder(self.folder)

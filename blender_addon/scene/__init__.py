@@ -6,6 +6,7 @@ camera frame becomes (x, -z, y).
 """
 
 from ..datablocks.provenance import is_isc_datablock
-from .build import BuildOptions, BuiltObject, build_object, find_built
+from .build import BuiltObject, build_object, find_built
+from .preparation import BuildOptions
 
 __all__ = ["BuildOptions", "BuiltObject", "build_object", "find_built", "is_isc_datablock"]

@@ -15,14 +15,14 @@ from isc_core.result_files.vertex_normals import interpolated_normals
 from isc_core.shading.perspective import view_directions
 
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
-from ..files.result_arrays import PreparedBody, ResultArrays
+from ..files.result_arrays import ResultArrays
 from .camera import camera_of
 
 
 def body_geometry(
     result: ResultArrays, size_metres: float, back: str, triangles: int
 ) -> tuple[MeshGeometry, np.ndarray]:
-    """Return the mesh of a body, and its normal map.
+    """Return the mesh of a body, and its normal map; this may run in another thread.
 
     Parameters
     ----------
@@ -47,10 +47,7 @@ def body_geometry(
     InputError
         If the object is too thin for a mesh, or the size is not positive.
     """
-    prepared = result.body
-    if prepared is None or (prepared.back, prepared.triangles) != (back, triangles):
-        prepared = prepare_body(result, back, triangles)
-    body, smooth, detail = prepared.body, prepared.smooth, prepared.detail
+    body, smooth, detail = _solid(result, back, triangles)
     vertices = _placed(result, body) * metres_per_pixel(result, size_metres)
     normals = _face_normals(vertices, body.faces)
     normals[: len(smooth)] = smooth
@@ -69,24 +66,8 @@ def body_geometry(
     return geometry, ((detail + 1) / 2).astype(np.float32)
 
 
-def prepare_body(result: ResultArrays, back: str, triangles: int) -> PreparedBody:
-    """Make the mesh of a body in pixels; this may run in another thread.
-
-    Parameters
-    ----------
-    result, back, triangles
-        As for `body_geometry`.
-
-    Returns
-    -------
-    PreparedBody
-        The mesh.
-
-    Raises
-    ------
-    InputError
-        If the object is too thin for a mesh.
-    """
+def _solid(result: ResultArrays, back: str, triangles: int) -> tuple[Body, np.ndarray, np.ndarray]:
+    """The mesh in pixels, the normals of its visible vertices, and the tangent-space normals."""
     camera, (height, width) = camera_of(result), result.mask.shape
     view = np.array([0.0, 0.0, 1.0])
     if camera is not None:
@@ -94,7 +75,7 @@ def prepare_body(result: ResultArrays, back: str, triangles: int) -> PreparedBod
     cosine = (result.normal * view).sum(-1)
     body = make_body(_heights(result), cosine, result.mask, result.mask, Back(back), triangles)
     smooth, detail = interpolated_normals(body.visible, _continued_normals(result, body), view)
-    return PreparedBody(back, triangles, body, smooth, detail)
+    return body, smooth, detail
 
 
 def _heights(result: ResultArrays) -> np.ndarray:

@@ -3,27 +3,23 @@ updates the same datablocks.
 """
 
 import json
+from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
 
 import bpy
-import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.result_files.solids.body import Back
 
 from ..datablocks.images import (
     COLOR,
     DATA,
+    MAPS,
     SRGB,
     attach_maps,
-    ensure_image,
-    ensure_maps,
-    ensure_png_texture,
-    ensure_texture,
+    put_image,
     require_color_spaces,
-    scaled_png,
 )
-from ..datablocks.mesh import MeshGeometry, fill_mesh, front_geometry
+from ..datablocks.mesh import replace_mesh
 from ..datablocks.provenance import (
     KEY,
     PHOTO_HASH,
@@ -37,9 +33,9 @@ from ..datablocks.provenance import (
     tag,
     write_provenance,
 )
+from ..datablocks.staging import StagedBlocks, stage
 from ..files.result_arrays import ResultArrays
-from .body import body_geometry, prepare_body
-from .camera import ensure_camera, eye_of, set_render_size
+from .camera import ensure_camera, set_render_size
 from .camera_background import set_background_photo
 from .collection import (
     ensure_collection,
@@ -49,79 +45,16 @@ from .collection import (
     use_standard_view,
 )
 from .copies import COPY, OBJECT, find_material
-from .displacement import add_displacement, flatten, remove_displacement
+from .displacement import add_displacement, remove_displacement
 from .hand_edits import remember_mesh
-from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
+from .material import MaterialMaps, ensure_material
 from .photo_highlights import forget_view
 from .placement import free_place
-from .specular_share import specular_share
+from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ensure_sun, relight
 from .world import ensure_world
 
-# `BuildOptions.own_shadows` of each item of the panel.
-OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
 LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
-_DEFAULT_ROUGHNESS = 0.5
-
-
-@dataclass(frozen=True)
-class BuildOptions:
-    """What is built, and which of the user's settings may change.
-
-    The field names are part of the JSON text that files store.
-
-    Attributes
-    ----------
-    size_metres : float
-        Longer side of the object.
-    own_scene : bool
-        Whether to build in a new scene. In a shared scene, a new object stands at the 3D cursor,
-        and world, active camera, resolution and view transform change only with the next four
-        options.
-    set_world, set_camera, set_resolution, set_view_transform : bool
-        What of a shared scene may change.
-    light_and_camera : bool
-        Whether the photo's camera and the estimated sun come along into a shared scene, in a
-        collection of their own that is unchecked at first. A new scene always has the camera.
-    photo_resolution : bool
-        Whether renders have the photo's resolution instead of that of the maps.
-    sun : bool
-        Whether to use a sun and uniform light instead of the environment map.
-    displacement : bool
-        Whether to displace a flat grid by a modifier instead of building the height mesh.
-    back : str
-        A value of `Back`; "" builds the result's own mesh, whose vertices are pixels.
-    triangles : int
-        The most of the visible side of a mesh with a `back`; 0 for two at each pixel.
-    specular_from : str
-        Source of the highlights: the fitted "lobe", the photo's specular "image" until light,
-        camera or pose change, or "none".
-    own_shadows : bool or None
-        Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
-        already contains those of the photo, so the object looks as in the photo without them. None
-        enables them for a new object in a shared scene, and keeps those of an existing object.
-    all_maps : bool
-        Whether the file also holds the layers and maps that neither material nor exports use.
-    name : str
-        Name of the object; "" for the result's own.
-    """
-
-    size_metres: float = 0.1
-    own_scene: bool = True
-    set_world: bool = False
-    set_camera: bool = False
-    set_resolution: bool = False
-    set_view_transform: bool = False
-    light_and_camera: bool = True
-    photo_resolution: bool = False
-    sun: bool = False
-    displacement: bool = False
-    back: str = ""
-    triangles: int = 50_000
-    specular_from: SpecularSource = "lobe"
-    own_shadows: bool | None = None
-    all_maps: bool = True
-    name: str = ""
 
 
 @dataclass(frozen=True)
@@ -150,6 +83,22 @@ class BuiltObject:
     world: bpy.types.World
     scene: bpy.types.Scene
     material: bpy.types.Material
+
+
+@dataclass(frozen=True)
+class StagedObject:
+    """An object whose images and mesh are made, and nothing else.
+
+    Attributes
+    ----------
+    prepared : PreparedObject
+        What it is built of.
+    blocks : StagedBlocks
+        Its images and mesh.
+    """
+
+    prepared: PreparedObject
+    blocks: StagedBlocks
 
 
 def build_object(
@@ -186,72 +135,125 @@ def build_object(
         mesh in an edit mode, or a colour configuration without the required colour spaces.
     """
     options = options or BuildOptions()
-    key = _choose_key(options.name or result.name, result, photo)
-    _require_ready(key, options, scene or bpy.context.scene)
-    geometry = None
-    if options.back and not options.displacement:  # a displaced grid is open
-        geometry, normal_map = body_geometry(
-            result, options.size_metres, options.back, options.triangles
-        )
-        result = replace(result, normal_map=normal_map)
-    scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
+    require_options(options)
+    _require_ready(_choose_key(result, options, photo), options, scene or bpy.context.scene)
+    steps = stage_object(prepare(result, options, with_photo=photo is None), photo=photo)
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            return place_object(stop.value, scene=scene, photo=photo)
+
+
+def stage_object(
+    prepared: PreparedObject, *, photo: bpy.types.Image | None = None
+) -> Generator[None, None, StagedObject]:
+    """Make the images and the mesh of an object in short steps; the scene stays as it is.
+
+    Between two steps anything may happen, an undo included. If closed before the end, nothing is
+    left.
+
+    Parameters
+    ----------
+    prepared : PreparedObject
+        What it is built of.
+    photo : bpy.types.Image, optional
+        Image behind the object; not used once the first step has been made.
+
+    Returns
+    -------
+    StagedObject
+        For `place_object`, to be called at once.
+    """
+    key = _choose_key(prepared.result, prepared.options, photo)
+    while True:
+        base = _mesh_number(key)
+        blocks = yield from stage(prepared.files, prepared.mesh, base)
+        if blocks.are_there and _mesh_number(key) == base:
+            return StagedObject(prepared, blocks)
+        blocks.discard()
+
+
+def place_object(
+    staged: StagedObject,
+    *,
+    scene: bpy.types.Scene | None = None,
+    photo: bpy.types.Image | None = None,
+) -> BuiltObject:
+    """Put a staged object in the scene, as `build_object` does, in one short call.
+
+    Parameters
+    ----------
+    staged : StagedObject
+        The object; its datablocks are used or removed.
+    scene, photo
+        As of `build_object`.
+
+    Returns
+    -------
+    BuiltObject
+        The object.
+
+    Raises
+    ------
+    InputError
+        As of `build_object`.
+    """
+    try:
+        return _place(staged.prepared, staged.blocks, scene or bpy.context.scene, photo)
+    finally:
+        staged.blocks.discard()
+
+
+def _place(
+    prepared: PreparedObject,
+    blocks: StagedBlocks,
+    scene: bpy.types.Scene,
+    photo: bpy.types.Image | None,
+) -> BuiltObject:
+    result, options = prepared.result, prepared.options
+    key = _choose_key(result, options, photo)
+    _require_ready(key, options, scene)
+    if options.own_scene:
+        scene = ensure_scene(key)
     collection = ensure_collection(key, scene)
-    maps = ensure_maps(key, result, options.all_maps)
-    specular = _specular_settings(result, options)
-    material_maps = _material_maps(key, result, maps, specular.share)
-    material = ensure_material(key, material_maps, specular)
-    _remove_unused(key, material_maps)
+    images = {
+        role: put_image(image, key, role)
+        for role in prepared.files
+        if (image := blocks.take_image(role)) is not None
+    }
+    maps = MaterialMaps(
+        base_color=images["base_color"],
+        specular=images["specular"],
+        variation=images.get("specular_variation"),
+        normal=images.get("normal_map"),
+        plain=prepared.plain,
+    )
+    material = ensure_material(key, maps, prepared.specular)
+    _remove_unused(key, maps)
     is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
-    obj = _ensure_object(key, collection, result, options, material, geometry)
+    obj = _ensure_object(key, collection, prepared, blocks.take_mesh(), material)
+    if options.displacement:
+        add_displacement(key, obj, images["displacement"], result.eye is not None)
+    else:
+        remove_displacement(key, obj)
     if is_new and not options.own_scene:
         obj.location = free_place(obj, scene)
-    attach_maps(obj, maps)
-    if photo is None:
-        alpha = result.mask.astype(np.float32)
-        photo = ensure_image(key, "photo", result.image, COLOR, alpha)
-    environment_map = ensure_image(key, "environment_map", result.environment_map, COLOR)
-    world = ensure_world(key, environment_map, result.sun_ambient, options.sun)
+    attach_maps(key, obj, {name: images[name] for name in MAPS if name in images})
+    world = ensure_world(key, images["environment_map"], result.sun_ambient, options.sun)
     # Saves and appends the light with the object, whether or not a scene uses it.
     obj["isc_world"] = world
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))
     relight(obj, options.sun)
     camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
-    if camera is not None:
+    photo = photo or images.get("photo")
+    if camera is not None and photo is not None:
         set_background_photo(camera, photo)
     built = BuiltObject(collection, obj, camera, world, scene, material)
     _set_scene(built, options, result)
     forget_view(material)  # the layer of highlights belongs to what is seen now
     return built
-
-
-def prepared(result: ResultArrays, options: BuildOptions) -> ResultArrays:
-    """Make in advance what takes time and no datablock; this may run in another thread.
-
-    Parameters
-    ----------
-    result : ResultArrays
-        The result.
-    options : BuildOptions
-        What will be built.
-
-    Returns
-    -------
-    ResultArrays
-        With `encoded`, if it has a fine texture, and with `body`, if it will have a back.
-
-    Raises
-    ------
-    InputError
-        If the object is too thin for a mesh.
-    """
-    if result.texture is not None:
-        share = _specular_settings(result, options).share
-        encoded = {gain: scaled_png(result.texture, gain) for gain in {1.0, 1 / (1 - share)}}
-        result = replace(result, encoded=encoded)
-    if options.back and not options.displacement:
-        result = replace(result, body=prepare_body(result, options.back, options.triangles))
-    return result
 
 
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
@@ -290,8 +292,9 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     )
 
 
-def _choose_key(name: str, result: ResultArrays, photo: bpy.types.Image | None) -> str:
+def _choose_key(result: ResultArrays, options: BuildOptions, photo: bpy.types.Image | None) -> str:
     """The name, numbered if another photo's object has it: folders may share file names."""
+    name = options.name or result.name
     key, number = name, 1
     while (obj := find_tagged(bpy.data.objects, key, OBJECT)) is not None and not _is_of_same_photo(
         obj, result, photo
@@ -312,19 +315,11 @@ def _is_of_same_photo(
 
 
 def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:
-    if not 0 < options.size_metres < 1e6:
-        raise InputError(
-            f"a size of {options.size_metres} metres cannot be built: choose one above 0"
-        )
     if not options.own_scene and scene.library is not None:
         raise InputError(
             f"the scene {scene.name} is linked from another file and cannot be changed: "
             "enable New Scene"
         )
-    if options.back not in ("", *Back):
-        raise InputError(f"there is no back {options.back!r}: choose {', '.join(Back)}")
-    if options.triangles < 0:
-        raise InputError("the number of triangles cannot be negative: 0 keeps every pixel")
     require_color_spaces(COLOR, DATA, SRGB)
     require_local(key)
     obj = find_tagged(bpy.data.objects, key, OBJECT)
@@ -332,33 +327,34 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
         raise InputError(f"{obj.name} is being edited: return to Object Mode first")
 
 
+def _mesh_number(key: str) -> int:
+    """Blender's number of the mesh of an object; 0 if there is no object."""
+    obj = find_tagged(bpy.data.objects, key, OBJECT)
+    return 0 if obj is None else int(obj.data.session_uid)
+
+
 def _ensure_object(
     key: str,
     collection: bpy.types.Collection,
-    result: ResultArrays,
-    options: BuildOptions,
+    prepared: PreparedObject,
+    mesh: bpy.types.Mesh,
     material: bpy.types.Material,
-    geometry: MeshGeometry | None,
 ) -> bpy.types.Object:
-    obj, shadows = find_tagged(bpy.data.objects, key, OBJECT), options.own_shadows
+    obj, shadows = find_tagged(bpy.data.objects, key, OBJECT), prepared.options.own_shadows
     if obj is None:
-        mesh = tag(bpy.data.meshes.new(datablock_name(key)), key, "mesh")
+        mesh.name = datablock_name(key)
         obj = tag(bpy.data.objects.new(datablock_name(key), mesh), key, OBJECT)
-        shadows = not options.own_scene if shadows is None else shadows
+        shadows = not prepared.options.own_scene if shadows is None else shadows
+    else:
+        obj.shape_key_clear()
+        replace_mesh(obj.data, mesh)
+    tag(mesh, key, "mesh")
+    remember_mesh(mesh, prepared.checksum)
     if shadows is not None:
         obj.visible_shadow = obj.visible_diffuse = shadows
     link_object(obj, collection)
-    obj.shape_key_clear()
-    if options.displacement:
-        sheet = front_geometry(result, options.size_metres)
-        fill_mesh(obj.data, flatten(sheet, eye_of(result, options.size_metres)))
-        add_displacement(key, obj, result, options.size_metres)
-    else:
-        fill_mesh(obj.data, geometry or front_geometry(result, options.size_metres))
-        remove_displacement(key, obj)
-    remember_mesh(obj.data)
-    if not obj.data.materials:
-        obj.data.materials.append(material)
+    if not mesh.materials:
+        mesh.materials.append(material)
     return obj
 
 
@@ -383,48 +379,11 @@ def _ensure_camera_and_light(
     )
 
 
-def _material_maps(
-    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image], share: float
-) -> MaterialMaps:
-    variation, normal = None, None
-    if result.specular_variation is not None:
-        values = result.specular_variation / _peak(result)
-        variation = ensure_texture(key, "specular_variation", values, DATA)
-    # A mesh with a vertex per pixel has all detail in its own normals.
-    if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
-        normal = ensure_texture(key, "normal_map", result.normal_map, DATA)
-    if result.texture is not None:
-        gain = 1 / (1 - share)
-        png = result.encoded.get(gain) or scaled_png(result.texture, gain)
-        base_color = ensure_png_texture(key, "base_color", png)
-    else:
-        base_color = ensure_texture(key, "base_color", result.base_color / (1 - share), SRGB)
-    plain = result.encoded.get(1.0)
-    return MaterialMaps(base_color, maps["specular"], variation, normal, plain)
-
-
-def _peak(result: ResultArrays) -> float:
-    """The largest factor of the specular level: textures hold values up to 1."""
-    variation = result.specular_variation
-    return 1.0 if variation is None else max(1.0, float(variation.max()))
-
-
 def _remove_unused(key: str, maps: MaterialMaps) -> None:
     """Remove the normal map of an earlier mesh that had fewer triangles than this one."""
     old = find_tagged(bpy.data.images, key, "normal_map")
     if maps.normal is None and old is not None and old.users == 0:
         bpy.data.images.remove(old)
-
-
-def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:
-    """Values of the fit; without a fitted level the object is diffuse, as in the photo's light."""
-    level = result.specular_level if np.isfinite(result.specular_level) else 0.0
-    roughness = result.roughness if np.isfinite(result.roughness) else _DEFAULT_ROUGHNESS
-    mean = level if options.specular_from != "none" else 0.0
-    if result.specular_variation is not None:
-        mean *= float(result.specular_variation[result.mask].mean())
-    share = specular_share(mean, roughness, result.normal[result.mask][:, 2])
-    return SpecularSettings(level * _peak(result), roughness, options.specular_from, share)
 
 
 def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) -> None:

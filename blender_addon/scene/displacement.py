@@ -14,7 +14,6 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..datablocks.images import DATA, ensure_image
 from ..datablocks.mesh import UV, MeshGeometry, front_geometry, metres_per_pixel
 from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
@@ -94,10 +93,31 @@ def displacement_vectors(result: ResultArrays, size_metres: float, eye: np.ndarr
     return vectors
 
 
+def displacement_map(result: ResultArrays, size_metres: float) -> np.ndarray:
+    """Return what the grid is displaced by; this may run in another thread.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    size_metres : float
+        Longer side of the object.
+
+    Returns
+    -------
+    (H, W) or (H, W, 3) ndarray
+        Heights, or before a pinhole camera vectors.
+    """
+    eye = eye_of(result, size_metres)
+    if eye is None:
+        return displacement_heights(result, size_metres)
+    return displacement_vectors(result, size_metres, eye)
+
+
 def add_displacement(
-    key: str, obj: bpy.types.Object, result: ResultArrays, size_metres: float
+    key: str, obj: bpy.types.Object, image: bpy.types.Image, along_rays: bool
 ) -> None:
-    """Add or update the modifier, its texture and its image; an edited strength is kept.
+    """Add or update the modifier and its texture; an edited strength is kept.
 
     Parameters
     ----------
@@ -105,18 +125,11 @@ def add_displacement(
         Name of the photo.
     obj : bpy.types.Object
         The object with the flat grid.
-    result : ResultArrays
-        The result.
-    size_metres : float
-        Longer side of the object.
+    image : bpy.types.Image
+        The displacements.
+    along_rays : bool
+        Whether they are vectors.
     """
-    eye = eye_of(result, size_metres)
-    offsets = (
-        displacement_heights(result, size_metres)
-        if eye is None
-        else displacement_vectors(result, size_metres, eye)
-    )
-    image = ensure_image(key, "displacement", offsets, DATA)
     texture = find_tagged(bpy.data.textures, key, "displacement")
     texture = texture or tag(
         bpy.data.textures.new(datablock_name(key, "displacement"), "IMAGE"), key, "displacement"
@@ -124,7 +137,7 @@ def add_displacement(
     texture.image, texture.use_interpolation, texture.extension = image, False, "EXTEND"
     modifier = obj.modifiers.get(MODIFIER) or obj.modifiers.new(MODIFIER, "DISPLACE")
     modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV
-    modifier.direction, modifier.mid_level = "NORMAL" if eye is None else "RGB_TO_XYZ", 0.0
+    modifier.direction, modifier.mid_level = "RGB_TO_XYZ" if along_rays else "NORMAL", 0.0
     texture.use_clamp = False  # heights and vectors have negative parts
 
 

@@ -10,18 +10,38 @@ import zlib
 import bpy
 import numpy as np
 
+from ..datablocks.mesh import MeshArrays
+
 _BUILT = "isc_built_crc32"
 
 
-def remember_mesh(mesh: bpy.types.Mesh) -> None:
+def remember_mesh(mesh: bpy.types.Mesh, checksum: str) -> None:
     """Store the checksum of a mesh as it was built.
 
     Parameters
     ----------
     mesh : bpy.types.Mesh
         The mesh.
+    checksum : str
+        As `checksum_of` its arrays.
     """
-    mesh[_BUILT] = _checksum(mesh)
+    mesh[_BUILT] = checksum
+
+
+def checksum_of(arrays: MeshArrays) -> str:
+    """Return the checksum of a mesh that will be built; this may run in another thread.
+
+    Parameters
+    ----------
+    arrays : MeshArrays
+        The mesh.
+
+    Returns
+    -------
+    str
+        Eight hexadecimal digits.
+    """
+    return _checksum(arrays.positions, arrays.corners)
 
 
 def is_edited_by_hand(obj: bpy.types.Object) -> bool:
@@ -40,13 +60,15 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     mesh = obj.data
     if mesh.shape_keys is not None:
         return True
-    return _BUILT in mesh and mesh[_BUILT] != _checksum(mesh)
-
-
-def _checksum(mesh: bpy.types.Mesh) -> str:
+    if _BUILT not in mesh:
+        return False
     places = np.empty(3 * len(mesh.vertices), np.float32)
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.vertices.foreach_get("co", places)
     mesh.loops.foreach_get("vertex_index", corners)
+    return bool(mesh[_BUILT] != _checksum(places, corners))
+
+
+def _checksum(places: np.ndarray, corners: np.ndarray) -> str:
     # As text: Blender stores whole numbers with a sign.
     return f"{zlib.crc32(corners.tobytes(), zlib.crc32(places.tobytes())):08x}"

@@ -10,6 +10,7 @@ from typing import Literal
 
 import bpy
 
+from ..datablocks.images import ImageFile
 from ..datablocks.mesh import UV
 from ..datablocks.nodes import add_node, connect, node_tree
 from ..datablocks.provenance import datablock_name, find_tagged, tag
@@ -20,6 +21,7 @@ from .material_edits import (
     OWN_LEVEL,
     SURFACE,
     bake_edits,
+    begin_bake,
     dichromatic_node,
     forget_edits,
 )
@@ -43,15 +45,15 @@ class MaterialMaps:
         Spatial factor of the specular level.
     normal : bpy.types.Image or None
         Tangent-space normal map.
-    plain : bytes or None
-        PNG file of the base colour without its compensation for the specular share, if known.
+    plain : ImageFile or None
+        The base colour without its compensation for the specular share, if known.
     """
 
     base_color: bpy.types.Image
     specular: bpy.types.Image | None
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
-    plain: bytes | None = None
+    plain: ImageFile | None = None
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,10 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         material["isc_highlights"] = maps.specular
     if specular.source == "image":
         show_highlights(material)
-    bake_edits(material, maps.plain)
+    if bpy.app.background:
+        bake_edits(material, maps.plain)
+    else:
+        begin_bake(material, maps.plain)  # colours that take longer are baked later, as after edits
     return material
 
 

@@ -8,14 +8,10 @@ moves, the group's output is linked to the BSDF, so that the graphics processor 
 then `bake_edits` writes the edited colours into a texture and links that. An unedited base colour
 is the recovered texture itself.
 
-Equation: base colour = g v (1 - p s) rotated(rho; hue, saturation), as the group computes it,
-clipped at 1 and coded in 8 bits; see `dichromatic`.
+Equation: see `color_bake`.
 
-Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
-saturation and value).
-
-Limits: a base colour brighter than white is clipped. Keyframed edits, and a base colour that comes
-from the user's own nodes, stay live: exporters then see the unedited image, or none.
+Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
+exporters then see the unedited image, or none.
 """
 
 from dataclasses import dataclass
@@ -24,12 +20,19 @@ from typing import Any
 import bpy
 import numpy as np
 
-from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.shading.brdf.ggx import F0
 
-from ..datablocks.images import SRGB, new_png_texture, new_texture, scaled_png
+from ..datablocks.images import ImageFile, image_name, new_image
 from ..datablocks.nodes import add_node
 from ..datablocks.provenance import KEY, ROLE, tag
+from .color_bake import (
+    UNCHANGED,
+    ColorEdit,
+    ColorSource,
+    color_source,
+    edited_file,
+    recolour_reflectance,
+)
 from .dichromatic import DICHROMATIC, MOST
 
 SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
@@ -42,41 +45,6 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
 # index of refraction.
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
-_UNCHANGED = 1e-6  # as in the group
-
-
-@dataclass(frozen=True)
-class ColorEdit:
-    """An edit of the base colour.
-
-    Attributes
-    ----------
-    hue : float
-        Rotation of the hue; 0.5 changes nothing.
-    saturation : float
-        Factor of the saturation; 1 changes nothing.
-    gain : float
-        Factor of all channels; 1 changes nothing.
-    """
-
-    hue: float = 0.5
-    saturation: float = 1.0
-    gain: float = 1.0
-
-    @property
-    def values(self) -> tuple[float, float, float]:
-        """The three numbers."""
-        return self.hue, self.saturation, self.gain
-
-    @property
-    def only_scales(self) -> bool:
-        """Whether hue and saturation stay."""
-        return bool(np.abs(np.subtract(self.values[:2], (0.5, 1.0))).max() <= _UNCHANGED)
-
-    @property
-    def changes_nothing(self) -> bool:
-        """Whether the edited colour is the recovered one."""
-        return bool(np.abs(np.subtract(self.values, (0.5, 1.0, 1.0))).max() <= _UNCHANGED)
 
 
 def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
@@ -144,40 +112,119 @@ def apply_edits(material: bpy.types.Material) -> bool:
     return _can_bake(material, group)
 
 
-def bake_edits(material: bpy.types.Material, plain: bytes | None = None) -> None:
+@dataclass(frozen=True)
+class PendingBake:
+    """Edited colours that have to be computed, see `color_bake`.
+
+    Attributes
+    ----------
+    state : str
+        What the colours depend on, as text.
+    source : ColorSource
+        The recovered colours.
+    edit : ColorEdit
+        Their edit.
+    """
+
+    state: str
+    source: ColorSource
+    edit: ColorEdit
+
+
+def bake_edits(material: bpy.types.Material, plain: ImageFile | None = None) -> None:
     """Write all edits into the BSDF and its textures.
 
     Parameters
     ----------
     material : bpy.types.Material
         A local material of ISC; nothing changes where there is nothing to write.
-    plain : bytes, optional
-        PNG file of the base colour without its compensation for the specular share.
+    plain : ImageFile, optional
+        The base colour without its compensation for the specular share.
+    """
+    pending = begin_bake(material, plain)
+    if pending is not None and (file := edited_file(pending.source, pending.edit)) is not None:
+        finish_bake(material, pending.state, file)
+
+
+def begin_bake(material: bpy.types.Material, plain: ImageFile | None = None) -> PendingBake | None:
+    """Write all edits into the BSDF that need no computing of colours.
+
+    Parameters
+    ----------
+    material, plain : bpy.types.Material, ImageFile
+        As of `bake_edits`.
+
+    Returns
+    -------
+    PendingBake or None
+        The colours to compute, in any thread, for `finish_bake`; None if all is written.
     """
     if not apply_edits(material):
-        return
+        return None
     surface, group = surface_node(material), dichromatic_node(material)
     if surface is None or group is None:
-        return
+        return None
     tree, edit, target = material.node_tree, _color_edit(group.inputs), surface.inputs["Base Color"]
-    source = group.inputs["Base Color"]
+    source, state = group.inputs["Base Color"], _color_state(group)
     if not source.is_linked:
         color = recolour_reflectance(np.array(source.default_value[:3]), *edit.values)
         tree.links.remove(target.links[0])
         target.default_value = (*np.clip(color, 0, 1), 1.0)
     elif not edit.changes_nothing:
-        node = _edited_texture(material, source.links[0].from_node)
         share = group.inputs["Specular Share"].default_value
-        if not (edit.only_scales and abs(edit.gain + share - 1) <= _UNCHANGED):
-            plain = None
-        _replace_image(node, _bake(material, source.links[0].from_node.image, edit, plain))
-        tree.links.new(node.outputs["Color"], target)
+        if plain is None or not (edit.only_scales and abs(edit.gain + share - 1) <= UNCHANGED):
+            return PendingBake(state, color_source(source.links[0].from_node.image), edit)
+        finish_bake(material, state, plain)
     else:
         tree.links.new(source.links[0].from_socket, target)
         if (node := tree.nodes.get(EDITED)) is not None:
             _replace_image(node, None)
             tree.nodes.remove(node)
-    material[_COLOR] = _color_state(group)
+    material[_COLOR] = state
+    return None
+
+
+def finish_bake(material: bpy.types.Material, state: str, file: ImageFile) -> None:
+    """Give a material its edited colours; does nothing if it has been edited since.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    state : str
+        As of `PendingBake`.
+    file : ImageFile
+        The colours.
+    """
+    if color_state(material) != state or not apply_edits(material):
+        return
+    surface, group = surface_node(material), dichromatic_node(material)
+    if surface is None or group is None:
+        return
+    key, role = str(material.get(KEY, material.name)), "edited_base_color"
+    image = tag(new_image(file), key, role)
+    image.name = image_name(key, role)
+    node = _edited_texture(material, group.inputs["Base Color"].links[0].from_node)
+    _replace_image(node, image)
+    material.node_tree.links.new(node.outputs["Color"], surface.inputs["Base Color"])
+    material[_COLOR] = state
+
+
+def color_state(material: bpy.types.Material) -> str:
+    """Return what the edited colours of a material depend on.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+
+    Returns
+    -------
+    str
+        Equal texts mean equal colours; "" without the node of the edits.
+    """
+    group = dichromatic_node(material)
+    return "" if group is None else _color_state(group)
 
 
 def forget_edits(material: bpy.types.Material) -> None:
@@ -194,40 +241,6 @@ def forget_edits(material: bpy.types.Material) -> None:
     node = material.node_tree.nodes.get(EDITED) if material.node_tree else None
     if node is not None and node.type == "TEX_IMAGE":
         _replace_image(node, None)
-
-
-def recolour_reflectance(
-    reflectance: np.ndarray, hue: float, saturation: float, gain: float
-) -> np.ndarray:
-    """Apply the group's colour edits.
-
-    Parameters
-    ----------
-    reflectance : (..., 3) ndarray
-        Linear Rec.709, 0 or more.
-    hue : float
-        Rotation of the hue; 0.5 changes nothing.
-    saturation : float
-        Factor of the saturation; 1 changes nothing.
-    gain : float
-        Factor of all channels.
-
-    Returns
-    -------
-    (..., 3) ndarray
-        Linear Rec.709, not clipped at 1.
-    """
-    if abs(hue - 0.5) <= _UNCHANGED and abs(saturation - 1) <= _UNCHANGED:
-        return gain * reflectance
-    value, low = reflectance.max(-1), reflectance.min(-1)
-    spread = np.where(value > low, value - low, 1.0)
-    red, green, blue = np.moveaxis(reflectance, -1, 0)
-    sector = np.where(green == value, 2 + (blue - red) / spread, 4 + (red - green) / spread)
-    sector = np.where(red == value, (green - blue) / spread, sector) + 6 * (hue + 0.5)
-    share = np.clip(saturation * (value - low) / np.where(value > 0, value, 1.0), 0, 1)
-    place = (np.array([5.0, 3.0, 1.0]) + sector[..., None]) % 6
-    removed = (value * share)[..., None] * np.clip(np.minimum(place, 4 - place), 0, 1)
-    return np.asarray(gain * (value[..., None] - removed))
 
 
 def refraction(level: float) -> float:
@@ -264,38 +277,6 @@ def specular_level(surface: Any) -> float:
     level = surface.inputs["Specular IOR Level"]
     factor = OWN_LEVEL if level.is_linked else level.default_value
     return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / 0.5)
-
-
-def linear_colors(image: bpy.types.Image) -> np.ndarray:
-    """Return the colours of an image.
-
-    Parameters
-    ----------
-    image : bpy.types.Image
-        The image.
-
-    Returns
-    -------
-    (H, W, 3) ndarray
-        Linear Rec.709, row 0 at the bottom.
-    """
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    colors = pixels.reshape(height, width, 4)[..., :3].astype(float)
-    # Blender returns the codes of such an image, and linear values of others.
-    if not image.is_float and image.colorspace_settings.name == SRGB:
-        return np.asarray(srgb_to_linear(colors))
-    return colors
-
-
-def _codes(image: bpy.types.Image) -> np.ndarray:
-    """(H, W, 3) uint8, row 0 at the top, of an image of 8 bits."""
-    width, height = image.size
-    pixels = np.empty(width * height * 4, np.float32)
-    image.pixels.foreach_get(pixels)
-    colors = pixels.reshape(height, width, 4)[::-1, :, :3]
-    return (255 * colors + 0.5).astype(np.uint8)
 
 
 def _color_edit(inputs: Any) -> ColorEdit:
@@ -338,9 +319,9 @@ def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> N
     )
     wanted = [refraction(level * gain * (1 - shown)), min(1.0, roughness / max(gloss, 1e-3))]
     written = material.get(_NUMBERS)
-    if written is None or abs(written[0] - wanted[0]) > _UNCHANGED:
+    if written is None or abs(written[0] - wanted[0]) > UNCHANGED:
         surface.inputs["IOR"].default_value = wanted[0]
-    if written is None or abs(written[1] - wanted[1]) > _UNCHANGED:
+    if written is None or abs(written[1] - wanted[1]) > UNCHANGED:
         surface.inputs["Roughness"].default_value = wanted[1]
     if written is None or np.abs(np.subtract(list(written), wanted)).max() > 0:
         material[_NUMBERS] = wanted
@@ -367,7 +348,10 @@ def _can_bake(material: bpy.types.Material, group: bpy.types.Node) -> bool:
     if not source.is_linked:
         return True
     node = source.links[0].from_node
-    return node.type == "TEX_IMAGE" and node.image is not None and bool(node.image.size[0])
+    if node.type != "TEX_IMAGE" or node.image is None:
+        return False
+    # Asking for the size of an image whose pixels Blender has not read yet would read them.
+    return node.image.packed_file is not None or bool(node.image.size[0])
 
 
 def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.types.Node:
@@ -380,20 +364,6 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
         node.location = base.location[0], base.location[1] - 280
         node.parent = base.parent
     return node
-
-
-def _bake(
-    material: bpy.types.Material, image: bpy.types.Image, edit: ColorEdit, png: bytes | None
-) -> bpy.types.Image:
-    """The edited colours; `png` is their file where that is known."""
-    key = str(material.get(KEY, material.name))
-    is_coded = not image.is_float and image.colorspace_settings.name == SRGB
-    if png is None and edit.only_scales and is_coded:
-        png = scaled_png(_codes(image), edit.gain)
-    if png is not None:
-        return tag(new_png_texture(key, "edited_base_color", png), key, "edited_base_color")
-    colors = recolour_reflectance(linear_colors(image), *edit.values)
-    return tag(new_texture(key, "edited_base_color", colors, SRGB), key, "edited_base_color")
 
 
 def _replace_image(node: Any, image: bpy.types.Image | None) -> None:

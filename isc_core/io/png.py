@@ -13,6 +13,7 @@ import numpy as np
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _COLOR_TYPES = {1: 0, 3: 2, 4: 6}  # by the number of channels
 _SUB = 1
+_LENGTH_AND_KIND, _HEADER_LENGTH, _CHECKSUM = 8, 13, 4  # bytes
 
 
 def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
@@ -46,6 +47,41 @@ def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
     data = packer.compress(filtered.data) + packer.flush()
     chunks = ((b"IHDR", header), (b"IDAT", data), (b"IEND", b""))
     return SIGNATURE + b"".join(png_chunk(*chunk) for chunk in chunks)
+
+
+def decode_png(data: bytes) -> np.ndarray:
+    """Decode an image of 8 bits that `encode_png` has written.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+
+    Returns
+    -------
+    (H, W), (H, W, 3) or (H, W, 4) ndarray of uint8
+        Row 0 at the top.
+
+    Raises
+    ------
+    ValueError
+        If another program has written it, or its codes have 16 bits.
+    """
+    start = len(SIGNATURE) + _LENGTH_AND_KIND
+    columns, rows, depth, color_type = struct.unpack_from(">IIBB", data, start)
+    start += _HEADER_LENGTH + _CHECKSUM
+    (length,) = struct.unpack_from(">I", data, start)
+    start += _LENGTH_AND_KIND
+    channels = next((n for n, kind in _COLOR_TYPES.items() if kind == color_type), 0)
+    lines = np.frombuffer(zlib.decompress(data[start : start + length]), np.uint8)
+    if depth != 8 or lines.size != rows * (1 + columns * channels):
+        raise ValueError("the PNG is of another kind")
+    lines = lines.reshape(rows, -1)
+    if (lines[:, 0] != _SUB).any():
+        raise ValueError("the PNG has other filters")
+    shape = (rows, columns, channels)
+    codes = np.cumsum(lines[:, 1:].reshape(shape), axis=1, dtype=np.uint8)
+    return codes[..., 0] if channels == 1 else codes
 
 
 def png_chunk(kind: bytes, data: bytes) -> bytes:

@@ -13,9 +13,10 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 from benchmarks.blender.read_back import READERS, read_back, shown  # noqa: E402
 from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators.export import export_object  # noqa: E402
-from blender_addon.scene.build import BuildOptions, BuiltObject, build_object  # noqa: E402
+from blender_addon.scene.build import BuiltObject, build_object  # noqa: E402
 from blender_addon.scene.material import shows_highlights  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node  # noqa: E402
+from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.evaluation.metrics import psnr  # noqa: E402
 
 EDITS = {

@@ -20,7 +20,8 @@ from blender_addon.operators.messages import join_notes, translate_message  # no
 from blender_addon.operators.request import request_from_settings  # noqa: E402
 from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
 from blender_addon.panels import wrap_text  # noqa: E402
-from blender_addon.scene.build import BuildOptions, find_built  # noqa: E402
+from blender_addon.scene.build import find_built  # noqa: E402
+from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.decomposition.pipeline import ILLUMINATIONS, MODELS  # noqa: E402

@@ -13,9 +13,10 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators import live_edits  # noqa: E402
-from blender_addon.scene.build import BuildOptions, BuiltObject, build_object  # noqa: E402
+from blender_addon.scene.build import BuiltObject, build_object  # noqa: E402
 from blender_addon.scene.material import shows_highlights  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
+from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.evaluation.metrics import psnr  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 
@@ -157,6 +158,8 @@ def test_with_a_window_baking_waits_until_the_slider_rests(
         rendering = "RENDER"
         assert started[0]() is not None and link.is_valid, "it waits for a render to end"
         rendering = ""
+        assert started[0]() is not None, "a thread computes the colors"
+        live_edits._bakes[built.material.session_uid].file.result()
         assert started[0]() is None
     (link,) = surface.inputs["Base Color"].links
     assert link.from_node.type == "TEX_IMAGE"

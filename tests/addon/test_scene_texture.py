@@ -47,18 +47,13 @@ def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -
     assert fine.texture is not None and np.array_equal(codes(image), fine.texture)
 
 
-@pytest.mark.parametrize("in_advance", [False, True])
 def test_with_the_photos_highlights_the_texture_is_not_compensated(
-    blender: Any, fine: ResultArrays, in_advance: bool
+    blender: Any, fine: ResultArrays
 ) -> None:
-    from blender_addon.scene.build import BuildOptions, prepared
-
-    given = prepared(replace(fine, specular_level=1.0, roughness=0.3), BuildOptions())
-    given = given if in_advance else replace(given, encoded={})
-    built = build(given, specular_from="image")
+    built = build(replace(fine, specular_level=1.0, roughness=0.3), specular_from="image")
     assert fine.texture is not None
     off = np.abs(codes(texture(built, "Edited Base Color")) - fine.texture.astype(int))
-    assert off.max() <= (0 if in_advance else 2)
+    assert off.max() == 0
     assert codes(texture(built)).mean() > fine.texture.mean() + 0.5, "for highlights of a lobe"
 
 

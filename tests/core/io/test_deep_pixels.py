@@ -10,7 +10,7 @@ import pytest
 
 from isc_core.errors import InputError
 from isc_core.io.decoders import read_raster
-from isc_core.io.png import SIGNATURE, encode_png, png_chunk
+from isc_core.io.png import SIGNATURE, decode_png, encode_png, png_chunk
 
 CHANNELS = {0: 1, 2: 3, 4: 2, 6: 4}
 PASSES = [(0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4)]
@@ -160,3 +160,11 @@ def test_radiance_hdr_has_the_values_of_another_reader(tmp_path: Path, width: in
         assert cv2.imwrite(str(path), light, (cv2.IMWRITE_HDR_COMPRESSION, compression))
         other = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
         assert (read_raster(path).values == other).all()
+
+
+@pytest.mark.parametrize("shape", [(7, 5), (7, 5, 3), (7, 5, 4)])
+def test_a_png_is_decoded_as_it_was_encoded(shape: tuple[int, ...]) -> None:
+    codes = np.random.default_rng(2).integers(0, 256, shape).astype(np.uint8)
+    np.testing.assert_array_equal(decode_png(encode_png(codes)), codes)
+    with pytest.raises(ValueError, match="another kind"):
+        decode_png(encode_png(codes.astype(np.uint16)))

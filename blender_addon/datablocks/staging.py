@@ -1,0 +1,127 @@
+"""New images and a new mesh that nothing uses yet, made in short steps.
+
+The window lives on between two steps. An undo may take away what was made since the last undo step,
+and loading a file all of it; references from Python would then be invalid. Datablocks are therefore
+known by Blender's number for them (`session_uid`), which is the same after an undo and is not used
+again.
+"""
+
+from collections.abc import Generator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import bpy
+
+from .images import ImageFile, new_image
+from .mesh import MeshArrays, fill_mesh
+
+
+@dataclass
+class StagedBlocks:
+    """New datablocks, until they are taken.
+
+    Attributes
+    ----------
+    images : dict of str to int
+        Numbers of the images, by role.
+    mesh : int
+        Number of the mesh; 0 before it is made.
+    """
+
+    images: dict[str, int] = field(default_factory=dict)
+    mesh: int = 0
+
+    @property
+    def are_there(self) -> bool:
+        """Whether Blender still has all of them."""
+        present = {block.session_uid for block in (*bpy.data.images, *bpy.data.meshes)}
+        return present.issuperset((*self.images.values(), self.mesh))
+
+    def take_image(self, role: str) -> bpy.types.Image | None:
+        """Return an image, which is then no longer one of these.
+
+        Parameters
+        ----------
+        role : str
+            Its role.
+
+        Returns
+        -------
+        bpy.types.Image or None
+            None if there is none.
+        """
+        return _find(bpy.data.images, self.images.pop(role, 0))
+
+    def take_mesh(self) -> bpy.types.Mesh:
+        """Return the mesh, which is then no longer one of these.
+
+        Returns
+        -------
+        bpy.types.Mesh
+            The mesh.
+        """
+        number, self.mesh = self.mesh, 0
+        return _find(bpy.data.meshes, number)
+
+    def discard(self) -> None:
+        """Remove what was not taken."""
+        for blocks, number in (
+            *((bpy.data.images, number) for number in self.images.values()),
+            (bpy.data.meshes, self.mesh),
+        ):
+            if (block := _find(blocks, number)) is not None:
+                blocks.remove(block)
+        self.images.clear()
+        self.mesh = 0
+
+
+def stage(
+    files: Mapping[str, ImageFile], arrays: MeshArrays, base: int = 0
+) -> Generator[None, None, StagedBlocks]:
+    """Make images and a mesh, one datablock a step; if closed before the end, remove them.
+
+    Parameters
+    ----------
+    files : dict of str to ImageFile
+        Files of the images, by role.
+    arrays : MeshArrays
+        The mesh.
+    base : int, optional
+        Number of a mesh whose materials and properties the new one has; 0 for none.
+
+    Returns
+    -------
+    StagedBlocks
+        The datablocks. Some are missing if an undo took them away in the meantime.
+    """
+    blocks, complete = StagedBlocks(), False
+    try:
+        for role, file in files.items():
+            blocks.images[role] = new_image(file).session_uid
+            yield
+        mesh = _copy(base)
+        blocks.mesh = mesh.session_uid
+        fill_mesh(mesh, arrays)
+        yield
+        complete = True
+        return blocks
+    finally:
+        if not complete:
+            blocks.discard()
+
+
+def _copy(base: int) -> bpy.types.Mesh:
+    """A copy of a mesh, without its shape keys; a new one if there is no such mesh."""
+    source = _find(bpy.data.meshes, base)
+    if source is None:
+        return bpy.data.meshes.new("isc")
+    mesh = source.copy()
+    if mesh.shape_keys is not None:  # which only an object can remove
+        holder = bpy.data.objects.new("isc", mesh)
+        holder.shape_key_clear()
+        bpy.data.objects.remove(holder)
+    return mesh
+
+
+def _find(blocks: Any, number: int) -> Any:
+    return next((block for block in blocks if block.session_uid == number), None)

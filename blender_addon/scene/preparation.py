@@ -1,0 +1,229 @@
+"""What of a result is built, and what of that takes time, made in advance: meshes, and the files of
+images.
+
+Nothing here touches a datablock, so it may run in another thread while the window is used.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from isc_core.errors import InputError
+from isc_core.result_files.solids.body import Back
+
+from ..datablocks.images import (
+    COLOR,
+    DATA,
+    SRGB,
+    ImageFile,
+    map_file,
+    map_files,
+    scaled_file,
+    texture_file,
+)
+from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arrays
+from ..files.result_arrays import ResultArrays
+from .body import body_geometry
+from .camera import eye_of
+from .displacement import displacement_map, flatten
+from .hand_edits import checksum_of
+from .material import SpecularSettings, SpecularSource
+from .specular_share import specular_share
+
+# `BuildOptions.own_shadows` of each item of the panel.
+OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
+_DEFAULT_ROUGHNESS = 0.5
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What is built, and which of the user's settings may change.
+
+    The field names are part of the JSON text that files store.
+
+    Attributes
+    ----------
+    size_metres : float
+        Longer side of the object.
+    own_scene : bool
+        Whether to build in a new scene. In a shared scene, a new object stands at the 3D cursor,
+        and world, active camera, resolution and view transform change only with the next four
+        options.
+    set_world, set_camera, set_resolution, set_view_transform : bool
+        What of a shared scene may change.
+    light_and_camera : bool
+        Whether the photo's camera and the estimated sun come along into a shared scene, in a
+        collection of their own that is unchecked at first. A new scene always has the camera.
+    photo_resolution : bool
+        Whether renders have the photo's resolution instead of that of the maps.
+    sun : bool
+        Whether to use a sun and uniform light instead of the environment map.
+    displacement : bool
+        Whether to displace a flat grid by a modifier instead of building the height mesh.
+    back : str
+        A value of `Back`; "" builds the result's own mesh, whose vertices are pixels.
+    triangles : int
+        The most of the visible side of a mesh with a `back`; 0 for two at each pixel.
+    specular_from : str
+        Source of the highlights: the fitted "lobe", the photo's specular "image" until light,
+        camera or pose change, or "none".
+    own_shadows : bool or None
+        Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
+        already contains those of the photo, so the object looks as in the photo without them. None
+        enables them for a new object in a shared scene, and keeps those of an existing object.
+    all_maps : bool
+        Whether the file also holds the layers and maps that neither material nor exports use.
+    name : str
+        Name of the object; "" for the result's own.
+    """
+
+    size_metres: float = 0.1
+    own_scene: bool = True
+    set_world: bool = False
+    set_camera: bool = False
+    set_resolution: bool = False
+    set_view_transform: bool = False
+    light_and_camera: bool = True
+    photo_resolution: bool = False
+    sun: bool = False
+    displacement: bool = False
+    back: str = ""
+    triangles: int = 50_000
+    specular_from: SpecularSource = "lobe"
+    own_shadows: bool | None = None
+    all_maps: bool = True
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class PreparedObject:
+    """What an object is built of.
+
+    Attributes
+    ----------
+    result : ResultArrays
+        The result.
+    options : BuildOptions
+        What will be built of it.
+    mesh : MeshArrays
+        The mesh.
+    checksum : str
+        Of the mesh, see `hand_edits`.
+    files : dict of str to ImageFile
+        The files of the images, by role; "photo" is one of them if no image of the file shows it.
+    specular : SpecularSettings
+        The specular part of the material.
+    plain : ImageFile or None
+        The base colour without its compensation for the specular share, where it is needed.
+    """
+
+    result: ResultArrays
+    options: BuildOptions
+    mesh: MeshArrays
+    checksum: str
+    files: dict[str, ImageFile]
+    specular: SpecularSettings
+    plain: ImageFile | None
+
+
+def prepare(
+    result: ResultArrays, options: BuildOptions, *, with_photo: bool = False
+) -> PreparedObject:
+    """Make in advance what takes time.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    options : BuildOptions
+        What will be built of it.
+    with_photo : bool, optional
+        Whether the masked photo of the result becomes an image.
+
+    Returns
+    -------
+    PreparedObject
+        What an object is built of.
+
+    Raises
+    ------
+    InputError
+        If the options are invalid, or the object is too thin for a mesh.
+    """
+    require_options(options)
+    geometry, normal_map = _geometry(result, options)
+    mesh = mesh_arrays(geometry)
+    specular = _specular_settings(result, options)
+    files = map_files(result, options.all_maps)
+    files["environment_map"] = map_file(result.environment_map, COLOR)
+    files["base_color"] = _base_color(result, 1 / (1 - specular.share))
+    plain = None
+    if options.specular_from == "image" and specular.share > 0:
+        plain = _base_color(result, 1.0)
+    if result.specular_variation is not None:
+        values = result.specular_variation / _peak(result)
+        files["specular_variation"] = texture_file(values, DATA)
+    # A mesh with a vertex per pixel has all detail in its own normals.
+    if np.abs(normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
+        files["normal_map"] = texture_file(normal_map, DATA)
+    if options.displacement:
+        files["displacement"] = map_file(displacement_map(result, options.size_metres), DATA)
+    if with_photo:
+        files["photo"] = map_file(result.image, COLOR, result.mask)
+    return PreparedObject(result, options, mesh, checksum_of(mesh), files, specular, plain)
+
+
+def require_options(options: BuildOptions) -> None:
+    """Check the options.
+
+    Parameters
+    ----------
+    options : BuildOptions
+        What will be built.
+
+    Raises
+    ------
+    InputError
+        If a number is out of range, or there is no such back.
+    """
+    if not 0 < options.size_metres < 1e6:
+        raise InputError(
+            f"a size of {options.size_metres} metres cannot be built: choose one above 0"
+        )
+    if options.back not in ("", *Back):
+        raise InputError(f"there is no back {options.back!r}: choose {', '.join(Back)}")
+    if options.triangles < 0:
+        raise InputError("the number of triangles cannot be negative: 0 keeps every pixel")
+
+
+def _geometry(result: ResultArrays, options: BuildOptions) -> tuple[MeshGeometry, np.ndarray]:
+    """The mesh, and its normal map; a displaced grid is open."""
+    if options.displacement:
+        sheet = front_geometry(result, options.size_metres)
+        return flatten(sheet, eye_of(result, options.size_metres)), result.normal_map
+    if options.back:
+        return body_geometry(result, options.size_metres, options.back, options.triangles)
+    return front_geometry(result, options.size_metres), result.normal_map
+
+
+def _base_color(result: ResultArrays, gain: float) -> ImageFile:
+    if result.texture is not None:
+        return scaled_file(result.texture, gain)
+    return texture_file(gain * result.base_color, SRGB)
+
+
+def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:
+    """Values of the fit; without a fitted level the object is diffuse, as in the photo's light."""
+    level = result.specular_level if np.isfinite(result.specular_level) else 0.0
+    roughness = result.roughness if np.isfinite(result.roughness) else _DEFAULT_ROUGHNESS
+    mean = level if options.specular_from != "none" else 0.0
+    if result.specular_variation is not None:
+        mean *= float(result.specular_variation[result.mask].mean())
+    share = specular_share(mean, roughness, result.normal[result.mask][:, 2])
+    return SpecularSettings(level * _peak(result), roughness, options.specular_from, share)
+
+
+def _peak(result: ResultArrays) -> float:
+    """The largest factor of the specular level: textures hold values up to 1."""
+    variation = result.specular_variation
+    return 1.0 if variation is None else max(1.0, float(variation.max()))
