@@ -88,7 +88,7 @@ def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
     return g
 
 
-@jit
+@jit(types="f4[3] f4 f4[3] -> f8")
 def _rows(f, softening, gradient):  # type: ignore[no-untyped-def]
     """Process one row along the last axis at a time: the six products of filters on the first two
     axes, then the filters on the last.
