@@ -15,7 +15,7 @@ import itertools
 
 import numpy as np
 
-from ..numerics.jit import jit, numba_available
+from ..numerics.jit import compiled_available, jit
 
 Taps = list[tuple[float, float, float]]
 _SMOOTH = (0.25, 0.5, 0.25)
@@ -39,7 +39,7 @@ def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray
     gradient : ndarray
         Of the shape and type of `f`.
     """
-    if numba_available() and f.ndim == 3 and f.dtype == np.float32:
+    if compiled_available() and f.ndim == 3 and f.dtype == np.float32:
         gradient = np.zeros_like(f)
         return float(_rows(f, np.float32(softening), gradient)), gradient
     return roughness_numpy(f, softening)

@@ -41,17 +41,11 @@ class Machine:
     level: int = 0
 
 
-def _x86(suffix: str, triple: str) -> tuple[Machine, ...]:
-    return tuple(
-        Machine(f"kernels-x86-64-v{level}.{suffix}", triple, f"x86_64_v{level}", level)
-        for level in (2, 3)
-    )
-
-
 MACHINES = {
-    "linux-x64": _x86("so", "x86_64-linux-gnu.2.28"),
-    "windows-x64": _x86("dll", "x86_64-windows-gnu"),
-    "macos-arm64": (Machine("kernels-arm64.dylib", "aarch64-macos.13.0", "apple_m1"),),
+    "linux-x64": tuple(
+        Machine(f"kernels-x86-64-v{level}.so", "x86_64-linux-gnu.2.28", f"x86_64_v{level}", level)
+        for level in (2, 3)
+    ),
 }
 
 
@@ -61,19 +55,22 @@ def libraries_for(platform: str, cache_folder: Path) -> list[Path]:
     Parameters
     ----------
     platform : str
-        Key of `MACHINES`.
+        Name of the platform in Blender's manifests.
     cache_folder : Path
         Folder of libraries that were made.
 
     Returns
     -------
     list of Path
+        Empty for a platform that is not in `MACHINES`.
 
     Raises
     ------
     InputError
         If Numba or Zig is not installed, or compiling fails.
     """
+    if platform not in MACHINES:
+        return []
     try:
         code, declared = _sources()
     except ImportError as error:
@@ -105,9 +102,9 @@ def _library(machine: Machine, code: str, declared: str, cache_folder: Path) -> 
     around = ["-fvisibility=hidden", f"-DLEVEL={machine.level}", "-c", "entries.c"]
     _zig(folder, *common, *kernels, "-o", "kernels.o")
     _zig(folder, *common, *around, "-o", "entries.o")
-    _zig(
-        folder, *common, "-shared", "-s", "kernels.o", "entries.o", "-o", f"partial-{machine.name}"
-    )
+    whole = ["-Wl,-z,defs"] if "linux" in machine.triple else []  # elsewhere the linker insists
+    objects = ["kernels.o", "entries.o", "-o", f"partial-{machine.name}"]
+    _zig(folder, *common, "-shared", "-s", *whole, *objects)
     (folder / f"partial-{machine.name}").replace(made)
     return made
 

@@ -86,6 +86,17 @@ memory *NRT_MemInfo_alloc_aligned(size_t size, unsigned alignment)
 
 void NRT_MemInfo_call_dtor(memory *block) { free(block); }
 
+/* Strides of an array in row-major order in another shape; kernels reshape no others. */
+int numba_attempt_nocopy_reshape(intptr_t axes, const intptr_t *shape, const intptr_t *strides,
+                                 intptr_t new_axes, const intptr_t *new_shape,
+                                 intptr_t *new_strides, intptr_t size, int column_major)
+{
+    (void)axes, (void)shape, (void)strides, (void)column_major;
+    for (intptr_t k = new_axes - 1; k >= 0; size *= new_shape[k--])
+        new_strides[k] = size;
+    return 1;
+}
+
 /* Whether this processor has what the kernels of this library were compiled for: 0 for any, 2 and 3
    for x86-64-v2 and -v3. */
 static int has_level(int level)
