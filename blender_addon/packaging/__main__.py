@@ -97,7 +97,8 @@ def build(target: Target, output: Path, cache: Path | None, *, offline: bool = F
     Raises
     ------
     InputError
-        If a wheel is missing, the kernels cannot be compiled, a module cannot be shipped, or Blender rejects the zip.
+        If a wheel is missing, the kernels cannot be compiled, a module cannot be shipped, or
+        Blender rejects the zip.
     """
     wheels = [] if cache is None else wheels_for(target, cache, offline=offline)
     libraries = [] if cache is None else libraries_for(target.platform, cache / "kernels")

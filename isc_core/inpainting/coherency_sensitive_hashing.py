@@ -272,7 +272,8 @@ class _Hashed(NamedTuple):
     members: np.ndarray
 
 
-_HASHED = "_Hashed(f4[3] i8[1:] i8[1:] i4[2] f4[2] i4[1] i4[1] i4[1])"  # types, see `numerics.kernel_types`
+# Types, see `numerics.kernel_types`.
+_HASHED = "_Hashed(f4[3] i8[1:] i8[1:] i4[2] f4[2] i4[1] i4[1] i4[1])"
 # Number of parts in which target patches are swept, independent of the threads, so that the result
 # is too.
 _PARTS = 16

@@ -1,7 +1,7 @@
 """The kernels as LLVM's intermediate code, for every processor.
 
-Numba translates a kernel to this code, optimises it for the processor at hand, and compiles it. Here
-it stops after the first of its optimisations, which inlines and removes the counting of references;
+Numba translates a kernel to this code, optimises it for the processor at hand, and compiles it.
+Here it stops after the first of its optimisations, which inlines and removes the counting of references;
 what depends on a processor, above all the vector instructions, is left to the compiler of each
 platform. The math flags of a kernel are part of the code.
 
@@ -25,8 +25,8 @@ from isc_core.numerics.kernel_types import Array, Group, Scalar, Signature
 
 ROOT = Path(__file__).resolve().parents[3]
 
-# Counts of references of arrays that a kernel makes for itself, hence of one thread; the arrays that
-# it is given have none.
+# Counts of references of arrays that a kernel makes for itself, hence of one thread; the arrays
+# that it is given have none.
 _COUNTS = """
 define internal void @NRT_incref(ptr %block) alwaysinline {
   %none = icmp eq ptr %block, null
