@@ -5,8 +5,8 @@ was shipped that runs on this machine; else from Numba, where it is installed. W
 same functions run as plain Python: slower, with equal results.
 
 Code that Numba compiled is cached between runs: beside the source if that folder is writable, else
-in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary folder
-serves until the process ends.
+in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary
+folder serves until the process ends.
 
 Numba is imported, and a function compiled, when one is first called: its import takes longer than
 many a command.

@@ -113,7 +113,7 @@ class _Truth:
 
 
 _SCALARS = {"i8": _Whole, "f4": _Single, "f8": _Double, "b1": _Truth}
-_RESULTS = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
+_RESULTS: dict[str, Any] = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
 
 
 class KernelLibrary:

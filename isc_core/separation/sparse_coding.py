@@ -481,8 +481,8 @@ def _groups(colour, active, considered, edge, floor, parent):
 @jit(types="f8[3] i8[2] b1[2:] (b1 b1) f8 f8 f8[2]")
 def _group_statistics(colour, group, mask, considered, edge, floor, sums):
     """Add to sums (5, groups) over the neighbours of each group: changes of beta attributed to
-    specular light and to reflectance, steps of beta at the border, the number of border neighbours, and
-    the largest beta. `group` (H, W) is -1 where not active.
+    specular light and to reflectance, steps of beta at the border, the number of border neighbours,
+    and the largest beta. `group` (H, W) is -1 where not active.
     """
     height, width = mask.shape
     for y in range(height):

@@ -1,9 +1,9 @@
 """The kernels as LLVM's intermediate code, for every processor.
 
 Numba translates a kernel to this code, optimises it for the processor at hand, and compiles it.
-Here it stops after the first of its optimisations, which inlines and removes the counting of references;
-what depends on a processor, above all the vector instructions, is left to the compiler of each
-platform. The math flags of a kernel are part of the code.
+Here it stops after the first of its optimisations, which inlines and removes the counting of
+references; what depends on a processor, above all the vector instructions, is left to the compiler
+of each platform. The math flags of a kernel are part of the code.
 
 Limits: `_Plain` overrides a method that Numba documents as internal, hence the pinned version. The
 code is for 64-bit processors with little-endian numbers.

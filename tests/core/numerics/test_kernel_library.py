@@ -83,7 +83,6 @@ EXACT_KERNELS = {
     "_refresh",
     "_flatten",
     "_hash",
-    "_combine",
     "_erode",
 }
 
@@ -149,7 +148,8 @@ def test_the_core_of_the_zip_decomposes_without_numba(library, tmp_path):
         "z = np.where(inside, np.sqrt(np.clip(1 - x**2 - y**2, 0, 1)), 0).astype(np.float32)\n"
         "photo = Photo(z[..., None] * np.array([.8, .5, .3], np.float32), inside, 1 / 255,\n"
         "    np.zeros_like(inside), PhotoSource('', (40, 40), 8, 'srgb', 'file'))\n"
-        "solve(DecompositionTask(photo, photo, Settings(model='sirfs', engine='numba', threads=1)))\n"
+        "settings = Settings(model='sirfs', engine='numba', threads=1)\n"
+        "solve(DecompositionTask(photo, photo, settings))\n"
     )
     done = subprocess.run(
         [sys.executable, "-c", code],
