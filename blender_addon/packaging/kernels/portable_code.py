@@ -76,7 +76,7 @@ class Version:
 
 def kernels() -> list[Kernel]:
     """Return all kernels of `isc_core`, in the order of their modules and lines."""
-    found = {}
+    found: dict[int, Kernel] = {}
     for path in sorted((ROOT / "isc_core").rglob("*.py")):
         if "jit import" in path.read_text(encoding="utf-8"):
             name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
@@ -150,7 +150,8 @@ def _compiled(dispatcher: Any, version: Version) -> Any:
     )
     dispatcher.compile(arguments)
     compiled = dispatcher.overloads[arguments]
-    returned = _RESULTS[version.signature.result and version.signature.result.code]
+    result = version.signature.result
+    returned = _RESULTS[result.code if result else None]
     if str(compiled.signature.return_type) != returned:
         raise TypeError(f"{version.symbol} returns {compiled.signature.return_type}")
     module = compiled.library._final_module.clone()
