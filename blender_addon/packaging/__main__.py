@@ -9,6 +9,7 @@ from pathlib import Path
 from isc_core.errors import InputError
 
 from .archive import archive_name, contents, listing, write_archive
+from .kernels.build import libraries_for
 from .targets import TARGETS, Target, chosen
 from .validate import validate
 from .wheels import wheels_for
@@ -57,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument(
         "--without-wheels",
         action="store_true",
-        help="leave out wheels, for a Blender whose Python has the packages",
+        help="leave out wheels and compiled kernels, for a Blender whose Python has the packages",
     )
     options = parser.parse_args(arguments)
     try:
@@ -84,7 +85,7 @@ def build(target: Target, output: Path, cache: Path | None, *, offline: bool = F
     output : Path
         Folder of the zip.
     cache : Path or None
-        Folder of downloaded wheels; None leaves wheels out.
+        Folder of downloaded wheels and compiled kernels; None leaves both out.
     offline : bool, optional
         Whether to use downloaded wheels only.
 
@@ -96,11 +97,13 @@ def build(target: Target, output: Path, cache: Path | None, *, offline: bool = F
     Raises
     ------
     InputError
-        If a wheel is missing, a module cannot be shipped, or Blender rejects the zip.
+        If a wheel is missing, the kernels cannot be compiled, a module cannot be shipped, or
+        Blender rejects the zip.
     """
     wheels = [] if cache is None else wheels_for(target, cache, offline=offline)
+    libraries = [] if cache is None else libraries_for(target.platform, cache / "kernels")
     path = output / archive_name(target)
-    write_archive(path, contents(target, wheels))
+    write_archive(path, contents(target, wheels, libraries))
     checked = validate(path)
     print(
         "\n".join(

@@ -39,7 +39,9 @@ def archive_name(target: Target) -> str:
     return f"isc_intrinsic-{__version__}-{target.name}.zip"
 
 
-def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
+def contents(
+    target: Target, wheels: Sequence[Path], libraries: Sequence[Path] = ()
+) -> dict[str, bytes | Path]:
     """Return the contents of a zip.
 
     Parameters
@@ -48,6 +50,8 @@ def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
         Platform and Python version.
     wheels : sequence of Path
         Wheels to include.
+    libraries : sequence of Path, optional
+        Libraries of compiled kernels.
 
     Returns
     -------
@@ -69,6 +73,7 @@ def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
             entries[name] = installed_source(path.read_text(encoding="utf-8"), name).encode()
     core = [path for path in sorted(_CORE.rglob("*")) if path.suffix in _CORE_FILES]
     entries |= {f"isc_core/{path.relative_to(_CORE).as_posix()}": path for path in core}
+    entries |= {f"isc_core/numerics/compiled/{path.name}": path for path in libraries}
     return entries | {f"wheels/{path.name}": path for path in wheels}
 
 

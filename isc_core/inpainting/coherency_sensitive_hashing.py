@@ -272,6 +272,8 @@ class _Hashed(NamedTuple):
     members: np.ndarray
 
 
+# Types, see `numerics.kernel_types`.
+_HASHED = "_Hashed(f4[3] i8[1:] i8[1:] i4[2] f4[2] i4[1] i4[1] i4[1])"
 # Number of parts in which target patches are swept, independent of the threads, so that the result
 # is too.
 _PARTS = 16
@@ -334,7 +336,7 @@ def _buckets(
     return bins, starts, members
 
 
-@jit
+@jit(types="f4[2] f4 f4[1] i8[1] i8 i4[1]")
 def _hash(values, width, offset, factors, bits, bins):
     """bins[i]: `bits` middle bits of sum_j factor_j floor((v_ij + b_j) / r), which depend on all 40
     bits of the factors; nothing overflows.
@@ -349,7 +351,7 @@ def _hash(values, width, offset, factors, bits, bins):
         bins[i] = (key >> 16) & ((1 << bits) - 1)
 
 
-@jit
+@jit(types="i4[1] i4[1] i4[1]")
 def _sort_into(bins, starts, members):
     """Counting sort: the patches of bin h become members[starts[h]:starts[h + 1]], in rising order.
 
@@ -365,7 +367,7 @@ def _sort_into(bins, starts, members):
         free[bins[i]] += 1
 
 
-@jit
+@jit(types=f"{_HASHED} {_HASHED} i4[1] f4[1] i4[1] i8 i8 b1 i8 i8")
 def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
     """One pass over the target patches [low, high).
 

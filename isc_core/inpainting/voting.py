@@ -60,7 +60,7 @@ def vote(
     return total[..., :-1] / np.where(has_votes, total[..., -1], 1)[..., None], has_votes
 
 
-@jit
+@jit(types="f4[3] i8[1:] i8[1:] i8[1:] i8[1:] i4[1] f8[1] f8[3]")
 def _add_votes(image, rows, columns, source_rows, source_columns, matches, weight, total):
     """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target
     patch's pixels.

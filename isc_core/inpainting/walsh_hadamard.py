@@ -102,7 +102,7 @@ def project(
     return out
 
 
-@jit
+@jit(types="f4[3] i8[1:] i8[1:] i8[1] f4[2]")
 def _project(image, rows, columns, chosen, out):
     width, channels = image.shape[1], image.shape[2]
     strip = np.empty((8, width), np.float32)

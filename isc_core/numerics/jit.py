@@ -1,10 +1,12 @@
-"""Loops over pixels that NumPy cannot express, compiled by Numba where it is installed.
+"""Loops over pixels that NumPy cannot express, as machine code.
 
-Without Numba the same functions run as plain Python: slower, with equal results.
+It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where one
+was shipped that runs on this machine; else from Numba, where it is installed. Without both, the
+same functions run as plain Python: slower, with equal results.
 
-Compiled code is cached between runs: beside the source if that folder is writable, else in the
-user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary folder
-serves until the process ends.
+Code that Numba compiled is cached between runs: beside the source if that folder is writable, else
+in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary
+folder serves until the process ends.
 
 Numba is imported, and a function compiled, when one is first called: its import takes longer than
 many a command.
@@ -24,6 +26,9 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar, cast, overload
 
+from .kernel_library import shipped_library
+from .kernel_types import Signature, signatures
+
 Loop = TypeVar("Loop", bound=Callable[..., object])
 
 EXACT: frozenset[str] = frozenset()
@@ -42,11 +47,15 @@ def jit(loop: Loop, /) -> Loop:
 
 
 @overload
-def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop], Loop]:
+def jit(
+    *, types: str = "", math: frozenset[str] = EXACT, inline: bool = False
+) -> Callable[[Loop], Loop]:
     """Return a decorator.
 
     Parameters
     ----------
+    types : str
+        The types of a call, see `kernel_types`; "" for what only other kernels call.
     math : frozenset of str
         Floating-point freedom of the compiler, see the constants of this module.
     inline : bool
@@ -60,17 +69,25 @@ def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop
 
 
 def jit(
-    loop: Loop | None = None, /, *, math: frozenset[str] = EXACT, inline: bool = False
+    loop: Loop | None = None,
+    /,
+    *,
+    types: str = "",
+    math: frozenset[str] = EXACT,
+    inline: bool = False,
 ) -> Loop | Callable[[Loop], Loop]:
-    """Compile a function of numbers and arrays, if Numba is installed.
+    """Compile a function of numbers and arrays.
 
-    The compiled function releases the interpreter lock, divides by zero as NumPy does, and is
-    cached on disk. Use as ``@jit`` or ``@jit(math=IN_ORDER)``.
+    The compiled function releases the interpreter lock, and divides by zero as NumPy does. Use as
+    ``@jit`` or ``@jit(types="i8 f4[2]", math=IN_ORDER)``.
 
     Parameters
     ----------
     loop : callable, optional
         The function, when used without arguments.
+    types : str
+        The types of a call, see `kernel_types`: those that the function is compiled for ahead of
+        time. "" for what only other kernels call.
     math : frozenset of str
         Floating-point freedom of the compiler: `EXACT`, `IN_ORDER`, `ACCUMULATED` or
         `REASSOCIATED`.
@@ -82,21 +99,22 @@ def jit(
     Returns
     -------
     callable
-        The compiled function, or `loop` itself without Numba.
+        The compiled function, or `loop` itself without a compiler.
     """
 
     def decorate(function: Loop) -> Loop:
-        return cast(Loop, Kernel(function, math, inline))
+        return cast(Loop, Kernel(function, types, math, inline))
 
     return decorate if loop is None else decorate(loop)
 
 
 class Kernel:
-    """A function that is compiled when it is first called.
+    """A function that is compiled, or loaded, when it is first called.
 
     Parameters
     ----------
     function : callable
+    types : str
     math : frozenset of str
     inline : bool
         See `jit`.
@@ -105,47 +123,71 @@ class Kernel:
     ----------
     function : callable
         As it was written.
+    types : str
     inline : bool
     """
 
-    def __init__(self, function: Callable[..., Any], math: frozenset[str], inline: bool) -> None:
-        self.function, self.inline, self._math = function, inline, math
+    def __init__(
+        self, function: Callable[..., Any], types: str, math: frozenset[str], inline: bool
+    ) -> None:
+        self.function, self.types, self.inline, self._math = function, types, inline, math
         self.__doc__, self.__module__ = function.__doc__, function.__module__
 
     def __call__(self, *values: Any) -> Any:
         """Call the compiled function."""
         return self.compiled(*values)
 
+    @property
+    def signatures(self) -> tuple[Signature, ...]:
+        """What the function is compiled for ahead of time."""
+        return signatures(self.types)
+
     @cached_property
     def compiled(self) -> Callable[..., Any]:
-        """Numba's dispatcher; the function itself without Numba."""
-        try:
-            import numba
-        except ImportError:
-            return self.function
+        """What a call runs: shipped code, Numba's dispatcher, or the function itself."""
+        library = shipped_library()
+        if library is not None:
+            return library.kernel(self.function, self.signatures)
+        return self._dispatcher if numba_available() else self.function
+
+    @cached_property
+    def _dispatcher(self) -> Any:
+        """Numba's dispatcher, which keeps what it compiles."""
         ensure_cache_folder()
-        dispatcher = numba.njit(
-            cache=True,
+        dispatcher = self.dispatcher(lambda kernel: kernel._dispatcher, cache=True)
+        drop_broken(Path(str(dispatcher.stats.cache_path)))
+        _load_alone(dispatcher)
+        return dispatcher
+
+    def dispatcher(self, of_called: "Callable[[Kernel], Any]", *, cache: bool = False) -> Any:
+        """Return a new dispatcher of Numba for the function.
+
+        Parameters
+        ----------
+        of_called : callable
+            Gives the dispatcher of a kernel that the function calls: compiled code knows no others.
+        cache : bool, optional
+            Whether to keep what it compiles on disk.
+
+        Returns
+        -------
+        numba.core.dispatcher.Dispatcher
+        """
+        import numba
+
+        function = cast(FunctionType, self.function)
+        names = {
+            name: of_called(value) if isinstance(value, Kernel) else value
+            for name, value in function.__globals__.items()
+            if name in function.__code__.co_names or name.startswith("__")
+        }
+        return numba.njit(
+            cache=cache,
             nogil=True,
             error_model="numpy",
             fastmath=set(self._math),
             forceinline=self.inline,
-        )(self._linked())
-        drop_broken(Path(str(dispatcher.stats.cache_path)))
-        _load_alone(dispatcher)
-        return cast(Callable[..., Any], dispatcher)
-
-    def _linked(self) -> Callable[..., Any]:
-        """The function, calling dispatchers where it called kernels: compiled code knows no
-        others.
-        """
-        function = cast(FunctionType, self.function)
-        names = {
-            name: value.compiled if isinstance(value, Kernel) else value
-            for name, value in function.__globals__.items()
-            if name in function.__code__.co_names or name.startswith("__")
-        }
-        return FunctionType(function.__code__, names, function.__name__)
+        )(FunctionType(function.__code__, names, function.__name__))
 
 
 def _load_alone(dispatcher: Any) -> None:
@@ -168,6 +210,11 @@ def _load_alone(dispatcher: Any) -> None:
             return None
 
     dispatcher._cache = LoadingCache(dispatcher.py_func)
+
+
+def compiled_available() -> bool:
+    """Return whether kernels run as machine code: shipped, or compiled by Numba."""
+    return shipped_library() is not None or numba_available()
 
 
 def numba_available() -> bool:

@@ -15,7 +15,7 @@ import itertools
 
 import numpy as np
 
-from ..numerics.jit import jit, numba_available
+from ..numerics.jit import compiled_available, jit
 
 Taps = list[tuple[float, float, float]]
 _SMOOTH = (0.25, 0.5, 0.25)
@@ -39,7 +39,7 @@ def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray
     gradient : ndarray
         Of the shape and type of `f`.
     """
-    if numba_available() and f.ndim == 3 and f.dtype == np.float32:
+    if compiled_available() and f.ndim == 3 and f.dtype == np.float32:
         gradient = np.zeros_like(f)
         return float(_rows(f, np.float32(softening), gradient)), gradient
     return roughness_numpy(f, softening)
@@ -88,7 +88,7 @@ def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
     return g
 
 
-@jit
+@jit(types="f4[3] f4 f4[3] -> f8")
 def _rows(f, softening, gradient):  # type: ignore[no-untyped-def]
     """Process one row along the last axis at a time: the six products of filters on the first two
     axes, then the filters on the last.

@@ -359,20 +359,19 @@ def _grouped(free: _Invariants, dictionary: _Dictionary, options: SparseCodingOp
     brightest = float(np.quantile(free.brightness[free.mask], 0.99))
     floor = options.noise * brightest
     active = beta > options.sparsity * free.brightness + floor / 2
-    code, group = np.zeros(beta.shape), np.full(beta.shape, -1)
+    code, group = np.zeros(beta.shape), np.full(beta.shape, -1, np.int64)
     result = Stages(free.hue, free.alpha, free.brightness, beta, group, code)
     if not active.any():
         return result
     angle = 2 * np.pi * free.hue
     colour = np.stack([np.cos(angle), np.sin(angle), free.alpha, np.exp(log_ratio), beta], axis=2)
     considered = options.specular_free != "sf2", options.specular_free != "sf1"
-    roots, number = np.unique(
-        _groups(colour, active, considered, options.edge, floor)[active], return_inverse=True
-    )
+    parent = np.arange(active.size, dtype=np.int64)
+    _groups(colour, active, considered, options.edge, floor, parent)
+    roots, number = np.unique(parent.reshape(active.shape)[active], return_inverse=True)
     group[active] = number
-    statistics = _group_statistics(
-        colour, group, free.mask, considered, options.edge, floor, len(roots)
-    )
+    statistics = np.zeros((5, len(roots)))
+    _group_statistics(colour, group, free.mask, considered, options.edge, floor, statistics)
     excess = np.log(free.brightness[active] / np.maximum(diffuse[active], _TINY))
     cues = _PixelCues(
         saturation=_saturation(free.hue[active], log_ratio[active]),
@@ -461,13 +460,12 @@ def _root(parent, pixel):
     return pixel
 
 
-@jit
-def _groups(colour, active, considered, edge, floor):
-    """The first pixel, as row * W + column, of the connected region of each pixel (H, W); edges and
-    inactive pixels separate regions.
+@jit(types="f8[3] b1[2] (b1 b1) f8 f8 i8[1]")
+def _groups(colour, active, considered, edge, floor, parent):
+    """Point each pixel, row * W + column, at the first one of its connected region; edges and
+    inactive pixels separate regions. `parent` (H W,) points each pixel at itself before.
     """
     height, width = active.shape
-    parent = np.arange(height * width)
     for y in range(height):
         for x in range(width):
             for v, u in ((y, x + 1), (y + 1, x)):
@@ -478,17 +476,15 @@ def _groups(colour, active, considered, edge, floor):
                         parent[max(one, two)] = min(one, two)
     for pixel in range(height * width):
         parent[pixel] = _root(parent, pixel)
-    return parent.reshape(height, width)
 
 
-@jit
-def _group_statistics(colour, group, mask, considered, edge, floor, count):
-    """Sums (5, count) over the neighbours of each group: changes of beta attributed to specular
-    light and to reflectance, steps of beta at the border, the number of border neighbours, and
-    the largest beta. `group` (H, W) is -1 where not active.
+@jit(types="f8[3] i8[2] b1[2:] (b1 b1) f8 f8 f8[2]")
+def _group_statistics(colour, group, mask, considered, edge, floor, sums):
+    """Add to sums (5, groups) over the neighbours of each group: changes of beta attributed to
+    specular light and to reflectance, steps of beta at the border, the number of border neighbours,
+    and the largest beta. `group` (H, W) is -1 where not active.
     """
     height, width = mask.shape
-    sums = np.zeros((5, count))
     for y in range(height):
         for x in range(width):
             if group[y, x] >= 0:
@@ -514,4 +510,3 @@ def _group_statistics(colour, group, mask, considered, edge, floor, count):
                         if one != two:
                             sums[2, one] += step
                             sums[3, one] += 1
-    return sums

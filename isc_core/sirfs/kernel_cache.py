@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from ..numerics.jit import drop_broken, ensure_cache_folder, numba_available
+from ..numerics.kernel_library import shipped_library
 from ..numerics.lbfgs import LbfgsOptions
 from ..progress import Monitor
 from ..scene.normal_estimate import NormalEstimate
@@ -45,7 +46,7 @@ def announce_compilation(engine: str, monitor: Monitor) -> None:
         "auto", "numba" or "numpy".
     monitor : Monitor
     """
-    if engine == "numpy" or not numba_available():
+    if engine == "numpy" or shipped_library() is not None or not numba_available():
         return
     ensure_cache_folder()
     drop_broken(_folder())
@@ -76,7 +77,7 @@ def load_kernels(illumination: str) -> None:
         One of `priors.prior_set.ILLUMINATIONS`: its tables are made, too.
     """
     priors, weights = shipped_priors(illumination, 3), isc_weights(illumination, 3)
-    if not numba_available() or not kernels_compiled():
+    if shipped_library() is not None or not numba_available() or not kernels_compiled():
         return
     y, x = np.mgrid[-_RADIUS : _RADIUS + 1, -_RADIUS : _RADIUS + 1] / (_RADIUS + 0.5)
     mask = np.hypot(x, y) < 1

@@ -162,7 +162,18 @@ class Backward(NamedTuple):
     derivatives: np.ndarray
 
 
-@jit(math=IN_ORDER)
+# Types, see `numerics.kernel_types`.
+_PHOTO = "Photo(r[3] r[2] r[2] i8[2])"
+_SURFACE = "Surface(r[3] r[2] f8[1])"
+_PAIRS = "Pairs(i8[2] r[1] r[1] f8 f8)"
+_GRID = "Grid(f8 f8 f8 f8 i8)"
+_CELLS = "Cells(i4[2] r[3])"
+
+
+@jit(
+    types=f"i8 i8 f8[2] {_PHOTO} r[2] Reflectance(r[2] r[2]) {_SURFACE} Reflectance(r[3] r[3])",
+    math=IN_ORDER,
+)
 def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance):
     """Compute the geometry, the whitened log reflectance and the slant term of rows [first, last).
 
@@ -282,7 +293,7 @@ def _mix(source, matrix, target):
             out[j] = m0 * s0[j] + m1 * s1[j] + m2 * s2[j]
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"i8 i8 i8 r[3] {_PHOTO} {_PAIRS} PairSums(r[3] r[4] f8[1])", math=REASSOCIATED)
 def smoothness_block(first, last, block, whitened, photo, pairs, out):
     """Compute the smoothness term of the pairs whose upper pixel lies in rows [first, last).
 
@@ -377,7 +388,7 @@ def smoothness_block(first, last, block, whitened, photo, pairs, out):
     out.cost[block] = cost
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"i8 i8 i8 r[3] {_PHOTO} {_PAIRS} PairSums(r[2] r[3] f8[1])", math=REASSOCIATED)
 def curvature_block(first, last, block, geometry, photo, pairs, out):
     """Compute the curvature term of the pairs whose upper pixel lies in rows [first, last).
 
@@ -450,7 +461,7 @@ def curvature_block(first, last, block, geometry, photo, pairs, out):
     out.cost[block] = cost
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"r[3] {_PHOTO} {_GRID} i8[2]", math=REASSOCIATED)
 def palette_range(palette, photo, grid, bounds):
     """Find the occupied part of the colour grid.
 
@@ -480,7 +491,7 @@ def palette_range(palette, photo, grid, bounds):
         bounds[c, 1] = min(int(final), nodes - 2) + 2
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"r[3] i8[2] {_GRID} i8[2] {_CELLS}", math=REASSOCIATED)
 def locate_color(palette, spans, grid, bounds, cells):
     """Find where every pixel falls on the occupied part of the colour grid.
 
@@ -516,7 +527,7 @@ def locate_color(palette, spans, grid, bounds, cells):
                 flat[j] += (whole - first) * stride
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"{_PHOTO} {_CELLS} f8[3]", math=REASSOCIATED)
 def splat_color(photo, cells, counts):
     """Add every pixel's weight to the eight nodes around its whitened log colour.
 
@@ -550,7 +561,7 @@ def splat_color(photo, cells, counts):
             flat[k + down + right + 1] += p11 * z
 
 
-@jit(math=REASSOCIATED)
+@jit(types=f"r[3] {_PHOTO} {_GRID} {_CELLS} r[3] r[3]", math=REASSOCIATED)
 def gather_color(palette, photo, grid, cells, node_gradient, gradient):
     """Compute the gradient of the whitened log colours from that of the node counts.
 
@@ -596,7 +607,7 @@ def gather_color(palette, photo, grid, cells, node_gradient, gradient):
                     out[j] = t(0)
 
 
-@jit(math=REASSOCIATED)
+@jit(types="f8[3] f8[1] f8[3]", math=REASSOCIATED)
 def blur_color(counts, taps, blurred):
     """Blur the node counts along each axis, zero padded, only where it can matter.
 
@@ -649,7 +660,7 @@ def blur_color(counts, taps, blurred):
                     target[c] += source[c] * tap
 
 
-@jit(math=REASSOCIATED)
+@jit(types="i8 i8 r[3] r[3] r[2] r[3] f8[1]", math=REASSOCIATED)
 def normals_rows(first, last, geometry, expected, strength, gradient, sums):
     """Compute a term of expected normals in rows [first, last).
 
@@ -690,7 +701,11 @@ def normals_rows(first, last, geometry, expected, strength, gradient, sums):
         sums[i] = half * total
 
 
-@jit(math=REASSOCIATED)
+@jit(
+    types=f"i8 i8 {_SURFACE} i8[2] r[2] Reflectance(r[2] r[2]) Pulls(r[3] r[3] r[2]) (f8 f8 f8 "
+    "f8) r[3] Backward(f8[3] r[3])",
+    math=REASSOCIATED,
+)
 def backward_rows(first, last, surface, spans, light, whiten, pulls, scales, in_plane, out):
     """Compute the gradients with respect to the height's derivatives and the light.
 
@@ -852,7 +867,7 @@ def _light_sums(d, n1, n2, n3, sums):
     )
 
 
-@jit(math=REASSOCIATED)
+@jit(types="i8 i8 r[3] r[2]", math=REASSOCIATED)
 def adjoint_rows(first, last, d, wide):
     """Compute rows [first, last) of the gradient of the padded height.
 

@@ -84,7 +84,7 @@ class _NormalsTerm:
         self, valid: np.ndarray, field: ExpectedNormals, weight: float, dtype: np.dtype[Any]
     ) -> None:
         self._expected = np.ascontiguousarray([field.down, field.right], dtype)
-        self._strength = strength_of(field.precision, valid, weight).astype(dtype)
+        self._strength = np.ascontiguousarray(strength_of(field.precision, valid, weight), dtype)
         self._sums = np.zeros(len(valid))
 
     def rows(self, geometry: np.ndarray, gradient: np.ndarray, first: int, last: int) -> None:
@@ -110,7 +110,7 @@ class _ShadingTerm:
         valid, weights = problem.valid, problem.weights
         channels = expected.mean.shape[2]
         strength = strength_of(expected.precision, valid, weights.predicted_shading, channels)
-        self._total, self._strength = float(strength.sum()), strength.astype(dtype)
+        self._total, self._strength = float(strength.sum()), strength.astype(dtype, order="C")
         self._balanced = weights.balanced_colour
         self._mean = np.ascontiguousarray(expected.mean.transpose(0, 2, 1), dtype)
         self._spans = _spans(valid)
@@ -188,8 +188,8 @@ class NumbaEngine:
         self._pixels = float(weight.sum())
         self._photo = kernels.Photo(
             np.ascontiguousarray(p.log_image.transpose(0, 2, 1), t),
-            weight.astype(t),
-            p.valid.astype(t),
+            weight.astype(t, order="C"),
+            p.valid.astype(t, order="C"),
             _spans(p.valid),
         )
         whiten = (
@@ -267,7 +267,7 @@ class NumbaEngine:
         """
         p = self.problem
         self._pad(height)
-        folded = _fold_light(np.asarray(light, float)).astype(self.dtype)
+        folded = _fold_light(np.asarray(light, float)).astype(self.dtype, order="C")
         self._each_share(partial(self._forward, folded))
         if not (np.isfinite(self._surface.slant).all() and np.isfinite(folded).all()):
             # a step too far: kernels that look up tables must not see NaN or infinity

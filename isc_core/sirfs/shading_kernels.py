@@ -11,7 +11,7 @@ independent of each other, and their sums are added in the order of the rows.
 from ..numerics.jit import REASSOCIATED, jit
 
 
-@jit(math=REASSOCIATED)
+@jit(types="i8 i8 r[3] i8[2] r[2] r[3] r[2] r[3] f8[2]", math=REASSOCIATED)
 def residual_rows(first, last, geometry, spans, light, mean, strength, residual, sums):
     """Compute the log shading less the expected one in rows [first, last).
 
@@ -56,7 +56,7 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
             sums[i, c] = total
 
 
-@jit(math=REASSOCIATED)
+@jit(types="i8 i8 i8[2] r[3] r[1] r[2] r[2] r[3] r[3] f8[1]", math=REASSOCIATED)
 def pull_rows(first, last, spans, residual, offsets, strength, back, palette, joined, sums):
     """Compute the term and its gradient in rows [first, last).
 

@@ -20,7 +20,7 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..numerics.jit import numba_available
+from ..numerics.jit import compiled_available
 from ..numerics.lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
 from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
@@ -151,7 +151,7 @@ class Backend:
     def __init__(self, options: SolverOptions, workers: ThreadPool) -> None:
         if options.engine not in ("auto", "numba", "numpy"):
             raise InputError(f'unknown engine "{options.engine}": choose auto, numba or numpy')
-        self.compiled = options.engine != "numpy" and numba_available()
+        self.compiled = options.engine != "numpy" and compiled_available()
         if options.engine == "numba" and not self.compiled:
             raise InputError(
                 "the engine numba needs the package numba: install it, or choose --engine numpy"

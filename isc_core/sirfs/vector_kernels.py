@@ -15,7 +15,7 @@ _CHUNK = 1024
 _PARTS = 8
 
 
-@jit(math=ACCUMULATED)
+@jit(types="i8 i8 r[2] r[2] f8[2]", math=ACCUMULATED)
 def _products(first, last, vectors, others, sums):
     count = others.shape[0]
     zero = vectors.dtype.type(0)
@@ -31,7 +31,7 @@ def _products(first, last, vectors, others, sums):
                 sums[k, m] += part
 
 
-@jit(math=ACCUMULATED)
+@jit(types="i8 i8 r[1] r[2] r[1]", math=ACCUMULATED)
 def _combine(first, last, coefficients, vectors, out):
     for start in range(first, last, _CHUNK):
         stop = min(start + _CHUNK, last)
@@ -100,7 +100,7 @@ def _parts(length: int) -> list[tuple[int, int]]:
     return list(zip(edges[:-1], edges[1:], strict=True))
 
 
-@jit(math=ACCUMULATED)
+@jit(types="r[2] r[2]", math=ACCUMULATED)
 def down(fine, out):
     """Take one pyramid step down, see `pyramid.down`.
 
@@ -128,7 +128,7 @@ def down(fine, out):
             o[j] = a * (line[2 * j] + line[2 * j + 3]) + b * (line[2 * j + 1] + line[2 * j + 2])
 
 
-@jit(math=ACCUMULATED)
+@jit(types="f8[2] r[2] f8[2]", math=ACCUMULATED)
 def up_add(coarse, fine, out):
     """Write `fine` plus the adjoint of `down` applied to `coarse`, see `pyramid.up`.
 

@@ -398,16 +398,14 @@ def _all_codes(
     for first in range(0, pixels.shape[1], _BLOCK):
         monitor.report("codes of the pixels", 0.8 + 0.2 * first / pixels.shape[1])
         block = slice(first, first + _BLOCK)
-        codes[:, block] = descend(
-            fit.colours.T @ pixels[:, block],
-            fit.colours.T @ fit.colours,
-            options.sparsity,
-            codes[:, block].copy(),
-        )
+        own = codes[:, block].copy()
+        products = fit.colours.T @ fit.colours
+        descend(fit.colours.T @ pixels[:, block], products, options.sparsity, own)
+        codes[:, block] = own
     return codes
 
 
-@jit
+@jit(types="f8[2] f8[2] f8 f8[2]")
 def descend(like, products, sparsity, codes):
     """Minimise 1/2 h' own h - (like - sparsity)' h over h >= 0 for each pixel.
 
@@ -422,11 +420,6 @@ def descend(like, products, sparsity, codes):
     sparsity : float
     codes : (m, n) ndarray
         Start; overwritten.
-
-    Returns
-    -------
-    (m, n) ndarray
-        `codes`.
     """
     size, count = like.shape
     for pixel in range(count):
@@ -442,4 +435,3 @@ def descend(like, products, sparsity, codes):
                 codes[k, pixel] = code
             if change < 0.02:
                 break
-    return codes

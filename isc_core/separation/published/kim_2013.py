@@ -353,7 +353,7 @@ def _weights(steps: np.ndarray, both: np.ndarray, options: Kim2013Options) -> np
     return np.where(both, options.smoothness / np.hypot(steps / options.gradient, 1), 0)
 
 
-@jit
+@jit(types="f8[2] r[2] r[2] r[2] r[2] r[2] i8")
 def _relax(s, target, pull, across, down, bound, parity):
     height, width = s.shape
     for y in range(height):

@@ -243,7 +243,7 @@ def _flow(
     return speed, across, down
 
 
-@jit
+@jit(types="f4[2] f4[2] f4[2] b1[2] f8 f8 f8 f4[2] f4[2] f4[2]")
 def _measure_flow(pixel_rho, u, v, mask, edge, chroma, texture, speed, across, down):
     for y in range(1, u.shape[0] - 1):
         for x in range(1, u.shape[1] - 1):
@@ -286,7 +286,7 @@ def _evolve(
     return here
 
 
-@jit
+@jit(types="f4[2] f4[2] f4[2] f4[2] f8 f4[2]")
 def _erode(phi, speed, across, down, step, result):
     for y in range(1, phi.shape[0] - 1):
         for x in range(1, phi.shape[1] - 1):

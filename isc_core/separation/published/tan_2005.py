@@ -304,7 +304,7 @@ def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options
             break
 
 
-@jit
+@jit(types="f8[2] f8[2] b1[2] i1[2] f8 b1 -> i8")
 def _mark(total, free, neighbour, label, factor, log_of_difference):
     """Label every open pixel as specular relative to its right or lower neighbour, or diffuse;
     return the number of specular ones.
@@ -339,7 +339,7 @@ def _mark(total, free, neighbour, label, factor, log_of_difference):
     return count
 
 
-@jit
+@jit(types="f8[3] f8[2] f8[2] f8[2] f8[2] i1[2] b1[2] f8 f8 b1")
 def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by_colour):
     """Set, pair by pair, the diffuse chromaticity of the pixel with the smaller c to the other's,
     up to its limit.
@@ -371,7 +371,7 @@ def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by
             label[other_y, other_x] = _DIFFUSE
 
 
-@jit
+@jit(types="f8[3] f8[2] f8[2] f8[2] f8[2] b1[2] b1")
 def _refresh(colours, total, peak, red, green, stale, shares):
     """Recompute totals and chromaticities of the changed colours; `red` and `green` only if
     `shares`.

@@ -260,7 +260,7 @@ def filter_in_grid(values: np.ndarray, grid: BilateralGrid) -> np.ndarray:
     return smooth
 
 
-@jit
+@jit(types="f8[1] f8[2] f8[3] f8[3]")
 def _scatter(values, at, sums, counts):
     """Add every value to its nearest cell, and one to the cell's count."""
     for i in range(len(values)):
@@ -269,7 +269,7 @@ def _scatter(values, at, sums, counts):
         counts[r, c, g] += 1.0
 
 
-@jit
+@jit(types="f8[3] f8[2] f8[1]")
 def _interpolate(cells, at, out):
     """Trilinear interpolation of `cells` at the positions `at` (n, 3)."""
     for i in range(len(out)):

@@ -219,7 +219,7 @@ def _by_regions(pixels: _TwoBand, options: Yoon2006Options) -> np.ndarray:
     """t (H, W), for every known pixel the quantile over the pixels of its region and cell of
     colour.
     """
-    parent = np.arange(pixels.valid.size)
+    parent = np.arange(pixels.valid.size, dtype=np.int64)
     for first, second in (_pairs(pixels, options.colour_step, axis) for axis in (1, 0)):
         _unite(first, second, parent)
     _flatten(parent)
@@ -274,7 +274,7 @@ def _column_pairs(pixels: _TwoBand, colour_step: float) -> tuple[np.ndarray, np.
     return first[kept], second[kept]
 
 
-@jit
+@jit(types="i8[1] i8[1] f8[1] f8[1] f8 -> i8")
 def _sweep(first, second, ratio, band, tolerance):
     """Lower the larger t of each pair to the smaller one, in order, where more than `tolerance` of
     light changes; return the number of changes.
@@ -292,7 +292,7 @@ def _sweep(first, second, ratio, band, tolerance):
     return moved
 
 
-@jit
+@jit(types="i8[1] i8[1] i8[1]")
 def _unite(first, second, parent):
     """Join the trees of every pair, with path halving; the root is the tree's smallest index."""
     for k in range(len(first)):
@@ -309,7 +309,7 @@ def _unite(first, second, parent):
             parent[p] = q
 
 
-@jit
+@jit(types="i8[1]")
 def _flatten(parent):
     """Point every node at its root; a node's parent never comes after it."""
     for i in range(len(parent)):

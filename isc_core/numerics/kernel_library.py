@@ -1,0 +1,216 @@
+"""Kernels that were compiled ahead of time, called through ctypes.
+
+Problem: a program that compiles its kernels carries a compiler, with Numba and LLVM 200 MB of it,
+and compiles for 20 s when it is first used. The extension for Blender carries one shared library of
+half a megabyte instead.
+
+The library has one function for each kernel and version of its types. It takes arrays as the
+objects that they are, and reads address, shape and strides from the fields that are part of NumPy's
+binary interface, after it has compared the type. A call releases the interpreter lock.
+
+Arrays of other types or strides than the declared ones are copied for the call, and what the kernel
+wrote is copied back: slower, with the same result.
+
+Limits: a library is for one system and one kind of processor. It uses the instructions of
+x86-64-v3, those of processors since 2013; another one for older processors may lie beside it.
+"""
+
+import ctypes
+import operator
+from collections.abc import Callable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .kernel_types import Array, Scalar, Signature
+
+FOLDER = Path(__file__).with_name("compiled")
+"""Where shipped libraries lie, the preferred one last by name."""
+_FITS, _MISFIT = 0, -1  # as in runtime.c
+
+
+@cache
+def shipped_library() -> "KernelLibrary | None":
+    """Return the library for this machine; None if none was shipped."""
+    for path in sorted(FOLDER.glob("kernels*"), reverse=True):
+        library = open_library(path)
+        if library is not None:
+            return library
+    return None
+
+
+def open_library(path: Path) -> "KernelLibrary | None":
+    """Load a library.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    KernelLibrary or None
+        None if it is for another system or processor.
+    """
+    try:
+        loaded = ctypes.CDLL(str(path))
+    except OSError:
+        return None
+    loaded.isc_set_array_class(ctypes.py_object(np.ndarray))
+    return KernelLibrary(loaded) if loaded.isc_processor_fits() else None
+
+
+def symbol(function: Callable[..., Any], version: int) -> str:
+    """Return the name of a kernel in the library.
+
+    Parameters
+    ----------
+    function : callable
+        The kernel as it was written.
+    version : int
+        Which of its signatures.
+
+    Returns
+    -------
+    str
+        For example isc_sirfs_kernels_forward_rows_0.
+    """
+    module = function.__module__.rpartition("isc_core.")[2]
+    return f"isc_{module.replace('.', '_')}_{function.__name__}_{version}"
+
+
+class _Whole:
+    """Converts what counts as an integer, also NumPy's, for ctypes."""
+
+    @staticmethod
+    def from_param(value: Any) -> ctypes.c_int64:
+        return ctypes.c_int64(operator.index(value))
+
+
+class _Single:
+    """Converts a number to float32."""
+
+    @staticmethod
+    def from_param(value: Any) -> ctypes.c_float:
+        return ctypes.c_float(value)
+
+
+class _Double:
+    """Converts a number to float64."""
+
+    @staticmethod
+    def from_param(value: Any) -> ctypes.c_double:
+        return ctypes.c_double(value)
+
+
+class _Truth:
+    """Converts a Boolean, also NumPy's."""
+
+    @staticmethod
+    def from_param(value: Any) -> ctypes.c_uint8:
+        return ctypes.c_uint8(bool(value))
+
+
+_SCALARS = {"i8": _Whole, "f4": _Single, "f8": _Double, "b1": _Truth}
+_RESULTS: dict[str, Any] = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
+
+
+class KernelLibrary:
+    """An open library.
+
+    Parameters
+    ----------
+    loaded : ctypes.CDLL
+    """
+
+    def __init__(self, loaded: ctypes.CDLL) -> None:
+        self._loaded = loaded
+
+    def kernel(
+        self, function: Callable[..., Any], signatures: Sequence[Signature]
+    ) -> Callable[..., Any]:
+        """Return the compiled kernel.
+
+        Parameters
+        ----------
+        function : callable
+            As it was written.
+        signatures : sequence of Signature
+            Its versions.
+
+        Returns
+        -------
+        callable
+            Takes what the function takes. Raises MemoryError if its scratch memory is not to be
+            had.
+        """
+        entries = [
+            _Entry(self._loaded[symbol(function, version)], signature)
+            for version, signature in enumerate(signatures)
+        ]
+
+        def call(*values: Any) -> Any:
+            flat = _flat(values)
+            for entry in entries:
+                fits, result = entry(flat)
+                if fits:
+                    return result
+            return entries[-1].on_copies(flat)
+
+        return call
+
+
+def _flat(values: Sequence[Any]) -> list[Any]:
+    """The arguments, with the fields of tuples in place of these."""
+    flat: list[Any] = []
+    for value in values:
+        if isinstance(value, tuple):
+            flat.extend(value)
+        else:
+            flat.append(value)
+    return flat
+
+
+class _Entry:
+    """One version of a kernel.
+
+    Parameters
+    ----------
+    native : ctypes function
+    signature : Signature
+    """
+
+    def __init__(self, native: Any, signature: Signature) -> None:
+        self._native, self._types = native, signature.flat
+        self._result = _RESULTS[signature.result.code] if signature.result else None
+        native.restype = ctypes.c_int
+        native.argtypes = (
+            ctypes.c_void_p,
+            *(_SCALARS[t.code] if isinstance(t, Scalar) else ctypes.py_object for t in self._types),
+        )
+
+    def __call__(self, flat: Sequence[Any]) -> tuple[bool, Any]:
+        """Whether the types fit, and the result."""
+        if self._result is None:
+            status, result = self._native(None, *flat), None
+        else:
+            written = self._result()
+            status, result = self._native(ctypes.byref(written), *flat), written.value
+        if status not in (_FITS, _MISFIT):
+            raise MemoryError("no memory for a compiled kernel")
+        return status == _FITS, result
+
+    def on_copies(self, flat: Sequence[Any]) -> Any:
+        """The result of a call with copies of all arrays, which are copied back."""
+        copies = [
+            np.array(value, kind.code, order="C") if isinstance(kind, Array) else value
+            for value, kind in zip(flat, self._types, strict=True)
+        ]
+        fits, result = self(copies)
+        if not fits:
+            raise TypeError("a compiled kernel was called with arrays of other dimensions")
+        for value, copy in zip(flat, copies, strict=True):
+            if isinstance(value, np.ndarray) and value.flags.writeable:
+                value[...] = copy
+        return result
