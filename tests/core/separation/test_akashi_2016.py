@@ -78,7 +78,7 @@ def test_descent_reaches_the_minimum() -> None:
     own, like = colours.T @ colours, colours.T @ random.uniform(0, 255, (3, 40))
     codes = np.zeros_like(like)
     akashi_2016.descend(like, own, 3.0, codes)
-    slope: np.ndarray = own @ codes - like + 3.0
+    slope = np.asarray(own @ codes - like + 3.0)
     assert (codes > 0).any(axis=1).all() and (codes == 0).any()
     assert np.abs(slope[codes > 0]).max() < 0.5 and slope[codes == 0].min() > -0.5
 
