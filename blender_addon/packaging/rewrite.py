@@ -22,6 +22,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.errors",
         "isc_core.extras",
         "isc_core.imaging.srgb",
+        "isc_core.imaging.upsampling",
         "isc_core.io.atomic",
         "isc_core.io.json_files",
         "isc_core.io.npy",

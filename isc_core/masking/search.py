@@ -33,6 +33,7 @@ WORKING = 768  # pixels of the longer side of the photo that is worked on
 _SIDES = (96, 128)  # pixels of the network's frame at the second look
 _MARGIN = 0.25  # of the thing's longer side, around it at the second look
 _FILLED = 0.75  # of the sides of a box: a smaller mask is not what the box was drawn around
+_SEEN = 0.5  # of a mask in a box the network has to have seen: cuts spread among similar colours
 _NOTHING = 0.5  # probability from which a photo shows no things
 
 
@@ -167,6 +168,8 @@ def _second_look(
     cover = np.zeros_like(first.cover)
     cover[part.slices] = refined(light[part.slices], second.cover, known)
     if hints.box is not None:
+        if not hints.points and (second.cover > 0.5).sum() < _SEEN * (cover >= 0.5).sum():
+            cover[:] = 0
         outside = np.ones(cover.shape, bool)
         left, top, wide, high = hints.box
         outside[top : top + high, left : left + wide] = False

@@ -296,6 +296,10 @@ CHARACTERISTICS = (
         "status.expected_error",
     ),
     CharacteristicEntry("camera", "f", "pixels", "image", "camera", "a focal length", "camera"),
+    CharacteristicEntry("visibility", "V", "", "image", "visibility", "H, W, RGB", "visibility"),
+    CharacteristicEntry(
+        "environment", "E", "radiance", "camera", "environment", "rows, columns, RGB", "environment"
+    ),
     CharacteristicEntry(
         "origin",
         "",

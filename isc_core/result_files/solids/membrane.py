@@ -4,17 +4,21 @@ Equation: lap z = -load inside, z given on the pixels around. Under a load of 4 
 sqrt(z) is the height of a sphere over a disc; over other outlines, of a body as round as they are.
 
 Method: from the coarsest of a pyramid to the finest, each level starts from the one before and is
-relaxed by red-black successive over-relaxation.
+relaxed by red-black successive over-relaxation; the larger a level, the fewer sweeps it needs.
 
 Citation: F. A. Bornemann and P. Deuflhard, "The cascadic multigrid method for elliptic problems",
 Numerische Mathematik 75 (1996), doi:10.1007/s002110050234.
 
-Limits: a fixed number of sweeps, some per cent from the limit in large regions.
+Limits: a fixed number of sweeps: a sphere of 2,200 pixels is 1.1 % of its radius off.
 """
 
 import numpy as np
 
+from ...imaging.upsampling import enlarged
+
 _SWEEPS, _OVER = 40, 1.8
+# Levels longer than so many pixels: their sweeps fall with their length, to the least.
+_LONG, _FEWEST, _OVER_LONG = 256, 8, 1.5
 _COARSEST = 12  # pixels of the shorter side
 
 
@@ -44,7 +48,7 @@ def membrane(inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: f
         coarse_inside = (_blocks(inside) > 0) & ~coarse_around
         means = known / np.maximum(weight, 1e-9)
         coarse = membrane(coarse_inside, coarse_around, means, 4 * load)
-        start = coarse.repeat(2, 0).repeat(2, 1)[: inside.shape[0], : inside.shape[1]]
+        start = enlarged(coarse, inside.shape, 2)
     found = np.where(around, values, 0.0).astype(np.float64)
     if start is not None:
         found[inside] = start[inside]
@@ -62,9 +66,12 @@ def _relaxed(found: np.ndarray, inside: np.ndarray, load: float) -> np.ndarray:
     pixels = np.flatnonzero(inside)
     row, column = np.divmod(pixels, width)
     colors = [pixels[(row + column) % 2 == parity] for parity in (0, 1)]
-    flat = found.reshape(-1)
-    for _ in range(_SWEEPS):
+    flat, length = found.reshape(-1), max(found.shape)
+    sweeps, over = _SWEEPS, _OVER
+    if length > _LONG:
+        sweeps, over = max(_SWEEPS * _LONG // length, _FEWEST), _OVER_LONG
+    for _ in range(sweeps):
         for at in colors:
             near = flat[at - 1] + flat[at + 1] + flat[at - width] + flat[at + width]
-            flat[at] += _OVER * ((near + load) / 4 - flat[at])
+            flat[at] += over * ((near + load) / 4 - flat[at])
     return found
