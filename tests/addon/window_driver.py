@@ -238,7 +238,7 @@ def begin(acc: Any) -> Iterator[float]:
     place = yield from acc.find("isc.decompose")
     if acc.check(place, "the button is found"):
         yield acc.click(*place, settle=0.5)
-        yield from until(lambda: shown().state == "running", 3)
+        yield from until(lambda: shown().state == "running", 30)
 
 
 def escape(acc: Any) -> Iterator[float]:
