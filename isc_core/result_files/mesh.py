@@ -51,6 +51,7 @@ from PIL import Image
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
 from ..imaging.srgb import linear_to_srgb
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
@@ -63,6 +64,8 @@ from .vertex_normals import detail_normals, directions_at, facing, flat_normals,
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
+_FADING = 0.01  # of the object's longer side: as wide a dark border may be a fading outline
+_AS_BRIGHT = 0.8  # of what lies within
 _ROWS = 256  # coded at once
 
 
@@ -315,11 +318,42 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     bright = float(np.percentile(reflectance[mask].max(-1).astype(np.float64), 99.5))
     k = _BRIGHT / bright if bright > 0 else 1.0
     mean = reflectance[mask].astype(np.float64).mean(0)
-    near, source = nearest_inside(mask, bleed)
-    color = np.where(mask[..., None], reflectance, mean)
+    rings = dark_rings(reflectance, mask)
+    inner = mask if rings == 0 else ndimage.distance_transform_edt(mask) > rings
+    near, source = nearest_inside(inner, bleed + rings)
+    color = np.where(inner[..., None], reflectance, mean)
     color.reshape(-1, 3)[near] = reflectance.reshape(-1, 3)[source]
     color *= k
     return color, k
+
+
+def dark_rings(reflectance: np.ndarray, mask: np.ndarray) -> int:
+    """Count the outermost rings of a mask that show a black background rather than the object.
+
+    A soft outline before black fades over several pixels, which a mask may include; the sides of
+    the mesh would stretch them to a black band. A darker border that is wider is paint.
+
+    Parameters
+    ----------
+    reflectance : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    int
+        Pixels; 0 where the border is as bright as what lies within.
+    """
+    depth = ndimage.distance_transform_edt(mask)
+    most = max(1, round(_FADING * max(mask[mask_slices(mask)].shape)))
+    light = reflectance.mean(axis=-1, dtype=np.float64)
+    within = light[(depth > most + 1) & (depth <= 2 * most + 2)]
+    if not within.size:
+        return 0
+    enough = _AS_BRIGHT * float(np.median(within))
+    for rings in range(most + 1):
+        if float(np.median(light[(depth > rings) & (depth <= rings + 1)])) >= enough:
+            return rings
+    return 0
 
 
 def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,8 @@ the pixels of the maps,
 
 g falls from 1 to 0 where the specular layer's share of the light grows from 0.4 to 0.8: there, what
 is finer than the maps belongs to the highlight. The outermost pixel of the mask, which often shows
-the background, too, takes the ratio of the nearest pixel inside, and the surroundings its colour.
+the background, too, and all of an outline that fades to black (`mesh.dark_rings`), take the ratio
+of the nearest pixel inside, and the surroundings its colour.
 
 Citation: the ratio of a fine to a coarse image that multiplies a coarse layer is that of
 G. Petschnigg et al., "Digital photography with flash and no-flash image pairs", ACM Transactions on
@@ -30,7 +31,7 @@ from ...imaging.bounding_box import mask_slices
 from ...imaging.upsampling import enlarged
 from ...photo import Photo
 from ...scene.decomposition import Decomposition
-from ..mesh import base_color, color_codes, nearest_inside
+from ..mesh import base_color, color_codes, dark_rings, nearest_inside
 from ..mesh_options import MeshOptions
 
 _MOST = 4.0  # the largest ratio of fine to coarse diffuse light, and the inverse of the smallest
@@ -134,8 +135,9 @@ def _texture(
 ) -> np.ndarray:
     """(h, w, 3) float32, linear: the texture in that part of the photo."""
     grids = _grids(photo.mask, box, d, factor)
-    interior = _interior(grids.inside)
-    near, source = nearest_inside(interior, round(_RIM * factor) + 2)
+    rim = max(1, round(factor * dark_rings(d.reflectance, d.mask)))
+    interior = _interior(grids.inside, rim)
+    near, source = nearest_inside(interior, round(_RIM * factor) + 1 + rim)
     beyond = ~interior
     beyond.reshape(-1)[near] = False
     outside = ~grids.inside.reshape(-1)[near]
@@ -159,7 +161,7 @@ def _texture(
     return texture
 
 
-def _interior(mask: np.ndarray) -> np.ndarray:
-    """The mask without its outermost pixel; the whole mask if that is all."""
-    inner = ndimage.binary_erosion(mask, border_value=1)
+def _interior(mask: np.ndarray, rim: int) -> np.ndarray:
+    """The mask without its outermost pixels; the whole mask if that is all."""
+    inner = ndimage.binary_erosion(mask, iterations=rim, border_value=1)
     return inner if inner.any() else mask

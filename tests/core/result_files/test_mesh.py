@@ -17,7 +17,13 @@ from scipy import ndimage
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
-from isc_core.result_files.mesh import MeshResult, base_color, build_mesh, limit_rim
+from isc_core.result_files.mesh import (
+    MeshResult,
+    base_color,
+    build_mesh,
+    dark_rings,
+    limit_rim,
+)
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.spherical_harmonics import real_sh
@@ -161,6 +167,30 @@ def test_the_base_color_gives_the_reflectance_back() -> None:
     for side in (-0.5, 0.5):  # the truth lies within half a code value of what is stored
         edge = srgb_to_linear(np.clip((coded + side * 1.001) / 255, 0, 1))
         assert ((truth - edge)[d.mask] * np.sign(side) <= 1e-6).all()
+
+
+def disc_with_a_border(width: int) -> tuple[np.ndarray, np.ndarray]:
+    """Reflectance and mask of a disc 400 pixels wide, whose border is darker."""
+    y, x = np.mgrid[:410, :410] - 204.5
+    mask = np.hypot(x, y) < 200
+    depth = ndimage.distance_transform_edt(mask)
+    light = np.where(depth > width, 0.5, 0.02) * mask
+    return light[..., None] * np.array([1, 0.8, 0.6]), mask
+
+
+def test_an_outline_that_fades_to_black_is_not_the_object() -> None:
+    reflectance, mask = disc_with_a_border(3)
+    assert dark_rings(reflectance, mask) == 3
+    color, k = base_color(reflectance, mask, 4)
+    np.testing.assert_allclose(color[mask] / k, np.broadcast_to([0.5, 0.4, 0.3], (mask.sum(), 3)))
+
+
+@pytest.mark.parametrize("width", [0, 12])
+def test_a_plain_border_and_a_painted_one_are_the_object(width: int) -> None:
+    reflectance, mask = disc_with_a_border(width)
+    assert dark_rings(reflectance, mask) == 0
+    color, k = base_color(reflectance, mask, 4)
+    np.testing.assert_allclose(color[mask] / k, reflectance[mask])
 
 
 def test_base_color_and_its_light_give_the_diffuse_image() -> None:
