@@ -1,5 +1,4 @@
-"""Rendered scenes for the refinement: truth, the result that the refinement starts from, and the
-truth under a new light.
+"""Rendered scenes for the refinement: truth, and the result that the refinement starts from.
 
 Scene k has its own object, albedo, GGX lobe and light, drawn from (`SEED`, k). Of three scenes, two
 have one or two lamps that cast shadows (directional, point or small panel) and one has smooth
@@ -20,12 +19,12 @@ from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition
 from synth.albedos import make_albedo
 from synth.capture.recipe import camera_around
-from synth.capture.truth import GroundTruth, exposed, render_truth
+from synth.capture.truth import exposed, render_truth
 from synth.light_rigs import make_lights
-from synth.light_rigs.placing import ambient, places, toward, white
+from synth.light_rigs.placing import ambient, places, white
 from synth.rendering import RenderOptions
 from synth.scene import Scene
-from synth.scene.lights import DirectionalLight, Light, panel_toward_origin
+from synth.scene.lights import Light, panel_toward_origin
 from synth.scene.materials import Material
 from synth.shapes import make_shape
 
@@ -34,6 +33,7 @@ LAMPS, SMOOTH = ("directional", "small", "point"), "sh"
 _SHAPES = ("displaced", "blobby", "lathe", "extruded", "height_field")
 _ALBEDOS = ("patches", "print", "uniform", "noise")
 _ALPHAS = (0.08, 0.4)
+_MAPS = ("image", "reflectance", "shading", "mask")
 _SAMPLES, _LEVEL, _BEAM = 64, 0.6, 12.0
 
 
@@ -48,8 +48,7 @@ class RefinementScene:
     light : str
         Kind of light, one of `LAMPS` or `SMOOTH`.
     truth : dict of str to ndarray
-        True maps by name; `lamp` (3,), the direction of the strongest lamp, or zeros; `alpha` and
-        `strength` of the lobe; `new_image`, the object under `new_lamp` (3,) and `new_ambient`.
+        True maps by name.
     start : Decomposition
         What the refinement starts from.
     folder : Path
@@ -109,47 +108,21 @@ def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
     strength = float(rng.uniform(0.6, 1.5))
     albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)
     material = Material(albedo, "ggx", alpha, strength)
-    lights, lamp = _lights(kind, rng)
-    scene = Scene(mesh, material, lights, camera_around(mesh, size, 0.88))
+    scene = Scene(mesh, material, _lights(kind, rng), camera_around(mesh, size, 0.88))
     options = RenderOptions(_SAMPLES, number)
-    scene, truth = exposed(scene, render_truth(scene, options), _LEVEL)
-    new_lamp = toward(rng.uniform(25, 60), rng.uniform(-180, 180))
-    beam = DirectionalLight(new_lamp, np.full(3, np.pi))
-    around = ambient(rng, 0.2, 0.2)
-    _, new = exposed(scene, render_truth(replace(scene, lights=(beam, around)), options), _LEVEL)
-    return _arrays(truth) | {
-        "light": np.array(kind),
-        "lamp": lamp,
-        "alpha": np.array(alpha),
-        "strength": np.array(strength),
-        "new_image": new.image,
-        "new_environment": new.environment,
-        "new_lamp": new_lamp,
-    }
+    _, truth = exposed(scene, render_truth(scene, options), _LEVEL)
+    return {name: getattr(truth, name) for name in _MAPS} | {"light": np.array(kind)}
 
 
-def _arrays(truth: GroundTruth) -> dict[str, np.ndarray]:
-    names = ("image", "diffuse", "reflectance", "shading", "normal", "height", "mask")
-    maps = {name: getattr(truth, name) for name in (*names, "environment", "illumination")}
-    return maps | {"specular": np.maximum(truth.specular, 0)}
-
-
-def _lights(kind: str, rng: np.random.Generator) -> tuple[tuple[Light, ...], np.ndarray]:
-    """The lights, and the direction (3,) of the strongest lamp; zeros for smooth light."""
+def _lights(kind: str, rng: np.random.Generator) -> tuple[Light, ...]:
     if kind == SMOOTH:
-        return make_lights(kind, rng), np.zeros(3)
+        return make_lights(kind, rng)
     fill = ambient(rng, 0.1, 0.35)
     if kind == "small":
         place, _ = places(rng)[0]
-        panel = panel_toward_origin(
-            tuple(_BEAM * place), (2.0, 2.0), tuple(np.pi * _BEAM**2 / 4 * white(rng))
-        )
-        return (panel, fill), place
-    lamps = tuple(light for light in make_lights(kind, rng) if not _is_ambient(light))
-    strongest = lamps[0]
-    where = getattr(strongest, "direction", None)
-    where = getattr(strongest, "position", None) if where is None else where
-    return (*lamps, fill), np.asarray(where) / np.linalg.norm(np.asarray(where))
+        strength = tuple(np.pi * _BEAM**2 / 4 * white(rng))
+        return (panel_toward_origin(tuple(_BEAM * place), (2.0, 2.0), strength), fill)
+    return (*(light for light in make_lights(kind, rng) if not _is_ambient(light)), fill)
 
 
 def _is_ambient(light: Light) -> bool:

@@ -241,24 +241,6 @@ def put_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
     return tag(image, key, role)
 
 
-def ensure_image(key: str, role: str, values: np.ndarray, space: str) -> bpy.types.Image:
-    """Create the image of a map, or replace the one of that role everywhere it is used.
-
-    Parameters
-    ----------
-    key, role : str
-        As of `put_image`.
-    values, space : ndarray, str
-        As of `map_file`.
-
-    Returns
-    -------
-    bpy.types.Image
-        The packed image.
-    """
-    return put_image(new_image(map_file(values, space)), key, role)
-
-
 def image_name(key: str, role: str) -> str:
     """Return the name of an image, from which exporters make that of its file.
 

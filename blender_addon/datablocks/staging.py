@@ -8,12 +8,14 @@ again.
 
 from collections.abc import Generator, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 
 from .images import ImageFile, new_image
 from .mesh import MeshArrays, fill_mesh
+
+Outcome = TypeVar("Outcome")
 
 
 @dataclass
@@ -108,6 +110,27 @@ def stage(
     finally:
         if not complete:
             blocks.discard()
+
+
+def completed(steps: Generator[Any, None, Outcome]) -> Outcome:
+    """Make all steps at once, where no window waits.
+
+    Parameters
+    ----------
+    steps : generator
+        The steps.
+
+    Returns
+    -------
+    Any
+        What they return.
+    """
+    while True:
+        try:
+            next(steps)
+        except StopIteration as stop:
+            outcome: Outcome = stop.value
+            return outcome
 
 
 def _copy(base: int) -> bpy.types.Mesh:

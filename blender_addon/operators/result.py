@@ -11,6 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..datablocks.staging import completed
 from ..files.result_arrays import ARRAYS, DESCRIPTION, read_result
 from ..scene.build import (
     BuiltObject,
@@ -112,12 +113,7 @@ def build_as_undo_step(
     InputError
         If the result cannot be built.
     """
-    steps = build_in_steps(context, output, request, view)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return str(stop.value)
+    return completed(build_in_steps(context, output, request, view))
 
 
 class ISC_OT_build_result(bpy.types.Operator):

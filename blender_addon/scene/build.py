@@ -33,7 +33,7 @@ from ..datablocks.provenance import (
     tag,
     write_provenance,
 )
-from ..datablocks.staging import StagedBlocks, stage
+from ..datablocks.staging import StagedBlocks, completed, stage
 from ..files.result_arrays import ResultArrays
 from .camera import ensure_camera, set_render_size
 from .camera_background import set_background_photo
@@ -138,11 +138,7 @@ def build_object(
     require_options(options)
     _require_ready(_choose_key(result, options, photo), options, scene or bpy.context.scene)
     steps = stage_object(prepare(result, options, with_photo=photo is None), photo=photo)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            return place_object(stop.value, scene=scene, photo=photo)
+    return place_object(completed(steps), scene=scene, photo=photo)
 
 
 def stage_object(

@@ -318,8 +318,9 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     bright = float(np.percentile(reflectance[mask].max(-1).astype(np.float64), 99.5))
     k = _BRIGHT / bright if bright > 0 else 1.0
     mean = reflectance[mask].astype(np.float64).mean(0)
-    rings = dark_rings(reflectance, mask)
-    inner = mask if rings == 0 else ndimage.distance_transform_edt(mask) > rings
+    depth = ndimage.distance_transform_edt(mask)
+    rings = dark_rings(reflectance, depth)
+    inner = depth > rings
     near, source = nearest_inside(inner, bleed + rings)
     color = np.where(inner[..., None], reflectance, mean)
     color.reshape(-1, 3)[near] = reflectance.reshape(-1, 3)[source]
@@ -327,7 +328,7 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     return color, k
 
 
-def dark_rings(reflectance: np.ndarray, mask: np.ndarray) -> int:
+def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
     """Count the outermost rings of a mask that show a black background rather than the object.
 
     A soft outline before black fades over several pixels, which a mask may include; the sides of
@@ -336,15 +337,16 @@ def dark_rings(reflectance: np.ndarray, mask: np.ndarray) -> int:
     Parameters
     ----------
     reflectance : (H, W, 3) ndarray
-    mask : (H, W) bool ndarray
+    depth : (H, W) ndarray
+        Distance of the mask's pixels from its outside; 0 outside.
 
     Returns
     -------
     int
         Pixels; 0 where the border is as bright as what lies within.
     """
-    depth = ndimage.distance_transform_edt(mask)
-    most = max(1, round(_FADING * max(mask[mask_slices(mask)].shape)))
+    box = mask_slices(depth > 0)
+    most = max(1, round(_FADING * max(depth[box].shape)))
     light = reflectance.mean(axis=-1, dtype=np.float64)
     within = light[(depth > most + 1) & (depth <= 2 * most + 2)]
     if not within.size:

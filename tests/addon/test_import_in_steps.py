@@ -1,6 +1,5 @@
 """An import in steps: until the last one the scene is as before, and nothing is left without it."""
 
-from collections.abc import Generator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -11,9 +10,10 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.datablocks.images import DATA, SRGB, map_file, new_image, own_file  # noqa: E402
+from blender_addon.datablocks.staging import completed  # noqa: E402
 from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
 from blender_addon.operators import live_edits  # noqa: E402
-from blender_addon.scene.build import StagedObject, build_object, place_object, stage_object  # noqa: E402
+from blender_addon.scene.build import build_object, place_object, stage_object  # noqa: E402
 from blender_addon.scene.color_bake import ColorEdit, color_source, edited_file  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
@@ -31,15 +31,6 @@ def census() -> dict[str, set[int]]:
     """Every datablock of the file."""
     kinds = ("images", "meshes", "objects", "materials", "collections", "worlds", "node_groups")
     return {kind: {block.session_uid for block in getattr(bpy.data, kind)} for kind in kinds}
-
-
-def completed(steps: Generator[None, None, StagedObject]) -> StagedObject:
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            staged: StagedObject = stop.value
-            return staged
 
 
 @pytest.mark.parametrize("steps", [1, 3, 5])

@@ -9,7 +9,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.files.image_source import ImageSource  # noqa: E402 (after the skip)
+from blender_addon.datablocks.staging import completed  # noqa: E402 (after the skip)
+from blender_addon.files.image_source import ImageSource  # noqa: E402
 from blender_addon.files.result_cache import ResultCache, content_key  # noqa: E402
 from blender_addon.operators import run_steps  # noqa: E402
 from blender_addon.operators.request import MethodSettings  # noqa: E402
@@ -99,13 +100,7 @@ def test_a_second_run_starts_no_worker(
 
     def run(number: int, method: MethodSettings) -> RunOutput:
         place = ResultPlace(tmp_path / str(number), cache, keep)
-        steps = decompose_steps(photo, None, None, method, place, 0, environment)
-        while True:
-            try:
-                next(steps)
-            except StopIteration as stop:
-                output: RunOutput = stop.value
-                return output
+        return completed(decompose_steps(photo, None, None, method, place, 0, environment))
 
     outputs = [run(n, MethodSettings(samples=n)) for n in range(2)]
     assert len(jobs) == 1, "how it is rendered does not count"

@@ -1,4 +1,4 @@
-/* What compiled kernels need besides themselves: arrays of NumPy, memory, and a look at the processor.
+/* What compiled kernels need besides themselves: arrays of NumPy, memory, a look at the processor.
 
    Needs no header of Python or NumPy: the first fields of an array are part of NumPy's binary
    interface, the same in versions 1 and 2. Limits: 64-bit, little-endian, not for free-threaded

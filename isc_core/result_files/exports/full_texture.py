@@ -135,7 +135,8 @@ def _texture(
 ) -> np.ndarray:
     """(h, w, 3) float32, linear: the texture in that part of the photo."""
     grids = _grids(photo.mask, box, d, factor)
-    rim = max(1, round(factor * dark_rings(d.reflectance, d.mask)))
+    rings = dark_rings(d.reflectance, ndimage.distance_transform_edt(d.mask))
+    rim = max(1, round(factor * rings))
     interior = _interior(grids.inside, rim)
     near, source = nearest_inside(interior, round(_RIM * factor) + 1 + rim)
     beyond = ~interior
