@@ -2,9 +2,11 @@
 
   python -m benchmarks.blender.side_views -o FOLDER
   python -m benchmarks.blender.side_views -o FOLDER --chosen-on --true-heights
+  python -m benchmarks.blender.side_views -o FOLDER --sheet JPG
 
 The first form measures the reported bodies, the second those that constants were chosen on, with
-their true heights in place of the recovered ones: the best that any recovery could reach.
+their true heights in place of the recovered ones: the best that any recovery could reach. The third
+draws four of the reported bodies: truth, former closed mesh, rounded, from five sides.
 
 Equation: IoU = sum min(a, b) / sum max(a, b) over the coverages a, b; PSNR over the pixels that
 either covers, with the 99.9th percentile of the truth as peak, and black where one is missing. The
@@ -22,10 +24,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from PIL import Image
 
 from blender_addon.datablocks.mesh import front_geometry
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.evaluation.metrics import psnr
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.result_files.solids.body import Back, make_body
 from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
@@ -37,6 +41,10 @@ ANGLES = (30, 60)
 BEFORE = ("former open", "former flat")
 _SIDE = 200  # pixels of a view
 _BACK_DISTANCE = 0.02
+_SHOWN, _SIDES = (6, 7, 8, 10), (0, 30, 60, 90, 180)
+_CROP = 45  # pixels at each border of a view
+_GREY = 0.2
+_SHEET = (880, 528)
 
 
 @dataclass(frozen=True)
@@ -87,7 +95,8 @@ def drawn(result: ResultArrays, kind: str) -> Drawn:
     normal = vertex_normals(vertices, body.faces)
     rows, columns = body.pixels.T
     normal[body.front] = result.normal[rows, columns][body.front]
-    return _lit(result, vertices, body.faces, normal, body.pixels)
+    texture = np.clip(np.rint(body.texture).astype(int), 0, np.array(result.mask.shape) - 1)
+    return _lit(result, vertices, body.faces, normal, texture)
 
 
 def _former(result: ResultArrays, flat: bool) -> Drawn:
@@ -254,6 +263,37 @@ def table(figures: dict[str, np.ndarray]) -> str:
     return "\n".join(lines) + "\n"
 
 
+def sheet(folder: Path) -> Image.Image:
+    """Draw bodies from five sides.
+
+    Parameters
+    ----------
+    folder : Path
+        Where results are kept.
+
+    Returns
+    -------
+    PIL.Image.Image
+        For each body the truth, the former closed mesh and the rounded one, below each other.
+    """
+    blocks = []
+    for number in _SHOWN:
+        body = bodies.make_body(number)
+        result = read_result(bodies.decompose_body(body, folder))
+        meshes = (body, drawn(result, "former flat"), drawn(result, Back.ROUNDED))
+        rows = [np.hstack([_pixels(view(mesh, yaw)) for yaw in _SIDES]) for mesh in meshes]
+        blocks.append(np.vstack(rows))
+    lines = [np.hstack(blocks[k : k + 2]) for k in range(0, len(blocks), 2)]
+    picture = Image.fromarray(np.vstack(lines))
+    return picture.resize(_SHEET, Image.Resampling.LANCZOS)
+
+
+def _pixels(seen: View) -> np.ndarray:
+    light = seen.values + _GREY * (1 - seen.coverage[..., None])
+    codes = np.rint(255 * linear_to_srgb(np.clip(light, 0, 1))).astype(np.uint8)
+    return np.asarray(codes[_CROP:-_CROP, _CROP:-_CROP])
+
+
 def main(arguments: list[str] | None = None) -> int:
     """Run the program.
 
@@ -271,7 +311,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--chosen-on", action="store_true")
     parser.add_argument("--true-heights", action="store_true")
+    parser.add_argument("--sheet", type=Path)
     given = parser.parse_args(arguments)
+    if given.sheet:
+        sheet(given.output).save(given.sheet, quality=82)
+        return 0
     first = 0 if given.chosen_on else bodies.CHOSEN_ON
     count = bodies.CHOSEN_ON if given.chosen_on else bodies.REPORTED
     figures = measured(range(first, first + count), given.output, given.true_heights)

@@ -1,8 +1,7 @@
 """The mesh with a smooth outline, fewer triangles and a back, from the maps of a result.
 
 The recovered normals of the visible side are in its vertices, and what lies between these in a
-tangent-space normal map. Rim and back have the normals of their faces, confidence 0, and the
-texture of the pixel in front of them.
+tangent-space normal map. Rim and back have the normals of their faces, and confidence 0.
 
 Equation: before a pinhole camera all vertices lie on the rays of their pixels, so that the front
 hides the back.
@@ -53,7 +52,7 @@ def body_geometry(
     normals[: len(smooth)] = smooth
     rows, columns = body.pixels.T
     height, width = result.mask.shape
-    uv = np.stack([(body.places[:, 1] + 0.5) / width, 1 - (body.places[:, 0] + 0.5) / height], -1)
+    uv = np.stack([(body.texture[:, 1] + 0.5) / width, 1 - (body.texture[:, 0] + 0.5) / height], -1)
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
         to_blender(vertices),

@@ -17,7 +17,8 @@ The back at a pixel is
 
 and at least `_LEAST` sqrt(u) behind the front, so that the two meet in the outline alone. Both are
 graphs over the same triangles: they do not cross each other, and before a pinhole camera, along
-whose rays the back lies, neither.
+whose rays the back lies, neither. The texture of a rounded back is folded in at the outline (see
+`texture_places`), that of the others is the texture of the pixel in front.
 
 Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
 artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
@@ -35,9 +36,12 @@ import numpy as np
 from ..adaptive_triangles import Triangulation
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
+from .smoothing import smoothed_within, surrounded
+from .texture_places import folded_places
 
 ROUND, FULLNESS = 1.0, 1.0
 _LEAST = 0.2
+_SMOOTH = 6  # passes over the depth of the rim
 _BEHIND = 0.02  # of the longer side
 
 
@@ -80,6 +84,8 @@ class Body:
         Vertices at pixels that the photo shows; not those of the outline.
     visible : Triangulation
         The triangles between these vertices, which come first.
+    texture : (V, 2) float64 ndarray
+        Row and column from which each vertex takes its texture.
     """
 
     places: np.ndarray
@@ -88,6 +94,7 @@ class Body:
     faces: np.ndarray
     front: np.ndarray
     visible: Triangulation
+    texture: np.ndarray
 
 
 def make_body(
@@ -132,12 +139,14 @@ def make_body(
     around = _grown(inside) & ~inside
     round_height = np.sqrt(np.maximum(membrane(inside, around, np.zeros_like(known), 4.0), 0))
     rim = np.where(inside, known - ROUND * round_height, 0.0)
+    rim = np.where(inside, smoothed_within(rim, surrounded(inside), _SMOOTH), 0.0)
     rows, columns = sheet.pixels.T
     heights = known[rows, columns]
     heights[sheet.inner :] = rim[rows, columns][sheet.inner :]
     front = np.arange(len(heights)) < sheet.inner
     if back is Back.OPEN:
-        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, sheet.pixel_triangles)
+        visible = sheet.pixel_triangles
+        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, visible, sheet.places)
     if back is Back.FLAT:
         return _walled(sheet, heights, front, mask)
     edge = _grown(around) & inside
@@ -145,7 +154,15 @@ def make_body(
     middle = np.where(edge, rim, middle)
     depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
     behind = np.minimum(middle - depth, known - _LEAST * round_height)
-    return _mirrored(sheet, heights, behind, front)
+    body = _joined(sheet, heights, behind, front)
+    if back is Back.MIRRORED:
+        return body
+    hidden = ~body.front
+    outline = (np.arange(len(hidden)) < len(front))[hidden]
+    body.texture[hidden] = folded_places(
+        np.square(round_height), body.places[hidden], body.pixels[hidden], outline
+    )
+    return body
 
 
 def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -184,7 +201,7 @@ def _grown(plane: np.ndarray) -> np.ndarray:
     return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
 
 
-def _mirrored(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray) -> Body:
+def _joined(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray) -> Body:
     """The sheet and, with the points of the outline in common, the back."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
@@ -196,6 +213,7 @@ def _mirrored(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: n
         np.concatenate([sheet.faces, other]),
         np.concatenate([front, np.zeros(inner, bool)]),
         sheet.pixel_triangles,
+        np.concatenate([sheet.places, sheet.places[:inner]]),
     )
 
 
@@ -218,4 +236,5 @@ def _walled(sheet: Outlined, heights: np.ndarray, front: np.ndarray, mask: np.nd
         np.concatenate([sheet.faces, sheet.faces[:, ::-1] + n, wall]),
         np.concatenate([front, np.zeros(n, bool)]),
         sheet.pixel_triangles,
+        np.concatenate([sheet.places, sheet.places]),
     )

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..adaptive_triangles import Triangulation, adaptive_triangles
+from .smoothing import binomial
 
 _CLOSEST = 0.1  # pixels
 _ALL = 1 << 40  # more triangles than any mesh has
@@ -67,11 +68,7 @@ def smooth_cover(cover: np.ndarray) -> np.ndarray:
     (H, W) float64 ndarray
         Smoothed twice over 3 x 3 pixels, 0 at the frame's border.
     """
-    smooth = np.pad(cover.astype(np.float64), 1)
-    for _ in range(2):
-        for axis in (0, 1):
-            smooth = (np.roll(smooth, 1, axis) + 2 * smooth + np.roll(smooth, -1, axis)) / 4
-    smooth = smooth[1:-1, 1:-1]
+    smooth = binomial(cover, 2)
     smooth[[0, -1]] = 0
     smooth[:, [0, -1]] = 0
     return smooth

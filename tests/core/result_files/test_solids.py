@@ -58,6 +58,53 @@ def test_front_and_back_meet_in_the_outline_alone() -> None:
     assert (behind < body.heights[:inner]).all()
 
 
+def texture_scales(body: Body) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest texture pixels per pixel of surface of each hidden face; face areas."""
+    faces = body.faces[~body.front[body.faces].any(1)]
+    vertices = np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1)[faces]
+    first, second = vertices[:, 1] - vertices[:, 0], vertices[:, 2] - vertices[:, 0]
+    across = np.cross(first, second)
+    x = first / np.linalg.norm(first, axis=1, keepdims=True)
+    y = np.cross(across / np.linalg.norm(across, axis=1, keepdims=True), x)
+    plane = np.stack([np.stack([(e * a).sum(1) for e in (first, second)], -1) for a in (x, y)], 1)
+    places = body.texture[faces]
+    texture = np.stack([places[:, k] - places[:, 0] for k in (1, 2)], -1)
+    scales = np.linalg.svd(texture @ np.linalg.inv(plane), compute_uv=False)
+    return scales, np.linalg.norm(across, axis=1)
+
+
+def test_the_texture_of_a_rounded_back_is_not_stretched() -> None:
+    """The pixels in front of the sides would be stretched thirtyfold there."""
+    height, mask = hemisphere(80, 180)
+    body = make_body(height, height / 80, mask, mask.astype(float), Back.ROUNDED, 0)
+    scales, area = texture_scales(body)
+    good = (scales[:, 0] < 1.5) & (scales[:, 1] > 0.3)
+    assert area[good].sum() > 0.85 * area.sum()
+    straight = scales[:, 1] < 0.1
+    assert area[straight].sum() < 0.03 * area.sum()
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_texture_comes_from_inside(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mask = ndimage.gaussian_filter(rng.normal(size=(90, 80)), 4) > 0
+    body = make_body(np.ones(mask.shape), np.ones(mask.shape), mask, mask * 1.0, Back.ROUNDED, 0)
+    np.testing.assert_array_equal(body.texture[body.front], body.places[body.front])
+    rows, columns = np.rint(body.texture).astype(int).T + 9
+    wide = np.pad(mask, 9)
+    assert ndimage.binary_dilation(wide)[rows, columns].mean() > 0.98
+    assert ndimage.binary_dilation(wide, iterations=4)[rows, columns].all()
+
+
+def test_the_rim_of_a_ball_lies_in_a_plane() -> None:
+    """Depths of single pixels would be 10 pixels apart, as their distances to the outline are."""
+    height, mask = hemisphere(80, 180)
+    body = make_body(height, height / 80, mask, mask.astype(float), Back.ROUNDED, 0)
+    inner = int(body.front.sum())
+    rim = body.heights[inner : len(body.heights) - inner]
+    assert np.ptp(rim) < 3.5
+
+
 def test_the_outline_of_a_disc_is_a_circle() -> None:
     """Steps of the pixel grid would be half a pixel off, of a cover a tenth."""
     radius, size = 20.0, 48
