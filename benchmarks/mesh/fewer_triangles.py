@@ -25,10 +25,14 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from isc_core.result_files.adaptive_triangles import Patch, Triangulation, covered_pixels
 from isc_core.result_files.mesh import MeshResult, build_mesh, limit_rim
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.result_files.result_folder import load
+from isc_core.result_files.triangulation.adaptive_triangles import (
+    Patch,
+    Triangulation,
+    covered_pixels,
+)
 
 _BODIES = 5
 Maps = tuple[np.ndarray, np.ndarray, np.ndarray]

@@ -36,7 +36,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.result_files.exports.targets",
         "isc_core.result_files.reading_notes_text",
         "isc_core.result_files.solids.body",
-        "isc_core.result_files.vertex_normals",
+        "isc_core.result_files.solids.surface",
         "isc_core.scene.diagnostics",
         "isc_core.shading.ambient_occlusion",
         "isc_core.shading.brdf.energy",

@@ -1,16 +1,12 @@
 """The mesh with a smooth outline, fewer triangles and a back, from the maps of a result.
 
-The recovered normals of the visible side are in its vertices, and what lies between these in a
-tangent-space normal map. Rim and back have the normals of their faces, and confidence 0.
-
-Equation: before a pinhole camera all vertices lie on the rays of their pixels, so that the front
-hides the back.
+Rim and back have confidence 0.
 """
 
 import numpy as np
 
-from isc_core.result_files.solids.body import Back, Body, continued, make_body
-from isc_core.result_files.vertex_normals import interpolated_normals
+from isc_core.result_files.solids.body import Back, continued
+from isc_core.result_files.solids.surface import Solid, before_camera, make_solid
 from isc_core.shading.perspective import view_directions
 
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
@@ -46,35 +42,29 @@ def body_geometry(
     InputError
         If the object is too thin for a mesh, or the size is not positive.
     """
-    body, smooth, detail = _solid(result, back, triangles)
-    vertices = _placed(result, body) * metres_per_pixel(result, size_metres)
-    normals = _face_normals(vertices, body.faces)
-    normals[: len(smooth)] = smooth
+    solid = _solid(result, back, triangles)
+    body = solid.body
+    vertices = _placed(result, solid) * metres_per_pixel(result, size_metres)
     rows, columns = body.pixels.T
-    height, width = result.mask.shape
-    uv = np.stack([(body.texture[:, 1] + 0.5) / width, 1 - (body.texture[:, 0] + 0.5) / height], -1)
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
         to_blender(vertices),
         np.ascontiguousarray(body.faces.ravel(), np.int32),
         np.arange(0, body.faces.size, 3, dtype=np.int32),
-        uv,
+        solid.uv(),
         confidence,
-        to_blender(normals),
+        to_blender(solid.normals(vertices)),
     )
-    return geometry, ((detail + 1) / 2).astype(np.float32)
+    return geometry, ((solid.detail + 1) / 2).astype(np.float32)
 
 
-def _solid(result: ResultArrays, back: str, triangles: int) -> tuple[Body, np.ndarray, np.ndarray]:
-    """The mesh in pixels, the normals of its visible vertices, and the tangent-space normals."""
+def _solid(result: ResultArrays, back: str, triangles: int) -> Solid:
+    """The mesh in pixels."""
     camera, (height, width) = camera_of(result), result.mask.shape
     view = np.array([0.0, 0.0, 1.0])
     if camera is not None:
         view = view_directions(camera, (height, width))
-    cosine = (result.normal * view).sum(-1)
-    body = make_body(_heights(result), cosine, result.mask, result.mask, Back(back), triangles)
-    smooth, detail = interpolated_normals(body.visible, _continued_normals(result, body), view)
-    return body, smooth, detail
+    return make_solid(_heights(result), result.normal, result.mask, view, Back(back), triangles)
 
 
 def _heights(result: ResultArrays) -> np.ndarray:
@@ -92,36 +82,10 @@ def _heights(result: ResultArrays) -> np.ndarray:
     return continued(found, known, result.mask)
 
 
-def _placed(result: ResultArrays, body: Body) -> np.ndarray:
+def _placed(result: ResultArrays, solid: Solid) -> np.ndarray:
     """(V, 3): the vertices in pixels, camera frame, the mesh's origin at 0."""
-    row, column = body.places.T
-    if result.eye is None or result.focal_length is None or result.principal_point is None:
-        return np.stack([column - result.origin[0], result.origin[1] - row, body.heights], -1)
+    (row, column), heights, camera = solid.body.places.T, solid.body.heights, camera_of(result)
+    if result.eye is None or camera is None:
+        return np.stack([column - result.origin[0], result.origin[1] - row, heights], -1)
     eye = result.eye.astype(np.float64) / result.metres_per_pixel
-    right = (column + 0.5 - result.principal_point[0]) / result.focal_length
-    down = (row + 0.5 - result.principal_point[1]) / result.focal_length
-    depth = eye[2] - body.heights
-    return np.stack([eye[0] + right * depth, eye[1] - down * depth, body.heights], -1)
-
-
-def _continued_normals(result: ResultArrays, body: Body) -> np.ndarray:
-    """(H, W, 3): the unit normals, also of pixels of the body just beyond the mask."""
-    inside = result.mask.copy()
-    inside[body.pixels[:, 0], body.pixels[:, 1]] = True
-    planes = [
-        continued(np.where(result.mask, plane, 0), result.mask, inside)
-        for plane in np.moveaxis(result.normal, -1, 0)
-    ]
-    normal = np.stack(planes, -1)
-    length = np.linalg.norm(normal, axis=-1, keepdims=True)
-    return np.where(length > 0, normal / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
-
-
-def _face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3): means of the faces' unit normals, by area."""
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    across = np.cross(b - a, c - a)
-    sums = np.stack(
-        [np.bincount(faces.ravel(), part.repeat(3), len(vertices)) for part in across.T], -1
-    )
-    return np.asarray(sums / np.maximum(np.linalg.norm(sums, axis=-1, keepdims=True), 1e-30))
+    return eye + before_camera(solid.body.places, eye[2] - heights, camera)

@@ -5,10 +5,10 @@ viewer, under the recovered light, that looks like the photo.
 
 Geometry: vertices at pixel centres, one cell of two triangles where all pixels of the cell lie
 inside the mask. If that exceeds the number of triangles asked for, large triangles replace small
-ones where the surface is smooth (see `adaptive_triangles`); the silhouette keeps its pixels. Where
-the silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World
-axes are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the middle of
-the bounding box. Before a camera, vertices are on the rays of their pixels (see
+ones where the surface is smooth (see `triangulation`); the silhouette keeps its pixels. Where the
+silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World axes
+are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the middle of the
+bounding box. Before a camera, vertices are on the rays of their pixels (see
 `shading.perspective`), and a pixel has its size at their mean distance.
 
 Normals: those of vertices are the recovered ones; in a mesh of fewer triangles, their mean over the
@@ -36,7 +36,10 @@ known the factor is 0: without the extension the file would look as glossy as pl
 Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
-Limits: one sheet without a back; steps of one cell along the silhouette; reflectances above 1/k are
+Back: an open mesh is one sheet with steps of one cell along the silhouette; `solids` closes it,
+with a smooth outline.
+
+Limits: reflectances above 1/k are
 clipped (at most 0.5 % of the pixels). Programs that compute tangents by themselves interpolate them
 along the triangles: their normals differ by the square of what the surface turns within one.
 """
@@ -57,10 +60,18 @@ from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
-from .adaptive_triangles import Triangulation, adaptive_triangles
 from .glb import TexturedMesh, encode_glb
 from .mesh_options import MeshOptions
-from .vertex_normals import detail_normals, directions_at, facing, flat_normals, mean_normals
+from .solids.body import Back
+from .solids.surface import before_camera, make_solid
+from .triangulation.adaptive_triangles import Triangulation, adaptive_triangles
+from .triangulation.vertex_normals import (
+    detail_normals,
+    directions_at,
+    facing,
+    flat_normals,
+    mean_normals,
+)
 
 _SPECULAR = "KHR_materials_specular"
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
@@ -98,6 +109,8 @@ class MeshResult:
         Of the maps; None for an orthographic view.
     eye : (3,) ndarray or None
         The camera's place in metres.
+    texture : (h, w, 3) uint8 ndarray or None
+        Finer base colour in sRGB codes, over the same frame.
     """
 
     mesh: TexturedMesh
@@ -112,6 +125,17 @@ class MeshResult:
     gloss: SpecularFit = field(default_factory=SpecularFit)
     camera: Camera | None = None
     eye: np.ndarray | None = None
+    texture: np.ndarray | None = None
+
+    @property
+    def bumpy(self) -> bool:
+        """Whether the normal map holds more than the normals of the vertices."""
+        return self.mesh.tangents is not None or self.options.back is not Back.OPEN
+
+    @property
+    def base_color_codes(self) -> np.ndarray:
+        """The base colour in sRGB codes, (h, w, 3) uint8: the finer one where there is one."""
+        return color_codes(self.base_color) if self.texture is None else self.texture
 
     @property
     def specular(self) -> float:
@@ -153,8 +177,8 @@ class MeshResult:
                 "roughnessFactor": self.roughness,
             },
             "normalTexture": {"index": 1},
-            # The mesh is open at the back, and should stay visible from behind.
-            "doubleSided": True,
+            # An open mesh should stay visible from behind.
+            "doubleSided": self.options.back is Back.OPEN,
             "extensions": {_SPECULAR: extension},
         }
         textures = [self.base_color_png(), self.normal_png()]
@@ -162,7 +186,7 @@ class MeshResult:
 
     def base_color_png(self) -> bytes:
         """Return the base colour as the bytes of a PNG, 8-bit sRGB."""
-        return encoded_png(color_codes(self.base_color))
+        return encoded_png(self.base_color_codes)
 
     def normal_png(self) -> bytes:
         """Return the tangent-space normal map as the bytes of a PNG, green upward."""
@@ -243,21 +267,9 @@ def build_mesh(
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
     limited = limit_rim(height, mask, options.rim)
-    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    stride, grid, fewer = _triangulated(limited, normal, mask, view, options.triangles)
-    vertex_pixel = grid.vertices * stride
-    row, column = vertex_pixel.T
-    if fewer:
-        smooth = mean_normals(grid, stride, normal, view)
-        detail, tangents = detail_normals(grid, stride, normal, smooth, view)
-    else:
-        smooth = facing(normal[row, column].astype(np.float32), directions_at(view, row, column))
-        detail, tangents = flat_normals(mask.shape), None
-    if camera is None:
-        pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
-    else:
-        points = lifted_points(limited, camera, object_axis(camera, mask))[row, column]
-        pixels = points * (camera.focal_length / -points[:, 2].mean())
+    make = _open_sheet if options.back is Back.OPEN else _closed
+    shape = make(limited, normal, mask, options, camera)
+    pixels = shape.places
     middle = (pixels.min(0) + pixels.max(0)) / 2
     size = options.metres_per_pixel or options.longest_side / max(
         np.ptp(np.argwhere(mask), axis=0) + 1
@@ -265,10 +277,10 @@ def build_mesh(
     color, k = base_color(reflectance, mask, options.bleed)
     mesh = TexturedMesh(
         (pixels - middle) * size,
-        grid.faces,
-        smooth.astype(np.float64),
-        np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
-        tangents,
+        shape.faces,
+        shape.normals.astype(np.float64),
+        shape.uv,
+        shape.tangents,
     )
     origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
     if camera is not None:
@@ -278,15 +290,82 @@ def build_mesh(
         k,
         float(size),
         origin,
-        stride,
-        vertex_pixel,
+        shape.stride,
+        shape.vertex_pixel,
         color,
-        detail,
+        shape.detail,
         options,
         gloss,
         camera,
         None if camera is None else -middle * size,
     )
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A mesh in pixels.
+
+    `places` and `normals` (V, 3), camera frame, the pinhole at the origin, if any; `faces` (F, 3);
+    `uv` (V, 2); `tangents` (V, 3) or None; `vertex_pixel` (V, 2); `detail` (H, W, 3).
+    """
+
+    places: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray
+    tangents: np.ndarray | None
+    vertex_pixel: np.ndarray
+    detail: np.ndarray
+    stride: int = 1
+
+
+def _open_sheet(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    options: MeshOptions,
+    camera: Camera | None,
+) -> _Shape:
+    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
+    stride, grid, fewer = _triangulated(height, normal, mask, view, options.triangles)
+    vertex_pixel = grid.vertices * stride
+    row, column = vertex_pixel.T
+    if fewer:
+        smooth = mean_normals(grid, stride, normal, view)
+        detail, tangents = detail_normals(grid, stride, normal, smooth, view)
+    else:
+        smooth = facing(normal[row, column].astype(np.float32), directions_at(view, row, column))
+        detail, tangents = flat_normals(mask.shape), None
+    if camera is None:
+        places = np.stack([column, -row, height[row, column]], -1).astype(np.float64)
+    else:
+        points = lifted_points(height, camera, object_axis(camera, mask))[row, column]
+        places = points * (camera.focal_length / -points[:, 2].mean())
+    uv = np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1)
+    return _Shape(places, smooth, grid.faces, uv, tangents, vertex_pixel, detail, stride)
+
+
+def _closed(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    options: MeshOptions,
+    camera: Camera | None,
+) -> _Shape:
+    """Without tangents: they would change their sign where the texture folds (see `solids`)."""
+    most = options.triangles // 2  # of either side
+    if camera is None:
+        solid = make_solid(height, normal, mask, VIEW, options.back, most)
+        row, column = solid.body.places.T
+        places = np.stack([column, -row, solid.body.heights], -1)
+    else:
+        depth = -lifted_points(height, camera, object_axis(camera, mask))[..., 2]
+        depth *= camera.focal_length / depth[mask].mean()
+        view = view_directions(camera, (mask.shape[0], mask.shape[1]))
+        solid = make_solid(-depth, normal, mask, view, options.back, most)
+        places = before_camera(solid.body.places, -solid.body.heights, camera)
+    body, normals = solid.body, solid.normals(places)
+    return _Shape(places, normals, body.faces, solid.uv(), None, body.pixels, solid.detail)
 
 
 def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from .solids.body import Back
+
 
 @dataclass(frozen=True)
 class MeshOptions:
@@ -21,6 +23,8 @@ class MeshOptions:
         Pixels by which the texture continues beyond the mask.
     roughness, metallic : float
         Default glTF factors in [0, 1]; a fitted gloss has its own roughness.
+    back : Back
+        What the mesh has on the side that the photo does not show.
     """
 
     longest_side: float = 0.1
@@ -30,3 +34,4 @@ class MeshOptions:
     bleed: int = 16
     roughness: float = 0.5
     metallic: float = 0.0
+    back: Back = Back.OPEN

@@ -4,11 +4,15 @@ import argparse
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from ...batch.names import safe_name
+from ...errors import InputError
 from ...io.atomic import require_writable
 from ...lobe_fitting.specular_level import SpecularSource
 from ...progress import Monitor
 from ...result_files.arrays_file import mesh_of
+from ...result_files.exports.full_texture import full_texture
 from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_mesh_file
 from ...result_files.exports.soft_alpha import object_cover
 from ...result_files.exports.targets import TARGETS
@@ -16,15 +20,18 @@ from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.result_folder import MASK, load
+from ...result_files.solids.body import Back
 from ...scene.decomposition import Decomposition
-from ..interface.options import add_triangles
+from ..interface.options import add_limits, add_triangles, limits_of
 from ..interface.parser import describe, hints
-from ..interface.values import share
+from ..interface.result_photo import photo_of_result
+from ..interface.values import count, share
 
 _EXAMPLES = """  isc export cup --textures unreal -o cup_textures
   isc export cup --textures generic --name mug -o mug_textures
   isc export cup --format usd -o cup.usdz
-  isc export cup --format obj --triangles 20000 -o cup.obj"""
+  isc export cup --format obj --triangles 20000 -o cup.obj
+  isc export cup --format glb --back rounded --photo cup.jpg -o cup.glb"""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -73,6 +80,28 @@ def declare(parser: argparse.ArgumentParser) -> None:
         help="roughness from 0 to 1 (default: the fitted one)",
     )
     add_triangles(parser)
+    parser.add_argument(
+        "--back",
+        choices=tuple(Back),
+        default=Back.OPEN,
+        help="with --format: what the mesh has on the side that the photo does not show; all but "
+        "open are closed (default %(default)s)",
+    )
+    fine = parser.add_argument_group("base colour at the photo's resolution")
+    fine.add_argument(
+        "--photo", type=Path, metavar="PHOTO", help="the photo that RESULT was made from"
+    )
+    fine.add_argument(
+        "--mask", type=Path, metavar="MASK", help="the mask, where RESULT was made with one"
+    )
+    fine.add_argument(
+        "--texture-size",
+        type=count,
+        default=0,
+        metavar="N",
+        help="longest side in pixels at most (default 0: the photo's)",
+    )
+    add_limits(fine)
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -94,6 +123,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         If the result cannot be read, or the output cannot be written.
     """
     output: Path = options.output
+    if options.photo is None and (options.mask is not None or options.texture_size):
+        raise InputError("--mask and --texture-size need --photo: give it too")
+    if options.textures is not None and options.back != Back.OPEN:
+        raise InputError("--back is that of a mesh: use it with --format")
     if options.format is not None:
         check_mesh_path(output, options.format)
         if options.format == "usd":
@@ -104,7 +137,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.textures is not None:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
-    built = mesh_of(d, MeshOptions(triangles=options.triangles))
+    fine = None if options.photo is None else _fine_texture(d, options)
+    built = mesh_of(d, MeshOptions(triangles=options.triangles, back=Back(options.back)))
+    built = replace(built, texture=fine)
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
         built = replace(built, gloss=replace(built.gloss, **given))
@@ -124,6 +159,16 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         monitor=writing,
     )
     return hints(options, f"wrote {output}, see {output / texture_files(name)[0]}")
+
+
+def _fine_texture(d: Decomposition, options: argparse.Namespace) -> np.ndarray | None:
+    """The base colour at the photo's resolution; None where the maps have it."""
+    photo = photo_of_result(
+        d, options.result, options.photo, options.mask, None, limits_of(options)
+    )
+    if photo.original.sha256 != d.provenance.input.get("sha256"):
+        raise InputError(f"{options.photo} is not the photo of {options.result}: give that one")
+    return full_texture(photo, d, options.texture_size)
 
 
 def _name_of(d: Decomposition, folder: Path) -> str:

@@ -43,13 +43,14 @@ import numpy as np
 from PIL import Image
 
 from ...errors import InputError
+from ...imaging.upsampling import enlarged
 from ...io.atomic import new_folder
 from ...io.exr import write_channels
 from ...lobe_fitting.specular_level import SpecularSource
 from ...progress import Monitor
 from ...scene.decomposition import Decomposition
 from ...shading.ambient_occlusion import ambient_occlusion
-from ..mesh import MeshResult, color_codes, nearest_inside, vector_codes
+from ..mesh import MeshResult, nearest_inside, vector_codes
 from .targets import TARGETS
 from .textures import PLASTIC, share_codes
 
@@ -107,9 +108,7 @@ def write_texture_set(
         raise InputError(f'unknown target "{target}": choose {", ".join(TARGETS)}')
     monitor, wanted = monitor or Monitor(), TARGETS[target]
     layers = _Layers(d, built, cover, *known_roughness(built), wanted.green_down)
-    textures = [
-        one for one in wanted.textures if one != "mesh_normal" or built.mesh.tangents is not None
-    ]
+    textures = [one for one in wanted.textures if one != "mesh_normal" or built.bumpy]
     with new_folder(folder, texture_files(name)) as partial:
         for number, texture in enumerate(textures):
             monitor.report(f"writing {texture}", number / len(textures))
@@ -163,7 +162,9 @@ class _Layers:
 
     @property
     def basecolor(self) -> np.ndarray:
-        return np.dstack([color_codes(self.built.base_color), share_codes(self.cover)])
+        codes = self.built.base_color_codes
+        cover = enlarged(self.cover, codes.shape[:2], codes.shape[1] / self.cover.shape[1])
+        return np.dstack([codes, share_codes(cover)])
 
     @property
     def normal(self) -> np.ndarray:
@@ -252,6 +253,7 @@ def _description(
         "target": target,
         "photo": d.provenance.input.get("name", ""),
         "size": list(d.mask.shape[::-1]),
+        "basecolor_size": list(built.base_color_codes.shape[1::-1]),
         "files": {texture: f"{name}_{texture}.png" for texture in textures}
         | {"height_float": f"{name}_height.exr"},
         "colour_space": {"basecolor": "sRGB", "others": "linear"},

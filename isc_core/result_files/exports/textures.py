@@ -74,7 +74,7 @@ class MeshTextures:
         """
         base_color = f"{name}_basecolor.png"
         files, normal, specular = {base_color: built.base_color_png()}, None, None
-        if built.mesh.tangents is not None:
+        if built.bumpy:
             normal = f"{name}_mesh_normal.png"
             files[normal] = built.normal_png()
         if built.gloss.variation is not None:

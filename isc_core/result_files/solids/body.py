@@ -33,7 +33,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from ..adaptive_triangles import Triangulation
+from ..triangulation.adaptive_triangles import Triangulation
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 from .smoothing import smoothed_within, surrounded

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError
-from ..adaptive_triangles import Triangulation, adaptive_triangles
+from ..triangulation.adaptive_triangles import Triangulation, adaptive_triangles
 from .smoothing import binomial
 
 _CLOSEST = 0.1  # pixels

@@ -4,14 +4,20 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 from isc_core.cli.main import main
 from isc_core.lobe_fitting import fit_lobe
+from isc_core.photo.camera import Camera
+from isc_core.result_files.mesh import build_mesh
+from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.result_files.result_folder import save
+from isc_core.result_files.solids.body import Back
 from tests.core.ball_scene import ball
-from tests.core.command_line import run_isc
+from tests.core.command_line import ball_photo, run_isc
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +59,70 @@ def test_the_mesh_has_as_many_triangles_as_asked_for(result: Path, tmp_path: Pat
     assert (tmp_path / "ball0.glb").read_bytes() == (result / "mesh.glb").read_bytes()
 
 
+@pytest.mark.parametrize("back", ["rounded", "mirrored", "flat"])
+def test_a_mesh_with_a_back_is_closed(result: Path, tmp_path: Path, back: str) -> None:
+    front, path = tmp_path / "front.glb", tmp_path / "ball.glb"
+    given = [result, "--format", "glb", "--triangles", 4000]
+    assert exported(*given, "-o", front) == 0
+    assert exported(*given, "--back", back, "-o", path) == 0
+    seen, mesh = (trimesh.load(one, force="mesh") for one in (front, path))
+    assert mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0
+    assert 2000 < len(mesh.faces) < 6500  # the outline has those that it needs
+    np.testing.assert_allclose(mesh.extents[:2], seen.extents[:2], rtol=0.06)
+    deepest = 1.6 if back == "rounded" else 1.05
+    assert mesh.extents[2] > deepest * seen.extents[2]
+
+
+@pytest.mark.parametrize("back", ["open", "rounded"])
+def test_a_photo_seen_in_perspective_has_a_back_on_its_rays(back: str) -> None:
+    """The outline is that of the open mesh, as the camera sees it."""
+    camera = Camera(90.0, (40.0, 36.0))
+    row, column = np.indices((72, 80)) + 0.5
+    distance = np.hypot(row - 36, column - 40)
+    mask = distance < 24
+    height = np.sqrt(np.maximum(24**2 - distance**2, 0))
+    normal = np.dstack([column - 40, 36 - row, height]) / 24
+    built = build_mesh(
+        height,
+        normal,
+        mask,
+        mask[..., None] * np.ones(3),
+        MeshOptions(back=Back(back)),
+        None,
+        camera,
+    )
+    assert built.eye is not None
+    ray = built.mesh.vertices - built.eye
+    seen = ray[:, :2] / -ray[:, 2:] * camera.focal_length + (0, 0)
+    assert np.hypot(*seen.T).max() == pytest.approx(24, abs=1.0)
+    assert built.mesh.vertices[:, 2].min() < (-0.02 if back == "rounded" else 0)
+
+
+@pytest.mark.parametrize("what", [["--textures", "generic"], ["--format", "obj"]])
+def test_the_photo_gives_a_finer_base_color(tmp_path: Path, what: list[str]) -> None:
+    photo, folder = ball_photo(tmp_path), tmp_path / "result"
+    words = ["decompose", str(photo), "-q", "--model", "naive", "--max-size", "24"]
+    assert main([*words, "-o", str(folder)]) == 0
+    out = tmp_path / ("out" if what[0] == "--textures" else "out/mesh.obj")
+    (tmp_path / "out").mkdir()
+    given = [folder, "-q", "--roughness", "0.5", *what, "-o", out]
+    sizes = []
+    for more in ([], ["--photo", photo], ["--photo", photo, "--texture-size", "50"]):
+        assert exported(*given, *more) == 0
+        (picture,) = (tmp_path / "out").glob("*_basecolor.png")
+        sizes.append(max(Image.open(picture).size))
+    assert sizes[0] < sizes[2] <= 50 < sizes[1]
+
+
+def test_another_photo_is_refused(
+    result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = [result, "-q", "--format", "glb", "--photo", ball_photo(tmp_path)]
+    assert exported(*given, "-o", tmp_path / "ball.glb") == 2
+    assert "is not the photo of" in capsys.readouterr().err
+    assert not (tmp_path / "ball.glb").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -64,6 +134,10 @@ def test_the_mesh_has_as_many_triangles_as_asked_for(result: Path, tmp_path: Pat
         (["--textures", "unity", "-o", "out"], "no fitted roughness: give one"),
         (["--textures", "unity", "--roughness", "2", "-o", "out"], "not a number from 0 to 1"),
         (["--textures", "unity", "--triangles", "-3", "-o", "out"], "not a whole number, 0 or"),
+        (["--textures", "unity", "--back", "flat", "-o", "out"], "use it with --format"),
+        (["--format", "glb", "--back", "round", "-o", "out.glb"], "invalid choice: 'round'"),
+        (["--format", "glb", "--texture-size", "90", "-o", "out.glb"], "need --photo"),
+        (["--format", "glb", "--photo", "none.png", "-o", "out.glb"], "none.png"),
     ],
 )
 def test_what_cannot_be_exported_is_one_line(

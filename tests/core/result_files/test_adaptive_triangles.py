@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from isc_core.result_files.adaptive_triangles import (
+from isc_core.result_files.mesh import build_mesh
+from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.triangulation.adaptive_triangles import (
     Triangulation,
     adaptive_triangles,
     covered_pixels,
 )
-from isc_core.result_files.mesh import build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
 from tests.core.ball_scene import ball
 
 SIDE = 200

@@ -9,14 +9,13 @@ import numpy as np
 from ....editing.edit_folder import Original, Record, Sheet, require_writable_edit, save_edit
 from ....errors import InputError
 from ....imaging.srgb import linear_to_srgb
-from ....photo import read_photo, read_raster
-from ....photo.found_mask import FOUND
-from ....photo.transfer import PROFILE
+from ....photo import read_raster
 from ....progress import Monitor
-from ....result_files.result_folder import MASK, load
+from ....result_files.result_folder import load
 from ....scene.decomposition import Decomposition
 from ...interface.options import limits_of
 from ...interface.parser import GENERAL, describe, hints
+from ...interface.result_photo import photo_of_result
 from . import dichromatic, gloss, highlight, light_direction, recolour, relight
 from .action import ActionResult, EditAction
 from .options import add_common, plain
@@ -181,16 +180,10 @@ def _changed_options(options: argparse.Namespace) -> str:
 
 
 def _original(d: Decomposition, options: argparse.Namespace) -> Original:
-    given = d.provenance.input
-    transfer = options.transfer or str(given.get("transfer", "auto"))
-    transfer = "auto" if transfer == PROFILE else transfer
-    if given.get("mask_from") == "file" and options.mask is None:
-        raise InputError("the result was made with a separate mask: give the same one with --mask")
-    mask = options.mask
-    if given.get("mask_from") in FOUND and mask is None:
-        mask = options.result / MASK
     limits = limits_of(options)
-    photo = read_photo(options.photo, mask, transfer, limits=limits)
+    photo = photo_of_result(
+        d, options.result, options.photo, options.mask, options.transfer, limits
+    )
     raster = read_raster(options.photo, limits)
     if raster.sha256 != photo.original.sha256:
         raise InputError(f"{options.photo} changed while it was read: run the command again")

@@ -1,0 +1,52 @@
+"""The photo of a result, read again at its own resolution."""
+
+from pathlib import Path
+
+from ...errors import InputError
+from ...io.limits import Limits
+from ...photo import Photo, read_photo
+from ...photo.found_mask import FOUND
+from ...photo.transfer import PROFILE
+from ...result_files.result_folder import MASK
+from ...scene.decomposition import Decomposition
+
+
+def photo_of_result(
+    d: Decomposition,
+    folder: Path,
+    photo: Path,
+    mask: Path | None,
+    transfer: str | None,
+    limits: Limits,
+) -> Photo:
+    """Read the photo of a result with the mask and the curve that the result was made with.
+
+    Parameters
+    ----------
+    d : Decomposition
+    folder : Path
+        Of the result.
+    photo : Path
+    mask : Path or None
+        Needed where the result was made with a separate mask.
+    transfer : str or None
+        Replaces the curve of the result.
+    limits : Limits
+
+    Returns
+    -------
+    Photo
+        Whether it is the same file is for the caller to check.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or the mask is missing.
+    """
+    given = d.provenance.input
+    curve = transfer or str(given.get("transfer", "auto"))
+    if given.get("mask_from") == "file" and mask is None:
+        raise InputError("the result was made with a separate mask: give the same one with --mask")
+    if given.get("mask_from") in FOUND and mask is None:
+        mask = folder / MASK
+    return read_photo(photo, mask, "auto" if curve == PROFILE else curve, limits=limits)

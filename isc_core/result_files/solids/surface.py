@@ -1,0 +1,145 @@
+"""A body with the normals of its visible side: what a mesh with a back is made of.
+
+The recovered normals of the visible side are in its vertices, and what lies between these in a
+tangent-space normal map. Rim and back have the normals of their faces.
+
+Equation: before a pinhole camera a vertex lies on the ray of its place, so that the front hides the
+back.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...photo.camera import Camera
+from ..triangulation.vertex_normals import interpolated_normals
+from .body import Back, Body, continued, make_body
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A body and its normals.
+
+    Attributes
+    ----------
+    body : Body
+    smooth : (N, 3) ndarray
+        Unit normals of its first N vertices, those of the visible side.
+    detail : (H, W, 3) ndarray
+        Unit vectors of the normal map in tangent space.
+    """
+
+    body: Body
+    smooth: np.ndarray
+    detail: np.ndarray
+
+    def normals(self, vertices: np.ndarray) -> np.ndarray:
+        """Return the normals of all vertices.
+
+        Parameters
+        ----------
+        vertices : (V, 3) ndarray
+            Their places.
+
+        Returns
+        -------
+        (V, 3) ndarray
+            Unit vectors; those of rim and back are means of the faces', by area.
+        """
+        normals = _face_normals(vertices, self.body.faces)
+        normals[: len(self.smooth)] = self.smooth
+        return normals
+
+    def uv(self) -> np.ndarray:
+        """Return texture coordinates, v from the bottom of the texture.
+
+        Returns
+        -------
+        (V, 2) ndarray
+        """
+        height, width = self.detail.shape[:2]
+        row, column = self.body.texture.T
+        return np.stack([(column + 0.5) / width, 1 - (row + 0.5) / height], -1)
+
+
+def make_solid(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    view: np.ndarray,
+    back: Back,
+    triangles: int,
+) -> Solid:
+    """Make a body of a height map.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer, inside the mask.
+    normal : (H, W, 3) ndarray
+        Unit vectors, camera frame.
+    mask : (H, W) bool ndarray
+    view : (3,) or (H, W, 3) ndarray
+        Unit vectors toward the viewer.
+    back : Back
+    triangles : int
+        The most of the visible side; 0 for two at each pixel.
+
+    Returns
+    -------
+    Solid
+
+    Raises
+    ------
+    InputError
+        If no block of 2 x 2 pixels lies inside.
+    """
+    body = make_body(height, (normal * view).sum(-1), mask, mask, back, triangles)
+    smooth, detail = interpolated_normals(
+        body.visible, _continued_normals(normal, mask, body.pixels), view
+    )
+    return Solid(body, smooth, detail)
+
+
+def before_camera(places: np.ndarray, depth: np.ndarray, camera: Camera) -> np.ndarray:
+    """Return points on the rays of pixels.
+
+    Parameters
+    ----------
+    places : (V, 2) ndarray
+        Row and column.
+    depth : (V,) ndarray
+        From the pinhole, along the optical axis.
+    camera : Camera
+
+    Returns
+    -------
+    (V, 3) ndarray
+        Camera frame, the pinhole at the origin; in the unit of `depth`.
+    """
+    row, column = places.T
+    right = (column + 0.5 - camera.principal_point[0]) / camera.focal_length
+    down = (row + 0.5 - camera.principal_point[1]) / camera.focal_length
+    return np.stack([right * depth, -down * depth, -depth], -1)
+
+
+def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """(H, W, 3): the unit normals, also of pixels of the body just beyond the mask."""
+    inside = mask.copy()
+    inside[pixels[:, 0], pixels[:, 1]] = True
+    planes = [
+        continued(np.where(mask, plane, 0), mask, inside) for plane in np.moveaxis(normal, -1, 0)
+    ]
+    found = np.stack(planes, -1)
+    length = np.linalg.norm(found, axis=-1, keepdims=True)
+    return np.where(length > 0, found / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
+
+
+def _face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(V, 3): means of the faces' unit normals, by area."""
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    sums = np.stack(
+        [np.bincount(faces.ravel(), part.repeat(3), len(vertices)) for part in across.T], -1
+    )
+    return np.asarray(sums / np.maximum(np.linalg.norm(sums, axis=-1, keepdims=True), 1e-30))
