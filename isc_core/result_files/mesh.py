@@ -63,7 +63,7 @@ from ..shading.perspective import lifted_points, object_axis, view_directions
 from .glb import TexturedMesh, encode_glb
 from .mesh_options import MeshOptions
 from .solids.body import Back
-from .solids.surface import before_camera, make_solid
+from .solids.surface import heights_seen, make_solid, placed
 from .triangulation.adaptive_triangles import Triangulation, adaptive_triangles
 from .triangulation.vertex_normals import (
     detail_normals,
@@ -353,17 +353,10 @@ def _closed(
     camera: Camera | None,
 ) -> _Shape:
     """Without tangents: they would change their sign where the texture folds (see `solids`)."""
-    most = options.triangles // 2  # of either side
-    if camera is None:
-        solid = make_solid(height, normal, mask, VIEW, options.back, most)
-        row, column = solid.body.places.T
-        places = np.stack([column, -row, solid.body.heights], -1)
-    else:
-        depth = -lifted_points(height, camera, object_axis(camera, mask))[..., 2]
-        depth *= camera.focal_length / depth[mask].mean()
-        view = view_directions(camera, (mask.shape[0], mask.shape[1]))
-        solid = make_solid(-depth, normal, mask, view, options.back, most)
-        places = before_camera(solid.body.places, -solid.body.heights, camera)
+    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
+    seen, either_side = heights_seen(height, mask, camera), options.triangles // 2
+    solid = make_solid(seen, normal, mask, view, options.back, either_side)
+    places = placed(solid.body, camera)
     body, normals = solid.body, solid.normals(places)
     return _Shape(places, normals, body.faces, solid.uv(), None, body.pixels, solid.detail)
 

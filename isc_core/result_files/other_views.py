@@ -7,8 +7,11 @@ brightest light moved to l; key and fill have the mean colour of the recovered l
 the other side than that light. Where a lobe predicts more light than the specular layer has, it is
 scaled down to it.
 
+Sides and back, which the photo does not show, are those of a rounded body (`solids`) and take the
+light and colour of the visible side.
+
 Limits: everything is drawn from maps of a panel's size, from far away; no cast shadows, no
-interreflection. The back of the object is not known. Without a fitted lobe there are no highlights.
+interreflection. Without a fitted lobe there are no highlights.
 """
 
 from collections.abc import Mapping
@@ -25,10 +28,11 @@ from ..shading.brdf.ggx import F0
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions, toward, turn
 from ..shading.lobe_rendering import Lobe
 from ..shading.radiance import DistantLights, radiance, sh_shading
-from .glb import TexturedMesh
-from .mesh import build_mesh
+from .mesh import limit_rim
 from .mesh_options import MeshOptions
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
+from .solids.body import Back, Body, make_body
+from .solids.surface import heights_seen, placed
 from .turned_view import turned_view
 
 ANGLE = 30.0  # degrees
@@ -58,44 +62,41 @@ def turned_panels(
         Two; empty ones for an object too thin for a mesh.
     """
     names = ("From the left", "From the right")
-    mesh = _coarse_mesh(frame, small, d.camera)
-    if mesh is None:
+    found = _coarse_body(frame, small, d.camera)
+    if found is None:
         empty = np.zeros((SIDE, SIDE))
         return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
-    places = (mesh.uv * (1, -1) + (0, 1)) * SIDE - 0.5
+    body, vertices = found
+    texture_places = (body.texture[:, ::-1] + 0.5) * _STEP - 0.5
     panels = []
     for name, yaw in zip(names, (ANGLE, -ANGLE), strict=True):
         texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
-        view = turned_view(mesh.vertices, mesh.faces, places, yaw, SIDE, 1.0, 1 - 2 * MARGIN)
+        view = turned_view(
+            vertices, body.faces, texture_places, yaw, SIDE, 1.0, 1 - 2 * MARGIN, closed=True
+        )
         covered = view.coverage > 0
         color, (column, row) = np.zeros((SIDE, SIDE, 3)), view.values[covered].T
         for channel in range(3):
             color[covered, channel] = ndimage.map_coordinates(
                 texture[..., channel], (row, column), order=1, mode="nearest"
             )
-        panels.append(Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, in the same light"))
+        panels.append(Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess"))
     return panels
 
 
-def _coarse_mesh(
+def _coarse_body(
     frame: Frame, small: Mapping[str, np.ndarray], camera: Camera | None
-) -> TexturedMesh | None:
-    """The mesh of a panel's maps in the panel's pixels, a vertex every `_STEP` pixels; None for an
-    object too thin for it.
+) -> tuple[Body, np.ndarray] | None:
+    """The closed body of a panel's maps, a vertex every `_STEP` pixels, and its vertices in the
+    panel's pixels; None for an object too thin for it.
     """
-    weight = frame.coverage > 0.5
-    share = _blocks(weight)
+    share = _blocks(frame.coverage)
     inside = share > 0.5
     if not ndimage.binary_opening(inside, np.ones((2, 2))).any():
         return None
-    height, normal = (
-        np.stack(
-            [_blocks(np.where(weight, plane, 0)) / np.maximum(share, 1e-3) for plane in planes], -1
-        )
-        for planes in (small["height"][None], np.moveaxis(small["normal"], -1, 0))
-    )
-    options = MeshOptions(metres_per_pixel=float(_STEP), triangles=0, bleed=0)
-    height = height[..., 0] * (frame.zoom / _STEP)
+    weight = frame.coverage > 0.5
+    sums, count = _blocks(np.where(weight, small["height"], 0)), _blocks(weight)
+    height = sums / np.maximum(count, 1e-3) * (frame.zoom / _STEP)
     if camera is not None:
         x, y = frame.place(*camera.principal_point)
         camera = replace(
@@ -103,9 +104,10 @@ def _coarse_mesh(
             focal_length=camera.focal_length * frame.zoom / _STEP,
             principal_point=(x / _STEP, y / _STEP),
         )
-    white = np.ones_like(normal)
-    built = build_mesh(height, unit_normals(normal), inside, white, options, camera=camera)
-    return built.mesh
+    limited = limit_rim(height, inside, MeshOptions().rim)
+    seen = heights_seen(limited, inside, camera)
+    body = make_body(seen, np.ones(inside.shape), inside, share, Back.ROUNDED, 0)
+    return body, placed(body, camera) * _STEP
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:

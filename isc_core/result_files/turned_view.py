@@ -55,6 +55,7 @@ def turned_view(
     side: int,
     zoom: float,
     room: float = 1.0,
+    closed: bool = False,
 ) -> View:
     """Draw a mesh that is turned about the vertical axis.
 
@@ -75,6 +76,8 @@ def turned_view(
         fit.
     room : float
         Share of the picture's side that the mesh may fill, in (0, 1].
+    closed : bool
+        Leave out what faces away: a closed mesh hides it.
 
     Returns
     -------
@@ -86,6 +89,9 @@ def turned_view(
     extent = float((high - low)[:2].max())
     scale = _FINE * min(zoom, room * side / extent if extent > 0 else zoom)
     points = (turned - (low + high) / 2) * scale + (_FINE * side / 2, _FINE * side / 2, 0)
+    if closed:
+        a, b, c = points[faces, :2].transpose(1, 0, 2)
+        faces = faces[_cross(b - a, c - a) < 0]  # rows count downward
     fine = _nearest(points, faces, values, _FINE * side)
     steps = [(row, column) for row in range(_FINE) for column in range(_FINE)]
     cells = np.zeros((side, side, fine.shape[2]))

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...photo.camera import Camera
+from ...shading.perspective import lifted_points, object_axis
 from ..triangulation.vertex_normals import interpolated_normals
 from .body import Back, Body, continued, make_body
 
@@ -99,6 +100,47 @@ def make_solid(
         body.visible, _continued_normals(normal, mask, body.pixels), view
     )
     return Solid(body, smooth, detail)
+
+
+def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) -> np.ndarray:
+    """Return the heights of which a body is made.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    mask : (H, W) bool ndarray
+    camera : Camera or None
+        None for an orthographic view.
+
+    Returns
+    -------
+    (H, W) ndarray
+        As given; before a camera minus the depth, whose mean is the focal length.
+    """
+    if camera is None:
+        return height
+    depth = -lifted_points(height, camera, object_axis(camera, mask))[..., 2]
+    return np.asarray(depth * (-camera.focal_length / depth[mask].mean()))
+
+
+def placed(body: Body, camera: Camera | None) -> np.ndarray:
+    """Return the vertices of a body made of `heights_seen`.
+
+    Parameters
+    ----------
+    body : Body
+    camera : Camera or None
+
+    Returns
+    -------
+    (V, 3) ndarray
+        Pixels, camera frame.
+    """
+    if camera is not None:
+        return before_camera(body.places, -body.heights, camera)
+    row, column = body.places.T
+    return np.stack([column, -row, body.heights], -1)
 
 
 def before_camera(places: np.ndarray, depth: np.ndarray, camera: Camera) -> np.ndarray:
