@@ -100,6 +100,28 @@ class _Mask(_Panel):
         self.layout.operator("isc.cut_mask", icon="MOD_MASK")
 
 
+class _Highlights(_Panel):
+    bl_label = "Highlights"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: Any) -> None:
+        """Draw the buttons for saying what is a highlight."""
+        settings = context.scene.isc
+        if settings.model != "joint":
+            self.layout.label(text="Needs the model Joint", icon="INFO")
+        layout = self.layout.column()
+        layout.enabled = settings.model == "joint"
+        row = layout.row(align=True)
+        row.operator("isc.mark_highlight", icon="ADD").reject = False
+        row.operator("isc.mark_highlight", text="Not a Highlight", icon="REMOVE").reject = True
+        column = layout.column()
+        column.use_property_split = True
+        column.prop(settings, "highlights")
+        column.prop(settings, "not_highlights")
+        if settings.highlights or settings.not_highlights:
+            layout.operator("isc.clear_highlights", icon="X")
+
+
 class _Method(_Panel):
     bl_label = "Method"
     bl_options = {"DEFAULT_CLOSED"}
@@ -303,7 +325,7 @@ def _create_class(panel: Any, order: int, editor: str) -> type:
     )
 
 
-_PANELS = (_Main, _Mask, _Method, _Output)
+_PANELS = (_Main, _Mask, _Highlights, _Method, _Output)
 CLASSES = (
     *(
         _create_class(panel, order, editor)

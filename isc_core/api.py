@@ -10,6 +10,7 @@ floats are linear light. What the functions return are frozen dataclasses of flo
 docs/concepts.md defines their frames and units.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from .errors import InputError
 from .io.decoders import Raster, read_raster
 from .masking.finder import MaskSearch
 from .photo.arrays import raster_from_array
+from .photo.highlight_marks import HighlightMarks
 from .photo.photo import Photo
 from .photo.reading import photo_from_raster
 from .progress import Monitor
@@ -41,6 +43,7 @@ def decompose(
     settings: Settings | None = None,
     known: KnownInputs | None = None,
     transfer: str = "auto",
+    marks: HighlightMarks | None = None,
     monitor: Monitor | None = None,
 ) -> Decomposition:
     """Decompose a photo of one glossy object into its intrinsic scene characteristics.
@@ -59,6 +62,8 @@ def decompose(
         Known shape, light or depth.
     transfer : {"auto", "srgb", "linear"}
         Encoding of the image; "auto": floats are linear, all others sRGB.
+    marks : HighlightMarks, optional
+        Places of highlights, and of paint that looks like them; for the model joint.
     monitor : Monitor, optional
         Receives progress; can cancel.
 
@@ -76,6 +81,8 @@ def decompose(
         If the monitor cancels.
     """
     photo = _photo(image, mask, transfer, whole_frame=False)
+    if marks:
+        photo = replace(photo, marks=marks)
     name = Path(image).name if isinstance(image, str | Path) else ""
     return pipeline.decompose(photo, settings, known=known, name=name, monitor=monitor)
 

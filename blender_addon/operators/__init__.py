@@ -11,10 +11,16 @@ from .edit import (
 )
 from .export import ISC_OT_export, ISC_OT_export_textures
 from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
-from .mask_points import ISC_OT_auto_mask, ISC_OT_clear_points, ISC_OT_mark_point
 from .modal import ISC_OT_cancel
 from .notes import ISC_OT_show_notes
 from .photo_import import HANDLERS, ISC_OT_photo_as_object
+from .photo_points import (
+    ISC_OT_auto_mask,
+    ISC_OT_clear_highlights,
+    ISC_OT_clear_points,
+    ISC_OT_mark_highlight,
+    ISC_OT_mark_point,
+)
 from .result import (
     ISC_OT_build_result,
     ISC_OT_complete_result,
@@ -37,6 +43,8 @@ CLASSES = (
     ISC_OT_auto_mask,
     ISC_OT_mark_point,
     ISC_OT_clear_points,
+    ISC_OT_mark_highlight,
+    ISC_OT_clear_highlights,
     ISC_OT_build_result,
     ISC_OT_import_result,
     ISC_OT_complete_result,

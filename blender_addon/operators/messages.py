@@ -21,6 +21,8 @@ _FIELDS = {
     "--separator": "Separator",
     "--model": "Model",
     "--box": "Box",
+    "--highlight": "Highlights",
+    "--not-highlight": "Not Highlights",
     "--point": "Points",
     "--not": "Background",
 }

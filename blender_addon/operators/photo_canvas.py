@@ -3,15 +3,20 @@
 Over the 3D view, the photo fills as much of the region as its shape allows, with a margin; the
 scene stays visible around it.
 
+`ClickOnPhoto` waits for a click and gives the pixel.
+
 Limits: the photo over the 3D view cannot be zoomed: use an image editor for small objects.
 """
 
 from collections.abc import Callable
+from math import floor
 from typing import Any
 
 import bpy
 import gpu  # type: ignore[import-not-found]
 from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
+
+from .worker_run import active_run
 
 _FILL = 0.9  # of the region, along the side that limits the photo
 _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
@@ -174,3 +179,162 @@ def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, 
     scale = _FILL * min(room[0] / size[0], room[1] / size[1])
     width, height = scale * size[0], scale * size[1]
     return (room[0] - width) / 2, (room[1] - height) / 2, width, height
+
+
+class ClickOnPhoto:
+    """An operator that waits for a click on the photo; a base beside `bpy.types.Operator`."""
+
+    report: Any  # from bpy.types.Operator
+    poll_message_set: Any
+    _size: tuple[int, ...] = (0, 0)
+    _canvas: PhotoCanvas | None = None
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether there is a photo to click on and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False for want of a photo, the tooltip gives the reason.
+        """
+        if shown_photo(context) is None:
+            cls.poll_message_set("Open a photo first")
+            return False
+        return active_run() is None
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Wait for the mouse.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"}.
+        """
+        del event
+        settings, shown = context.scene.isc, shown_photo(context)
+        if shown not in (settings.image, settings.mask):
+            settings.image = shown
+        context.window.cursor_modal_set("CROSSHAIR")
+        context.workspace.status_text_set(self.advice())
+        self._size = tuple(shown.size)
+        self._canvas = PhotoCanvas(context, shown)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
+
+    def advice(self) -> str:
+        """Return what to click on, for the status bar; the operator's own.
+
+        Returns
+        -------
+        str
+        """
+        raise NotImplementedError
+
+    def take(self, settings: Any, point: str) -> None:
+        """Use the click; the operator's own.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Of the scene.
+        point : str
+            Column and row, such as "120,80".
+        """
+        raise NotImplementedError
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Take the click of the left mouse button.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard; its position is in pixels of the window.
+
+        Returns
+        -------
+        set of str
+            {"PASS_THROUGH"} while waiting; {"FINISHED"} with a point; {"CANCELLED"} on Esc, the
+            right mouse button, or a click beside the photo.
+        """
+        if event.type in {"ESC", "RIGHTMOUSE"}:
+            return self._leave(context, {"CANCELLED"})
+        if event.type != "LEFTMOUSE" or event.value != "PRESS" or self._canvas is None:
+            return {"PASS_THROUGH"}
+        position = self._canvas.position(event)
+        if position is None:
+            return self._leave(context, {"CANCELLED"})
+        point = point_at(self._canvas.place(position), self._size)
+        self._leave(context, set())
+        if point is None:
+            self.report({"WARNING"}, "the point lies outside of the photo: click on the photo")
+            return {"CANCELLED"}
+        self.take(context.scene.isc, f"{point[0]},{point[1]}")
+        return {"FINISHED"}
+
+    def cancel(self, context: Any) -> None:
+        """Stop waiting: Blender ends the operator.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        """
+        self._leave(context, set())
+
+    def _leave(self, context: Any, result: set[str]) -> set[str]:
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
+        if context.window is not None:  # another file is loaded
+            context.window.cursor_modal_restore()
+            context.workspace.status_text_set(None)
+        return result
+
+
+def add_point(settings: Any, name: str, point: str) -> None:
+    """Append a point to a field of the panel.
+
+    Parameters
+    ----------
+    settings : ISC_PG_settings
+        Changed in place.
+    name : str
+        Of the field.
+    point : str
+        Column and row.
+    """
+    setattr(settings, name, f"{getattr(settings, name)} {point}".strip())
+
+
+def point_at(place: tuple[float, float], size: tuple[int, ...]) -> tuple[int, int] | None:
+    """Convert a place in the image editor's view to a pixel.
+
+    Parameters
+    ----------
+    place : tuple of float
+        (0, 0) is the image's lower left corner, (1, 1) its upper right one.
+    size : tuple of int
+        Width and height of the image in pixels.
+
+    Returns
+    -------
+    tuple of int or None
+        Column and row from the upper left corner; None outside of the image.
+    """
+    x, y = floor(place[0] * size[0]), floor((1 - place[1]) * size[1])
+    return (x, y) if 0 <= x < size[0] and 0 <= y < size[1] else None

@@ -40,6 +40,8 @@ class MethodSettings:
         Samples per pixel of Cycles in the scene that is built.
     texture_size : str
         Value of `--texture-size`.
+    highlights, not_highlights : str
+        Pixels that are marked, such as "120,80 64,200".
     """
 
     model: str = "joint"
@@ -49,6 +51,8 @@ class MethodSettings:
     samples: int = 64
     camera: str = "auto"
     texture_size: str = "photo"
+    highlights: str = ""
+    not_highlights: str = ""
 
 
 @dataclass(frozen=True)
@@ -345,3 +349,30 @@ def _from_known_fields(kind: type, stored: dict[str, Any]) -> Any:
         raise TypeError(f"{stored!r} is not a mapping")
     names = {part.name for part in fields(kind)}
     return kind(**{name: value for name, value in stored.items() if name in names})
+
+
+def parse_points(text: str) -> list[tuple[int, int]]:
+    """Read the points of a field of the panel.
+
+    Parameters
+    ----------
+    text : str
+        Such as "120,80 64,200".
+
+    Returns
+    -------
+    list of (x, y)
+
+    Raises
+    ------
+    InputError
+        If a word is no point.
+    """
+    points = []
+    for word in text.split():
+        try:
+            x, y = (int(part) for part in word.split(","))
+        except ValueError as error:
+            raise InputError(f"{word!r} is no point: write column,row, such as 120,80") from error
+        points.append((x, y))
+    return points

@@ -33,7 +33,7 @@ from ..worker.commands import (
 from ..worker.pace import Pace
 from ..worker.process import WorkerProcess, WorkerUpdate
 from .messages import translate_message
-from .request import MethodSettings
+from .request import MethodSettings, parse_points
 from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
 
 _EXPORTING = "exporting the photo"
@@ -103,6 +103,10 @@ def decompose_steps(
         The result folder, and what is built of it.
     """
     folder = place.folder
+    highlights, not_highlights = (
+        tuple(parse_points(text)) if method.model == "joint" else ()
+        for text in (method.highlights, method.not_highlights)
+    )
     photo_path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
     mask_path = None
     if mask is not None:
@@ -119,6 +123,8 @@ def decompose_steps(
         transfer=photo.transfer,
         camera=method.camera,
         texture_size=method.texture_size,
+        highlights=highlights,
+        not_highlights=not_highlights,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     prepared = yield from _cached_result(job, place, names, environment)

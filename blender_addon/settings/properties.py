@@ -177,8 +177,9 @@ def _is_still_image(_settings: Any, image: Any) -> bool:
 def _forget_points(settings: Any, context: Any) -> None:
     """Points belong to one photo."""
     del context
-    if settings.points or settings.other_points:
-        settings.points = settings.other_points = ""
+    for name in ("points", "other_points", "highlights", "not_highlights"):
+        if getattr(settings, name):
+            setattr(settings, name, "")
 
 
 class ISC_PG_settings(bpy.types.PropertyGroup):
@@ -228,6 +229,17 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     other_points: StringProperty(
         name="Background",
         description="Pixels that do not belong to the object, written as Points",
+    )
+    highlights: StringProperty(
+        name="Highlights",
+        description=(
+            "Pixels of highlights to take off, as column,row from the photo's upper left corner, "
+            "separated by spaces"
+        ),
+    )
+    not_highlights: StringProperty(
+        name="Not Highlights",
+        description="Pixels of print and paint that look like highlights, written as Highlights",
     )
 
     preset: EnumProperty(

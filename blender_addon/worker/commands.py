@@ -68,6 +68,8 @@ class DecomposeJob:
         Value of `--camera`.
     texture_size : str
         Value of `--texture-size`.
+    highlights, not_highlights : tuple of (x, y)
+        Values of `--highlight` and `--not-highlight`.
     """
 
     photo: Path
@@ -81,6 +83,8 @@ class DecomposeJob:
     transfer: str = "auto"
     camera: str = "auto"
     texture_size: str = "photo"
+    highlights: tuple[tuple[int, int], ...] = ()
+    not_highlights: tuple[tuple[int, int], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -159,6 +163,8 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]
+    words += [f"--highlight={x},{y}" for x, y in job.highlights]
+    words += [f"--not-highlight={x},{y}" for x, y in job.not_highlights]
     return _start(words, job.output, environment, job.threads)
 
 

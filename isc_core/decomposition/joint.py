@@ -42,6 +42,7 @@ from scipy import ndimage
 
 from ..imaging.smoothing import masked_gaussian
 from ..networks.scene_network import ScenePrediction, predict_scene
+from ..photo.highlight_marks import HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
@@ -150,7 +151,13 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     split, layers = separated_first(task)
     with task.clock.stage("separation"):
         layers, residual = supported_layers(
-            working.image, layers, working.mask, task.prediction, options, working.clipped
+            working.image,
+            layers,
+            working.mask,
+            task.prediction,
+            options,
+            working.clipped,
+            working.marks,
         )
     weight = confidence_weight(
         without_unreliable(layers.confidence, residual), task.settings.confidence_weights
@@ -192,6 +199,7 @@ def supported_layers(
     seen: ScenePrediction | None = None,
     options: JointOptions | None = None,
     clipped: np.ndarray | None = None,
+    marks: HighlightMarks | None = None,
 ) -> tuple[Separation, ResidualHighlights | None]:
     """Add what form shows of highlights to what colour shows, and keep what both support.
 
@@ -209,6 +217,8 @@ def supported_layers(
         Thresholds.
     clipped : (H, W) ndarray of bool, optional
         Where highlights hide the paint, it is continued from around.
+    marks : HighlightMarks, optional
+        What a person says of highlights.
 
     Returns
     -------
@@ -220,7 +230,7 @@ def supported_layers(
     options, seen = options or JointOptions(), seen or predict_scene(image, mask)
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
-    kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds)
+    kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds, marks)
     inside = np.where(mask[..., None], image, 0).astype(split.diffuse.dtype)
     chosen = kept[..., None]
     split = replace(
@@ -387,7 +397,7 @@ def _split(
     if not task.one_scale and (residual is not None or start.specular.any()):
         seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
         start, of_maps = supported_layers(
-            photo.image, start, photo.mask, seen, options, photo.clipped
+            photo.image, start, photo.mask, seen, options, photo.clipped, photo.marks
         )
         residual = None if residual is None else of_maps
         if residual is not None:

@@ -96,6 +96,7 @@ def decompose(
     monitor, clock = monitor or Monitor(), Clock()
     settings.check()
     _check_used(settings, inputs, prior_set)
+    _check_marks(settings, photo)
     if not photo.image[photo.mask].any():
         raise InputError(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
@@ -164,6 +165,14 @@ def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | N
             "--shape, --light, --depth, --priors and --shading-only do not apply to "
             f"{settings.model}: use --model {models}"
         )
+
+
+def _check_marks(settings: Settings, photo: Photo) -> None:
+    if photo.marks and settings.model != "joint":
+        raise InputError(
+            f"--highlight and --not-highlight do not apply to {settings.model}: use --model joint"
+        )
+    photo.marks.check(photo.mask)
 
 
 def assemble(
@@ -307,5 +316,16 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "colour_profile": source.colour_profile,
         "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
+        **_marks_json(photo),
         **({} if source.sureness is None else {"mask_sureness": round(source.sureness, 4)}),
+    }
+
+
+def _marks_json(photo: Photo) -> dict[str, object]:
+    """Pixels of the file that a person has marked, by what they are."""
+    marks = photo.marks.scaled(1 / photo.scale)
+    return {
+        f"marked_{name}": [[int(x), int(y)] for x, y in places]
+        for name, places in (("highlights", marks.highlights), ("paint", marks.paint))
+        if places
     }

@@ -1,6 +1,6 @@
 """A photo of one object: linear light and a mask, and their source."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from ..io.decoders import MIN_SIDE
 from ..io.reading_notes import ReadingNote
 from .camera import Camera
 from .found_mask import FoundMask
+from .highlight_marks import HighlightMarks
 
 
 @dataclass(frozen=True)
@@ -80,6 +81,8 @@ class Photo:
         The pinhole camera of `image`; None where it is unknown, for an orthographic view.
     found : FoundMask or None
         The mask at the file's size, where it was found by its looks.
+    marks : HighlightMarks
+        What a person says of its highlights.
     """
 
     image: np.ndarray
@@ -91,6 +94,7 @@ class Photo:
     exposed: bool = True
     camera: Camera | None = None
     found: FoundMask | None = None
+    marks: HighlightMarks = field(default_factory=HighlightMarks)
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -147,6 +151,7 @@ class Photo:
             clipped=clipped,
             scale=self.scale * factor,
             camera=None if self.camera is None else self.camera.scaled(factor),
+            marks=self.marks.scaled(factor),
         )
 
 

@@ -15,9 +15,9 @@ from blender_addon import operators  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
 from blender_addon.operators.mask import box_from_corners  # noqa: E402
-from blender_addon.operators.mask_points import parse_points, point_at  # noqa: E402
 from blender_addon.operators.messages import join_notes, translate_message  # noqa: E402
-from blender_addon.operators.request import request_from_settings  # noqa: E402
+from blender_addon.operators.photo_canvas import point_at  # noqa: E402
+from blender_addon.operators.request import parse_points, request_from_settings  # noqa: E402
 from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
 from blender_addon.panels import wrap_text  # noqa: E402
 from blender_addon.scene.build import find_built  # noqa: E402
@@ -347,6 +347,19 @@ def test_a_point_finds_the_mask(addon: Any) -> None:
     assert "lies outside of the photo" in error_of(addon.ops.isc.auto_mask)
     settings.image = photo()
     assert not settings.points, "points belong to one photo"
+
+
+def test_marked_highlights_reach_the_request(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    settings.image = photo()
+    settings.highlights, settings.not_highlights = "40,20", "3,4 5,6"
+    method = request_from_settings(addon.context.scene).method
+    assert (method.highlights, method.not_highlights) == ("40,20", "3,4 5,6")
+    assert addon.ops.isc.clear_highlights() == {"FINISHED"}
+    assert not settings.highlights and not settings.not_highlights
+    settings.highlights = "40,20"
+    settings.image = picture("other.png", np.full((8, 8, 3), 0.5), float_buffer=True)
+    assert not settings.highlights, "marks belong to one photo"
 
 
 def test_wrong_points_are_refused(addon: Any) -> None:

@@ -20,6 +20,7 @@ from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
+from ..interface.highlight_options import add_highlight_marks, mark_notes, marks_of, with_marks
 from ..interface.mask_options import add_each, add_hints, hints_of, mask_notes
 from ..interface.options import (
     add_engine,
@@ -44,6 +45,7 @@ _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose cup.png jug.png vase.png -o results      one folder each, results/cup and so on
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
   isc decompose phone.jpg --point 900,1200 -o result     the object is the thing at that pixel
+  isc decompose toy.jpg --highlight 480,215 -o toy       what shines there is a highlight
   isc decompose shelf.jpg --each -o results              each thing: results/1, results/2, ...
   isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
   curl -s https://example.org/cup.png | isc decompose - -o cup
@@ -79,6 +81,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_mask(main)
     add_hints(main)
     add_each(main, "DIR/1, DIR/2 and so on, from left to right")
+    add_highlight_marks(main)
     add_main_settings(main)
     main.add_argument(
         "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
@@ -171,6 +174,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.texture_size is not None and not options.arrays:
         raise InputError("--texture-size is that of the arrays: add --arrays, or leave it out")
     prior_set = None if options.priors is None else load_prior_set(options.priors)
+    marked = bool(marks_of(options))
+    if marked and (options.each or len(options.photo) > 1):
+        raise InputError(
+            "--highlight and --not-highlight belong to one object: give one photo without --each"
+        )
     if options.each:
         return _decompose_each(options, settings, prior_set, monitor)
     if len(options.photo) == 1:
@@ -208,6 +216,7 @@ def _decompose_photo(
     prior_set: PriorSet | None,
     monitor: Monitor,
 ) -> list[str]:
+    photo = with_marks(photo, options)
     known = _known_inputs(options, photo)
     require_room(output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(
@@ -239,6 +248,7 @@ def _decompose_photo(
         options,
         *reading_note_lines(photo.original.notes),
         *note_lines(result.provenance.diagnostics),
+        *(f"note: {note}" for note in mark_notes(photo, result)),
         *_detail_notes(settings, max(mask_box(result.mask)[2:]), max(photo.box[2:])),
         *((f"note: {CROPPED}",) if photo.original.cropped and settings.camera == "auto" else ()),
         *(show(preview) if options.open else ()),

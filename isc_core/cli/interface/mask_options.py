@@ -3,10 +3,11 @@
 import argparse
 
 from ...errors import InputError
-from ...masking.hints import Hints, Point
+from ...masking.hints import Hints
 from ...masking.search import separate_parts
 from ...photo.grabcut import Box
 from ...photo.photo import Photo
+from .values import pixel
 
 Group = argparse._ArgumentGroup
 
@@ -31,7 +32,7 @@ def add_hints(group: Group | argparse.ArgumentParser) -> None:
     ):
         group.add_argument(
             option,
-            type=_point,
+            type=pixel,
             action="append",
             default=[],
             dest=name,
@@ -111,11 +112,3 @@ def _box(text: str) -> Box:
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"{text!r} is not four integers x,y,w,h") from error
     return x, y, width, height
-
-
-def _point(text: str) -> Point:
-    try:
-        x, y = (int(part) for part in text.split(","))
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"{text!r} is not two integers x,y") from error
-    return x, y

@@ -257,3 +257,28 @@ def names(text: str) -> tuple[str, ...]:
     if not parsed:
         raise argparse.ArgumentTypeError("give at least one name")
     return parsed
+
+
+def pixel(text: str) -> tuple[int, int]:
+    """Parse a pixel.
+
+    Parameters
+    ----------
+    text : str
+        Value on the command line.
+
+    Returns
+    -------
+    tuple of int
+        Column and row.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is none.
+    """
+    try:
+        x, y = (int(part) for part in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not two integers x,y") from error
+    return x, y

@@ -16,6 +16,7 @@ the log odds that taking s off lowers the squared error are
 with C = max I - min I, which a highlight leaves and white paint lowers; means are weighted by s^2.
 What is left under a highlight on saturated paint is saturated; on grey, colour proves nothing. A
 region keeps its s where the odds exceed `odds`, and otherwise gives all of it back, bit for bit.
+Where a person has marked a highlight, or paint, the nearest region is what the mark says.
 
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. The weights
 are those of `benchmarks.separation.print_rule --mixed` on rendered bodies, half of them with print;
@@ -25,16 +26,19 @@ Limits: a region that holds both, a highlight and print, is kept or given back a
 broad highlights, of which the network is not sure, are given back, and most on grey and white.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
 
 from ...imaging.channels import largest, mean_channel, smallest
+from ...photo.highlight_marks import HighlightMarks, Place
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added before logarithms
 _CORE, _RING = 0.5, 0.02  # of a region's peak; distance of the ring, of the object's diagonal
+_NEAR = 0.02  # of the object's diagonal: from a mark to the region that it means
 _LEAST = 6  # pixels of a region that can be judged
 _MOST_STEP = 5.0  # of each number that is weighed
 WEIGHTS = (-1.725, 0.948, 0.602, -0.337, 2.064)
@@ -139,6 +143,7 @@ def supported(
     log_ratio: np.ndarray,
     ratio_scale: np.ndarray,
     odds: float = ODDS,
+    marks: HighlightMarks | None = None,
 ) -> np.ndarray:
     """Decide where removed light was a highlight.
 
@@ -154,6 +159,8 @@ def supported(
         b.
     odds : float
         To be exceeded, above 0; larger ones keep less.
+    marks : HighlightMarks, optional
+        Decide without the odds; paint before highlights.
 
     Returns
     -------
@@ -162,4 +169,23 @@ def supported(
     """
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
-    return np.isin(seen.labels, seen.numbers[score > np.log(odds)])
+    kept = np.isin(seen.labels, seen.numbers[score > np.log(odds)])
+    if marks:
+        kept |= _marked(seen.labels, marks.highlights, mask)
+        kept &= ~_marked(seen.labels, marks.paint, mask)
+    return kept
+
+
+def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np.ndarray:
+    """(H, W) bool: the regions nearest to places, where there is one near."""
+    found = np.zeros(labels.shape, bool)
+    if not places or not labels.any():
+        return found
+    distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
+    rows, columns = np.nonzero(mask)
+    reach = max(2.0, _NEAR * float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
+    for x, y in places:
+        at = (min(int(y), labels.shape[0] - 1), min(int(x), labels.shape[1] - 1))
+        if distance[at] <= reach:
+            found |= labels == labels[tuple(nearest[(slice(None), *at)])]
+    return found

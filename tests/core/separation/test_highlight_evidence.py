@@ -3,8 +3,12 @@
 import numpy as np
 import pytest
 
+import isc_core
 from isc_core.decomposition.joint import supported_layers
+from isc_core.decomposition.settings import Settings
+from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
+from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import separate
 from isc_core.separation.support.highlight_evidence import highlight_evidence, supported
 
@@ -94,3 +98,48 @@ def test_mirror_images_have_mirrored_answers() -> None:
 def test_where_nothing_was_removed_nothing_is_kept() -> None:
     photo, _, mask = ball(stripe=0.2)
     assert not supported(photo, photo, mask, *form(photo, photo)).any()
+
+
+def test_a_mark_decides_where_the_odds_do_not() -> None:
+    photo, diffuse, mask = ball(gloss=0.4)
+    ratio, scale = form(photo, diffuse)
+    evidence = photo, diffuse, mask, 0.05 * ratio, scale
+    place = (SIDE * 0.41, SIDE * 0.386)  # of the highlight
+    assert not supported(*evidence, odds=100).any()
+    kept = supported(*evidence, odds=100, marks=HighlightMarks((place,)))
+    removed = (photo - diffuse).sum(axis=2)
+    assert removed[kept].sum() > 0.95 * removed.sum()
+    assert not supported(*evidence, odds=1e-9, marks=HighlightMarks((), (place,))).any()
+    far = (SIDE * 0.7, SIDE * 0.7)
+    assert not supported(*evidence, odds=100, marks=HighlightMarks((far,))).any()
+
+
+@pytest.mark.parametrize("size", [64, 0])
+def test_what_is_marked_as_paint_stays_at_any_size_of_the_maps(size: int) -> None:
+    photo, _, mask = (
+        np.kron(one, np.ones((4, 4) + (1,) * (one.ndim - 2))) for one in ball(gloss=0.4)
+    )
+    given, settings = (photo.astype(np.float32), mask > 0), Settings(max_size=size, detail=0)
+    marks = HighlightMarks((), ((4 * SIDE * 0.41, 4 * SIDE * 0.386),))
+    without, found = (
+        isc_core.decompose(*given, settings=settings, marks=one) for one in (None, marks)
+    )
+    assert without.specular.sum() > 10 and not found.specular.any()
+    assert found.provenance.input["marked_paint"] == [[157, 148]]
+    assert "marked_paint" not in without.provenance.input
+
+
+@pytest.mark.parametrize(
+    ("marks", "settings", "words"),
+    [
+        (HighlightMarks(((1.0, 1.0),)), Settings(), "the mark 1,1 lies outside of the object"),
+        (HighlightMarks(((900.0, 1.0),)), Settings(), "lies outside of the object"),
+        (HighlightMarks(((40.0, 40.0),)), Settings(model="mdr"), "do not apply to mdr"),
+    ],
+)
+def test_marks_that_cannot_be_used_are_refused(
+    marks: HighlightMarks, settings: Settings, words: str
+) -> None:
+    photo, _, mask = ball(gloss=0.4)
+    with pytest.raises(InputError, match=words):
+        isc_core.decompose(photo, mask, settings=settings, marks=marks)

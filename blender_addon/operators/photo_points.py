@@ -1,0 +1,191 @@
+"""Points of the photo: on the object, for its mask, and on highlights, for the next run."""
+# mypy: allow-subclassing-any, disable-error-code="valid-type"
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
+
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty
+
+from isc_core.errors import InputError
+
+from .mask import can_cut, mask_run
+from .modal import WorkerOperator
+from .photo_canvas import ClickOnPhoto, add_point
+from .request import parse_points
+from .run_steps import auto_mask_steps
+from .worker_run import WorkerRun, require_no_active_run
+
+
+class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
+    """Find the object and make it the mask."""
+
+    bl_idname = "isc.auto_mask"
+    bl_label = "Auto Mask"
+    bl_description = "Create the mask by finding the object in the photo; points say which it is"
+
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether there is a photo and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
+        return can_cut(cls, context)
+
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run; see `WorkerOperator`.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If no photo is selected, it cannot be used, a point is no point, or a run is active.
+        """
+        require_no_active_run()
+        settings = context.scene.isc
+        if settings.image is None:
+            raise InputError("no photo is selected: open a file, or choose an image of this file")
+        points, others = parse_points(settings.points), parse_points(settings.other_points)
+        return mask_run(
+            context,
+            "Auto Mask",
+            lambda photo, folder, environment: auto_mask_steps(
+                photo, points, others, folder, environment
+            ),
+        )
+
+
+class ISC_OT_mark_point(ClickOnPhoto, bpy.types.Operator):
+    """Mark a point of the object or of the background with a click, and find the mask again."""
+
+    bl_idname = "isc.mark_point"
+    bl_label = "Add Point"
+    bl_description = "Click on the object, or on what does not belong to it, and find the mask"
+
+    background: BoolProperty(
+        name="Background", description="The point does not belong to the object"
+    )
+
+    def advice(self) -> str:
+        """Return what to click on; see `ClickOnPhoto`.
+
+        Returns
+        -------
+        str
+        """
+        return "Click on the background" if self.background else "Click on the object"
+
+    def take(self, settings: Any, point: str) -> None:
+        """Add the point, and find the mask again; see `ClickOnPhoto`.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Changed in place.
+        point : str
+            Column and row.
+        """
+        add_point(settings, "other_points" if self.background else "points", point)
+        bpy.ops.isc.auto_mask("INVOKE_DEFAULT")
+
+
+class ISC_OT_clear_points(bpy.types.Operator):
+    """Remove all points."""
+
+    bl_idname = "isc.clear_points"
+    bl_label = "Clear Points"
+    bl_description = "Remove the points of the object and of the background"
+    bl_options = {"UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        """Remove the points.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}.
+        """
+        context.scene.isc.points = context.scene.isc.other_points = ""
+        return {"FINISHED"}
+
+
+class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
+    """Mark a highlight, or what looks like one, with a click."""
+
+    bl_idname = "isc.mark_highlight"
+    bl_label = "Add Highlight"
+    bl_description = (
+        "Click on a highlight that stayed in the base color, or on print that was taken for one; "
+        "create the object again afterwards"
+    )
+    bl_options = {"UNDO"}
+
+    reject: BoolProperty(name="Not a Highlight", description="What is there is no highlight")
+
+    def advice(self) -> str:
+        """Return what to click on; see `ClickOnPhoto`.
+
+        Returns
+        -------
+        str
+        """
+        return "Click on what is no highlight" if self.reject else "Click on a highlight"
+
+    def take(self, settings: Any, point: str) -> None:
+        """Add the mark; see `ClickOnPhoto`.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Changed in place.
+        point : str
+            Column and row.
+        """
+        add_point(settings, "not_highlights" if self.reject else "highlights", point)
+
+
+class ISC_OT_clear_highlights(bpy.types.Operator):
+    """Remove all marks of highlights."""
+
+    bl_idname = "isc.clear_highlights"
+    bl_label = "Clear Marks"
+    bl_description = "Remove the marks of highlights; what is one is then decided automatically"
+    bl_options = {"UNDO"}
+
+    def execute(self, context: Any) -> set[str]:
+        """Remove the marks.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"}.
+        """
+        context.scene.isc.highlights = context.scene.isc.not_highlights = ""
+        return {"FINISHED"}

@@ -1,0 +1,67 @@
+"""Places of a photo at which a person says what is a highlight and what is paint."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+Place = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class HighlightMarks:
+    """What a person has marked, in pixels of the upright photo from its upper left edges.
+
+    Attributes
+    ----------
+    highlights : tuple of (x, y)
+        On highlights; the middle of pixel (3, 5) is (3.5, 5.5).
+    paint : tuple of (x, y)
+        On what looks like a highlight and is none.
+    """
+
+    highlights: tuple[Place, ...] = ()
+    paint: tuple[Place, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.highlights or self.paint)
+
+    def scaled(self, factor: float) -> "HighlightMarks":
+        """Return the marks of the photo resized by a factor.
+
+        Parameters
+        ----------
+        factor : float
+
+        Returns
+        -------
+        HighlightMarks
+        """
+        return HighlightMarks(
+            *(
+                tuple((factor * x, factor * y) for x, y in places)
+                for places in (self.highlights, self.paint)
+            )
+        )
+
+    def check(self, mask: np.ndarray) -> None:
+        """Check that the marks lie on the object.
+
+        Parameters
+        ----------
+        mask : (H, W) bool ndarray
+
+        Raises
+        ------
+        InputError
+            If one does not.
+        """
+        for x, y in (*self.highlights, *self.paint):
+            row, column = int(np.floor(y)), int(np.floor(x))
+            inside = 0 <= row < mask.shape[0] and 0 <= column < mask.shape[1]
+            if not (inside and mask[row, column]):
+                raise InputError(
+                    f"the mark {column},{row} lies outside of the object: mark a pixel of it, "
+                    "counted from 0 at the top left"
+                )
