@@ -1,13 +1,14 @@
 """What is not a highlight: light that methods take off painted bodies, matt and glossy.
 
   python -m benchmarks.separation.prints WORLD --panoramas DIR [--part choice|report] [--count N]
-  [--methods isc,network,joint,chain] [--sheet JPG] [--json FILE]
+  [--methods isc,network,joint,marked,chain] [--sheet JPG] [--json FILE]
   python -m benchmarks.separation.prints WORLD --photos DIR --sheet JPG
 
 WORLD is a folder of `isc world build`; the photos are those of `print_set`. Constants are fitted on
 `Part.FIT` (`print_rule`), rules are chosen on `Part.CHOICE`, figures are reported on `Part.REPORT`.
 `isc` and `network` are separators, `joint` the layers of `isc decompose` before reflectance is
-continued, `chain` all of `isc decompose` (minutes).
+continued, `chain` all of `isc decompose` (minutes). `marked` is `joint` with one click: at the
+strongest highlight of a glossy body, as a person sees it; none on a matt one.
 
 Matt: share of the light taken off, and its RMS over the photo's. Glossy: squared error of the
 specular light over that of none. 1 is what doing nothing reaches; intervals are of resampled
@@ -22,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
+from scipy import ndimage
 
 from isc_core.decomposition.joint import supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
@@ -29,6 +31,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.photo import Photo, PhotoSource, read_photo
+from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import separate
 
 from .print_set import Part, PrintScene, print_scenes
@@ -46,7 +49,7 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
     ----------
     scene : PrintScene
     method : str
-        "chain", "joint" or a separation method.
+        "chain", "joint", "marked" or a separation method.
 
     Returns
     -------
@@ -57,11 +60,32 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         source = PhotoSource("", (mask.shape[1], mask.shape[0]), 8, "srgb", "file")
         whole = Photo(photo, mask, 1 / 255, scene.clipped, source)
         return decompose(whole, Settings(threads=1)).specular
-    if method == "joint":
+    if method in ("joint", "marked"):
         colour = separate("isc", photo, mask, scene.clipped)
-        split, residual = supported_layers(photo, colour, mask, clipped=scene.clipped)
+        marks = strongest_highlight(scene) if method == "marked" else None
+        split, residual = supported_layers(photo, colour, mask, clipped=scene.clipped, marks=marks)
         return split.specular if residual is None else photo - residual.diffuse
     return separate(method, photo, mask, scene.clipped).specular
+
+
+def strongest_highlight(scene: PrintScene) -> HighlightMarks:
+    """Mark the strongest highlight of a photo.
+
+    Parameters
+    ----------
+    scene : PrintScene
+
+    Returns
+    -------
+    HighlightMarks
+        One, in the middle of the brightest 3 x 3 pixels; none on a matt body.
+    """
+    light = np.where(scene.mask, (scene.photo - scene.diffuse).mean(axis=2), 0)
+    if not light.any():
+        return HighlightMarks()
+    means = ndimage.uniform_filter(light, 3)
+    row, column = np.unravel_index(int(np.where(scene.mask, means, 0).argmax()), light.shape)
+    return HighlightMarks(((float(column) + 0.5, float(row) + 0.5),))
 
 
 def matt_errors(scene: PrintScene, removed: np.ndarray) -> tuple[float, float]:
