@@ -90,8 +90,11 @@ def resampled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     Returns
     -------
     (h, w) or (h, w, C) float32 ndarray
+        The values themselves where the shape is the same.
     """
     rows, columns = values.shape[:2]
+    if (rows, columns) == shape:
+        return values
     down, right = (
         _weights(old, new).astype(np.float32)
         for old, new in zip((rows, columns), shape, strict=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..imaging.resampling import resampled
 from ..networks.mask_network import POINT, SIDE, MaskNetwork, predict_mask
-from ..photo.masks import resized
 from .hints import Hints
 
 
@@ -82,11 +82,11 @@ def predict_part(
     left, top = (side - width) // 2, (side - height) // 2
     place = slice(top, top + height), slice(left, left + width)
     small, frame = np.zeros((side, side, 3), np.float32), np.zeros((side, side), bool)
-    small[place], frame[place] = resized(light[part.slices], width, height), True
+    small[place], frame[place] = resampled(light[part.slices], (height, width)), True
     scale = width / part.width, height / part.height
     drawn = _drawn(hints, part, scale, (left, top), side)
     found = predict_mask(small, frame, drawn, network)
-    cover = resized(found.cover[place], part.width, part.height)
+    cover = resampled(found.cover[place], (part.height, part.width))
     return PartPrediction(cover.clip(0, 1), found.counts)
 
 

@@ -18,9 +18,10 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.guided_filter import affine_fit
+from ..imaging.resampling import resampled
 from ..imaging.srgb import linear_to_srgb
 from ..photo.grabcut import Label, segmented
-from ..photo.masks import resized, tidy_mask
+from ..photo.masks import tidy_mask
 
 SIDE = 384
 _SURE = 0.97  # probability from which the network is trusted, away from the outline
@@ -65,13 +66,14 @@ def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarr
     """
     height, width = cover.shape
     factor = min(1.0, SIDE / max(width, height))
-    small = round(width * factor), round(height * factor)
-    codes = coded(resized(light, *small))
-    soft = soft_cover(codes, resized(cover, *small), _nearest(known, *small))
-    return resized(soft, width, height)
+    small = round(height * factor), round(width * factor)
+    codes = coded(resampled(light, small))
+    soft = soft_cover(codes, resampled(cover, small), _nearest(known, small))
+    return resampled(soft, (height, width))
 
 
-def _nearest(values: np.ndarray, width: int, height: int) -> np.ndarray:
+def _nearest(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    height, width = shape
     rows = (np.arange(height) + 0.5) * (values.shape[0] / height)
     columns = (np.arange(width) + 0.5) * (values.shape[1] / width)
     return values[rows.astype(int)[:, None], columns.astype(int)]

@@ -20,10 +20,11 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_box
+from ..imaging.resampling import resampled
 from ..networks.mask_network import Count, MaskNetwork
 from ..photo.found_mask import FoundMask
 from ..photo.grabcut import Box, grabcut
-from ..photo.masks import resized, tidy_mask
+from ..photo.masks import tidy_mask
 from .evidence import evidence_of, no_evidence, sureness_of
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
@@ -130,8 +131,8 @@ def _working(light: np.ndarray, hints: Hints) -> tuple[np.ndarray, Hints]:
     """The photo and the hints at the size that is worked on."""
     height, width = light.shape[:2]
     factor = min(1.0, WORKING / max(height, width))
-    size = max(round(width * factor), 1), max(round(height * factor), 1)
-    across, down = size[0] / width, size[1] / height
+    size = max(round(height * factor), 1), max(round(width * factor), 1)
+    down, across = size[0] / height, size[1] / width
 
     def moved(points: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
         return tuple((int((x + 0.5) * across), int((y + 0.5) * down)) for x, y in points)
@@ -142,7 +143,7 @@ def _working(light: np.ndarray, hints: Hints) -> tuple[np.ndarray, Hints]:
         first = int(left * across), int(top * down)
         last = int(np.ceil((left + wide) * across)), int(np.ceil((top + high) * down))
         box = (*first, last[0] - first[0], last[1] - first[1])
-    return resized(light, *size), Hints(moved(hints.points), moved(hints.others), box)
+    return resampled(light, size), Hints(moved(hints.points), moved(hints.others), box)
 
 
 def _all_of(light: np.ndarray) -> Part:
@@ -150,7 +151,7 @@ def _all_of(light: np.ndarray) -> Part:
 
 
 def _at_size(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
-    cover = resized(found.cover, shape[1], shape[0])
+    cover = resampled(found.cover, (shape[0], shape[1]))
     return replace(found, cover=np.clip(cover, 0, 1))
 
 

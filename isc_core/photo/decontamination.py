@@ -17,7 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_slices
-from .masks import resized
+from ..imaging.resampling import resampled
 
 _SOLVED = 512  # pixels of the longer side on which means are taken
 _WINDOW = 9  # of these pixels
@@ -47,11 +47,11 @@ def without_background(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
     part, share = image[place], cover[place]
     height, width = share.shape
     factor = min(1.0, _SOLVED / max(height, width))
-    size = max(round(width * factor), 1), max(round(height * factor), 1)
-    small, a = resized(part, *size), resized(share, *size)[..., None]
+    size = max(round(height * factor), 1), max(round(width * factor), 1)
+    small, a = resampled(part, size), resampled(share, size)[..., None]
     front, back = _means(small, a**_POWER), _means(small, (1 - a) ** _POWER)
     rows, columns = np.nonzero(rim[place])
-    at = (rows * size[1]) // height, (columns * size[0]) // width
+    at = (rows * size[0]) // height, (columns * size[1]) // width
     a, seen = share[rows, columns][:, None], part[rows, columns]
     colours = front[at] + a * (seen - a * front[at] - (1 - a) * back[at])
     result = image.copy()

@@ -26,13 +26,14 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.minimum_cut import STEPS, minimum_cut, shifted
+from ..imaging.resampling import resampled
 from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_file, require_writable_file
 from ..io.decoders import MIN_SIDE
 from ..io.limits import USUAL, Limits
 from ..io.png import encode_png
 from .colour_mixture import ColourMixture, split_colours
-from .masks import check_mask, resized, tidy_mask
+from .masks import check_mask, tidy_mask
 from .reading import read_linear
 
 COARSE_PIXELS, SOLVED_PIXELS = 1 << 16, 1 << 19
@@ -133,9 +134,9 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     found = segmented(small, labels, iterations)
     fine, part = _reduced(coded, box, SOLVED_PIXELS)
     if fine.shape != small.shape and found.any():
-        cover = resized(found.astype(np.float32), fine.shape[1], fine.shape[0]) > 0.5
+        cover = resampled(found.astype(np.float32), (fine.shape[0], fine.shape[1])) > 0.5
         found = segmented(fine, _band(cover, part), 1)
-    return resized(found.astype(np.float32), width, height)
+    return resampled(found.astype(np.float32), (height, width))
 
 
 def _reduced(coded: np.ndarray, box: Box, most: int) -> tuple[np.ndarray, tuple[slice, slice]]:
@@ -144,7 +145,7 @@ def _reduced(coded: np.ndarray, box: Box, most: int) -> tuple[np.ndarray, tuple[
     factor = min(1.0, float(np.sqrt(most / (height * width))))
     size = (max(round(width * factor), 1), max(round(height * factor), 1))
     x, y, w, h = (round(n * factor) for n in box)
-    small = np.rint(resized(coded.astype(np.float32), *size)).astype(np.uint8)
+    small = np.rint(resampled(coded.astype(np.float32), size[::-1])).astype(np.uint8)
     return small, (slice(y, y + h), slice(x, x + w))
 
 

@@ -6,7 +6,6 @@ from scipy.ndimage import label
 from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
-from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import MIN_SIDE, Raster
 from ..io.decoders.raster import as_rgb
@@ -193,21 +192,3 @@ def finite_or_zero(values: np.ndarray) -> np.ndarray:
         Of the shape and dtype of `values`.
     """
     return np.where(np.isfinite(values), values, np.zeros(1, values.dtype))
-
-
-def resized(values: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Change the size of an image: averages of areas, or linear interpolation if it grows.
-
-    Parameters
-    ----------
-    values : (H, W) or (H, W, C) float32 ndarray
-    width, height : int
-        New size.
-
-    Returns
-    -------
-    (height, width) or (height, width, C) float32 ndarray
-    """
-    if values.shape[:2] == (height, width):
-        return values
-    return resampled(values, (height, width))
