@@ -145,13 +145,10 @@ class KernelLibrary:
             Takes what the function takes. Raises MemoryError if its scratch memory is not to be
             had.
         """
-        entries = [
-            _Entry(self._loaded[symbol(function, version)], signature)
-            for version, signature in enumerate(signatures)
-        ]
+        entries = self.entries(function, signatures)
 
         def call(*values: Any) -> Any:
-            flat = _flat(values)
+            flat = flattened(values)
             for entry in entries:
                 fits, result = entry(flat)
                 if fits:
@@ -160,9 +157,42 @@ class KernelLibrary:
 
         return call
 
+    def entries(
+        self, function: Callable[..., Any], signatures: Sequence[Signature]
+    ) -> list["_Entry"]:
+        """Return the versions of a compiled kernel.
 
-def _flat(values: Sequence[Any]) -> list[Any]:
-    """The arguments, with the fields of tuples in place of these."""
+        Parameters
+        ----------
+        function : callable
+            As it was written.
+        signatures : sequence of Signature
+            Its versions.
+
+        Returns
+        -------
+        list
+            Each takes the list of `flattened` arguments, and returns whether they have its types,
+            and the result.
+        """
+        return [
+            _Entry(self._loaded[symbol(function, version)], signature)
+            for version, signature in enumerate(signatures)
+        ]
+
+
+def flattened(values: Sequence[Any]) -> list[Any]:
+    """Put the fields of tuples in place of these.
+
+    Parameters
+    ----------
+    values : sequence
+        Arguments of a kernel.
+
+    Returns
+    -------
+    list
+    """
     flat: list[Any] = []
     for value in values:
         if isinstance(value, tuple):

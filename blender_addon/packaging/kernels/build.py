@@ -14,9 +14,9 @@ from pathlib import Path
 from isc_core.errors import InputError
 
 from .entries import entries
-from .portable_code import portable_code, versions
+from .portable_code import Version, portable_code, versions
 
-_RUNTIME = Path(__file__).with_name("runtime.c")
+_C_FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,11 @@ MACHINES = {
         Machine(f"kernels-x86-64-v{level}.so", "x86_64-linux-gnu.2.28", f"x86_64_v{level}", level)
         for level in (2, 3)
     ),
+    "windows-x64": tuple(
+        Machine(f"kernels-x86-64-v{level}.dll", "x86_64-windows-gnu", f"x86_64_v{level}", level)
+        for level in (2, 3)
+    ),
+    "linux-arm64": (Machine("kernels-arm64.so", "aarch64-linux-gnu.2.28", "generic"),),
 }
 
 
@@ -72,22 +77,70 @@ def libraries_for(platform: str, cache_folder: Path) -> list[Path]:
     if platform not in MACHINES:
         return []
     try:
-        code, declared = _sources()
+        sources = _all_sources()
     except ImportError as error:
         raise InputError(
             f"the kernels cannot be compiled: {error}: install the extra dev"
         ) from error
-    return [_library(one, code, declared, cache_folder) for one in MACHINES[platform]]
+    return [library(one, *sources, cache_folder) for one in MACHINES[platform]]
 
 
 @cache
-def _sources() -> tuple[str, str]:
-    """The kernels, and the C around them."""
-    chosen = versions()
-    return portable_code(chosen), _RUNTIME.read_text(encoding="utf-8") + entries(chosen)
+def _all_sources() -> tuple[str, str]:
+    return sources_of(versions())
 
 
-def _library(machine: Machine, code: str, declared: str, cache_folder: Path) -> Path:
+def sources_of(chosen: list[Version]) -> tuple[str, str]:
+    """Return what a library of some kernels is compiled from.
+
+    Parameters
+    ----------
+    chosen : list of Version
+
+    Returns
+    -------
+    code : str
+        The kernels, in LLVM's notation.
+    declared : str
+        The C around them.
+    """
+    return portable_code(chosen), c_text("arrays.h") + c_text("runtime.c") + entries(chosen)
+
+
+def c_text(name: str) -> str:
+    """Return the text of a file in C beside this one.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    return (_C_FOLDER / name).read_text(encoding="utf-8")
+
+
+def library(machine: Machine, code: str, declared: str, cache_folder: Path) -> Path:
+    """Return a library, made unless it was before.
+
+    Parameters
+    ----------
+    machine : Machine
+    code, declared : str
+        See `sources_of`.
+    cache_folder : Path
+        Folder of libraries that were made.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If Zig is not installed, or compiling fails.
+    """
     digest = hashlib.sha256(f"{machine}\0{code}\0{declared}".encode()).hexdigest()
     folder = cache_folder / digest[:16]
     made = folder / machine.name
@@ -100,20 +153,51 @@ def _library(machine: Machine, code: str, declared: str, cache_folder: Path) -> 
     kernels = [f"-mcpu={machine.processor}", "-Wno-override-module", "-c", "kernels.ll"]
     # The entries find out whether the processor is good enough for the kernels: on any.
     around = ["-fvisibility=hidden", f"-DLEVEL={machine.level}", "-c", "entries.c"]
-    _zig(folder, *common, *kernels, "-o", "kernels.o")
-    _zig(folder, *common, *around, "-o", "entries.o")
+    zig(folder, *common, *kernels, "-o", "kernels.o")
+    zig(folder, *common, *around, "-o", "entries.o")
     whole = ["-Wl,-z,defs"] if "linux" in machine.triple else []  # elsewhere the linker insists
-    objects = ["kernels.o", "entries.o", "-o", f"partial-{machine.name}"]
-    _zig(folder, *common, "-shared", "-s", *whole, *objects)
-    (folder / f"partial-{machine.name}").replace(made)
+    # The file's name is also in it.
+    partial = folder / "partial" / machine.name
+    partial.parent.mkdir(exist_ok=True)
+    objects = ["kernels.o", "entries.o", "-o", f"partial/{machine.name}"]
+    zig(folder, *common, "-shared", "-s", *whole, *objects)
+    partial.replace(made)
     return made
 
 
-def _zig(folder: Path, *arguments: str) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+def zig(folder: Path, *arguments: str) -> None:
+    """Run Zig's compiler for C.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder to work in.
+    *arguments : str
+
+    Raises
+    ------
+    InputError
+        If Zig is not installed, or compiling fails.
+    """
+    done = run([sys.executable, "-m", "ziglang", "cc", *arguments], folder)
     if done.returncode:
         lines = [
             line for line in done.stderr.splitlines() if "error" in line or "No module" in line
         ]
         raise InputError(f"the kernels cannot be compiled: {(lines or ['zig failed'])[0]}")
+
+
+def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command.
+
+    Parameters
+    ----------
+    command : list of str
+    folder : Path
+        Folder to work in.
+
+    Returns
+    -------
+    subprocess.CompletedProcess
+    """
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
