@@ -11,11 +11,15 @@ binary interface, after it has compared the type. A call releases the interprete
 Arrays of other types or strides than the declared ones are copied for the call, and what the kernel
 wrote is copied back: slower, with the same result.
 
-Limits: a library is for one system and one kind of processor. It uses the instructions of
-x86-64-v3, those of processors since 2013; another one for older processors may lie beside it.
+A library knows the digest of the files that its kernels are written in. It is used only while these
+have that digest, so that nobody runs the code of another version.
+
+Limits: a library is for one system and one kind of processor. For Intel's and AMD's there are two:
+one uses the instructions of x86-64-v3, those of processors since 2013, the other is for older ones.
 """
 
 import ctypes
+import hashlib
 import operator
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -28,17 +32,17 @@ from .kernel_types import Array, Scalar, Signature
 
 FOLDER = Path(__file__).with_name("compiled")
 """Where shipped libraries lie, the preferred one last by name."""
+_CORE = FOLDER.parents[1]
 _FITS, _MISFIT = 0, -1  # as in runtime.c
 
 
 @cache
 def shipped_library() -> "KernelLibrary | None":
-    """Return the library for this machine; None if none was shipped."""
-    for path in sorted(FOLDER.glob("kernels*"), reverse=True):
-        library = open_library(path)
-        if library is not None:
-            return library
-    return None
+    """Return the library for this machine; None if none was shipped that works on it."""
+    from .kernel_check import passes  # imports kernels, which look for this library
+
+    opened = map(open_library, sorted(FOLDER.glob("kernels*"), reverse=True))
+    return next((one for one in opened if one is not None and passes(one)), None)
 
 
 def open_library(path: Path) -> "KernelLibrary | None":
@@ -51,14 +55,42 @@ def open_library(path: Path) -> "KernelLibrary | None":
     Returns
     -------
     KernelLibrary or None
-        None if it is for another system or processor.
+        None if it is for another system or processor, or for other sources than these.
     """
     try:
         loaded = ctypes.CDLL(str(path))
+        loaded.isc_sources.restype = ctypes.c_char_p
+        digest, *names = loaded.isc_sources().decode().split()
+        if not loaded.isc_processor_fits() or source_digest(names) != digest:
+            return None
     except OSError:
         return None
     loaded.isc_set_array_class(ctypes.py_object(np.ndarray))
-    return KernelLibrary(loaded) if loaded.isc_processor_fits() else None
+    return KernelLibrary(loaded)
+
+
+def source_digest(names: Sequence[str]) -> str:
+    """Return the digest of some files of `isc_core`.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Paths inside `isc_core`, with forward slashes.
+
+    Returns
+    -------
+    str
+        SHA-256.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    digest = hashlib.sha256()
+    for name in names:
+        digest.update((_CORE / name).read_bytes())
+    return digest.hexdigest()
 
 
 def symbol(function: Callable[..., Any], version: int) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 
 from isc_core.inpainting.patch_fill import fill_patches
 from isc_core.numerics.jit import Kernel
+from isc_core.numerics.kernel_check import mix, outcome
 from isc_core.numerics.kernel_library import KernelLibrary, flattened
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.prior_fitting.roughness import roughness
@@ -153,6 +154,7 @@ def strided_copy(array: np.ndarray) -> np.ndarray:
 
 
 def _run_programs() -> None:
+    outcome(mix)
     rng = np.random.default_rng(3)
     y, x = np.mgrid[-1 : 1 : _SIDE * 1j, -1 : 1 : _SIDE * 1j]
     mask = np.hypot(x, y) < 0.9

@@ -1,5 +1,5 @@
 /* What compiled kernels need besides themselves: memory, a look at arrays and at the processor.
-   Comes after `arrays.h`. */
+   Comes after `arrays.h`, and a definition of SOURCES. */
 
 #include <stdlib.h>
 #include <string.h>
@@ -97,5 +97,8 @@ static int has_level(int level)
     return level == 0;
 #endif
 }
+
+/* Digest and names of the files that the kernels are written in, see `kernel_library`. */
+EXPORT const char *isc_sources(void) { return SOURCES; }
 
 EXPORT int isc_processor_fits(void) { return has_level(LEVEL); }

@@ -9,11 +9,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from blender_addon.packaging.kernels.build import MACHINES, libraries_for, library, sources_of
+from blender_addon.packaging.kernels.build import (
+    MACHINES,
+    libraries,
+    libraries_for,
+    library,
+    sources_of,
+)
 from blender_addon.packaging.kernels.calls import Call, recorded_calls, strided_copy
-from blender_addon.packaging.kernels.portable_code import versions
-from blender_addon.packaging.kernels.replay import EMULATORS, HERE, replay
-from isc_core.numerics.kernel_library import open_library
+from blender_addon.packaging.kernels.portable_code import source_names, versions
+from blender_addon.packaging.kernels.replay import EMULATORS, HERE, machines_of, replay
+from isc_core.numerics import kernel_check
+from isc_core.numerics.kernel_library import open_library, source_digest
 from isc_core.separation.published import yang_2010, yoon_2006
 
 pytestmark = pytest.mark.skipif(
@@ -48,6 +55,24 @@ def test_a_replayed_call_has_the_outcome_of_python_and_a_wrong_one_is_seen(tmp_p
     assert [one.agrees for one in replay(made, OLDEST, (), [wrong, calls[1]])] == [False, True]
 
 
+def test_a_library_of_other_sources_is_never_used(tmp_path):
+    code, declared = sources_of([one for one in versions() if one.kernel is kernel_check.mix])
+    opened = open_library(library(OLDEST, code, declared, tmp_path / "same"))
+    assert opened is not None and kernel_check.passes(opened)
+    digest = source_digest(source_names())
+    assert declared.count(digest) == 1
+    other = declared.replace(digest, "0" * 64)
+    assert open_library(library(OLDEST, code, other, tmp_path / "other")) is None
+
+
+def test_a_library_that_computes_something_else_is_never_used():
+    class Other:
+        def kernel(self, function, signatures):
+            return lambda *values: function(*values[:-1], values[-1] + 1)
+
+    assert not kernel_check.passes(Other())
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("kernels")
@@ -65,7 +90,8 @@ def test_every_kernel_of_every_platform_agrees(platform, folder, calls):
     emulator = EMULATORS[platform]
     if emulator and shutil.which(emulator[0]) is None:
         pytest.skip(f"{emulator[0]} is not installed")
-    for path, machine in zip(libraries_for(platform, folder), MACHINES[platform], strict=True):
+    machines = machines_of(platform)
+    for path, machine in zip(libraries(machines, folder), machines, strict=True):
         differences = replay(path, machine, emulator, calls)
         assert len(differences) == len(versions())
         assert [one for one in differences if not one.agrees] == []
