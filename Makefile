@@ -45,13 +45,12 @@ docs: .venv/.ready-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --clean --quiet
 	@echo "The documentation: build/site/index.html"
 
-# What the kernels are made from; an older library is not used.
-KERNELS := $(shell grep -rl "jit import" isc_core) $(wildcard blender_addon/packaging/kernels/*)
+# Compiles nothing if the kernels are as they were.
+kernels: build/.kernels-ready
 
-kernels: isc_core/numerics/compiled/.made
-
-isc_core/numerics/compiled/.made: .venv/.ready-dev $(KERNELS)
-	@echo "kernels: compiling (once; it takes a minute)"
+build/.kernels-ready: .venv/.ready-dev $(shell find isc_core -name '*.py') $(wildcard blender_addon/packaging/kernels/*.*)
+	@echo "kernels: compiling what changed (the first time, it takes a minute)"
+	@mkdir -p build
 	@$(BIN)/python -m blender_addon.packaging.kernels
 	@touch $@
 

@@ -1,8 +1,8 @@
 """Loops over pixels that NumPy cannot express, as machine code.
 
-It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where one
-was shipped that runs on this machine; else from Numba, where it is installed. Without both, the
-same functions run as plain Python: slower, with equal results.
+It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where
+there is one for this machine and these sources; else from Numba, where it is installed. Without
+both, the same functions run as plain Python: slower, with equal results.
 
 Code that Numba compiled is cached between runs: beside the source if that folder is writable, else
 in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary

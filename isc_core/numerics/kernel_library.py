@@ -1,8 +1,8 @@
 """Kernels that were compiled ahead of time, called through ctypes.
 
 Problem: a program that compiles its kernels carries a compiler, with Numba and LLVM 200 MB of it,
-and compiles for 20 s when it is first used. The extension for Blender carries one shared library of
-half a megabyte instead.
+and compiles for 20 s when it is first used; the result depends on the processor. The extension for
+Blender, wheels, and the trees of developers carry a shared library of half a megabyte instead.
 
 The library has one function for each kernel and version of its types. It takes arrays as the
 objects that they are, and reads address, shape and strides from the fields that are part of NumPy's
@@ -21,6 +21,8 @@ one uses the instructions of x86-64-v3, those of processors since 2013, the othe
 import ctypes
 import hashlib
 import operator
+import platform
+import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -31,7 +33,9 @@ import numpy as np
 from .kernel_types import Array, Scalar, Signature
 
 FOLDER = Path(__file__).with_name("compiled")
-"""Where shipped libraries lie, the preferred one last by name."""
+"""Where libraries lie, also those for other machines; the preferred one is the last by name."""
+_PROCESSORS = {"x86_64": "x86-64", "amd64": "x86-64", "arm64": "arm64", "aarch64": "arm64"}
+_SUFFIXES = {"win32": "dll", "darwin": "dylib"}
 _CORE = FOLDER.parents[1]
 _FITS, _MISFIT = 0, -1  # as in runtime.c
 
@@ -41,7 +45,10 @@ def shipped_library() -> "KernelLibrary | None":
     """Return the library for this machine; None if none was shipped that works on it."""
     from .kernel_check import passes  # imports kernels, which look for this library
 
-    opened = map(open_library, sorted(FOLDER.glob("kernels*"), reverse=True))
+    # Windows may show a dialog when it is to load a file that is not for it.
+    processor = _PROCESSORS.get(platform.machine().lower(), "none")
+    pattern = f"kernels-{processor}*.{_SUFFIXES.get(sys.platform, 'so')}"
+    opened = map(open_library, sorted(FOLDER.glob(pattern), reverse=True))
     return next((one for one in opened if one is not None and passes(one)), None)
 
 

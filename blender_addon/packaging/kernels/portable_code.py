@@ -97,14 +97,15 @@ def versions() -> list[Version]:
 
 
 def source_names() -> list[str]:
-    """Return the files that kernels, and constants that they import, are written in.
+    """Return the files that decide what kernels compute: theirs, those of constants that they
+    import, and that of the freedom of their arithmetic.
 
     Returns
     -------
     list of str
         Paths inside `isc_core`, with forward slashes, sorted.
     """
-    modules = {one.function.__module__ for one in kernels()}
+    modules = {Kernel.__module__} | {one.function.__module__ for one in kernels()}
     for one in kernels():
         function = one.function
         for node in ast.parse(_path(function.__module__).read_text(encoding="utf-8")).body:
