@@ -146,7 +146,7 @@ class Kernel:
     def compiled(self) -> Callable[..., Any]:
         """What a call runs: shipped code, Numba's dispatcher, or the function itself."""
         library = shipped_library()
-        if library is not None:
+        if library is not None and self.function in library:
             return library.kernel(self.function, self.signatures)
         return self._dispatcher if numba_available() else self.function
 

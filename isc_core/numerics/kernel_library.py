@@ -166,6 +166,10 @@ class KernelLibrary:
     def __init__(self, loaded: ctypes.CDLL) -> None:
         self._loaded = loaded
 
+    def __contains__(self, function: Callable[..., Any]) -> bool:
+        """Whether the library has a kernel: one that was written later may lie in a new file."""
+        return hasattr(self._loaded, symbol(function, 0))
+
     def kernel(
         self, function: Callable[..., Any], signatures: Sequence[Signature]
     ) -> Callable[..., Any]:

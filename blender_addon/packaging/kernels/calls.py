@@ -2,7 +2,7 @@
 
 Separation by every method, a filled hole, a bending table, and SIRFS in both precisions on a ball
 of a few pixels call each version of each kernel. The first calls of each are kept, with what the
-arrays held before and after.
+arrays held before and after. They run on one thread: others would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.inpainting.patch_fill import fill_patches
+from isc_core.inpainting.coherency_sensitive_hashing import CshOptions
+from isc_core.inpainting.patch_fill import PatchFillOptions, fill_patches
 from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_check import mix, outcome
 from isc_core.numerics.kernel_library import KernelLibrary, flattened
@@ -166,7 +167,8 @@ def _run_programs() -> None:
     for method, variant, changes in _METHODS:
         separate(method, photo, mask, variant=variant, changes=changes)
     separate("kim_2013", photo.astype(np.float32), mask)
-    fill_patches(diffuse, gloss < 0.1, gloss >= 0.1)
+    alone = PatchFillOptions(matching=CshOptions(tables=3, candidates=3, threads=1))
+    fill_patches(diffuse, gloss < 0.1, gloss >= 0.1, alone)
     roughness(rng.random((9, 10, 11)).astype(np.float32))
     for single in (True, False):
         _recover_shape(diffuse, mask, single)

@@ -59,6 +59,7 @@ def test_a_library_of_other_sources_is_never_used(tmp_path):
     code, declared = sources_of([one for one in versions() if one.kernel is kernel_check.mix])
     opened = open_library(library(OLDEST, code, declared, tmp_path / "same"))
     assert opened is not None and kernel_check.passes(opened)
+    assert kernel_check.mix.function in opened and yoon_2006._flatten.function not in opened
     digest = source_digest(source_names())
     assert declared.count(digest) == 1
     other = declared.replace(digest, "0" * 64)
