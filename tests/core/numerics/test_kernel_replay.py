@@ -5,6 +5,7 @@ import re
 import shutil
 import sys
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from blender_addon.packaging.kernels.calls import Call, recorded_calls, strided_
 from blender_addon.packaging.kernels.portable_code import source_names, versions
 from blender_addon.packaging.kernels.replay import EMULATORS, HERE, machines_of, replay
 from isc_core.numerics import kernel_check
+from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_library import open_library, source_digest
 from isc_core.separation.published import yang_2010, yoon_2006
 
@@ -59,7 +61,8 @@ def test_a_library_of_other_sources_is_never_used(tmp_path):
     code, declared = sources_of([one for one in versions() if one.kernel is kernel_check.mix])
     opened = open_library(library(OLDEST, code, declared, tmp_path / "same"))
     assert opened is not None and kernel_check.passes(opened)
-    assert kernel_check.mix.function in opened and yoon_2006._flatten.function not in opened
+    inside, outside = cast(Kernel, kernel_check.mix), cast(Kernel, yoon_2006._flatten)
+    assert inside.function in opened and outside.function not in opened
     digest = source_digest(source_names())
     assert declared.count(digest) == 1
     other = declared.replace(digest, "0" * 64)
