@@ -3,12 +3,14 @@
 # make test-all   the same and the slow tests (test-slow: these alone)
 # make docs   the documentation site, in build/site (open build/site/index.html)
 # make extension   Blender's add-on: one zip a platform and Python in dist/; TARGET=here builds only this machine's
+# make wheel   the wheel, with kernels for all machines, and the sdist, in dist/
+# make kernels   the kernels for this machine, which an editable installation then uses; tests do it by themselves
 # The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
 
 BIN := .venv/bin
 INPUTS := pyproject.toml constraints.txt tools/setup.sh
 
-.PHONY: demo test test-slow test-all lint docs extension clean
+.PHONY: demo test test-slow test-all lint docs kernels extension wheel clean
 .DEFAULT_GOAL := demo
 
 demo: .venv/.ready-demo
@@ -26,10 +28,10 @@ test test-slow test-all: export PYTHONDONTWRITEBYTECODE =
 # One process a core. A worker takes the next file, so that a file's fixtures are made once.
 PYTEST = $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
-test: lint
+test: lint kernels
 	$(PYTEST)
 
-test-slow: .venv/.ready-dev
+test-slow: kernels
 	$(PYTEST) -m slow
 
 test-all: test
@@ -42,6 +44,19 @@ lint: .venv/.ready-dev
 docs: .venv/.ready-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --clean --quiet
 	@echo "The documentation: build/site/index.html"
+
+# Compiles nothing if the kernels are as they were.
+kernels: build/.kernels-ready
+
+build/.kernels-ready: .venv/.ready-dev $(shell find isc_core -name '*.py') $(wildcard blender_addon/packaging/kernels/*.*)
+	@echo "kernels: compiling what changed (the first time, it takes a minute)"
+	@mkdir -p build
+	@$(BIN)/python -m blender_addon.packaging.kernels
+	@touch $@
+
+wheel: .venv/.ready-dev
+	@$(BIN)/python -m blender_addon.packaging.kernels --all
+	@$(BIN)/python -m build --sdist --wheel
 
 TARGET := all
 
@@ -62,5 +77,5 @@ extension: .venv/.ready-dev
 	@touch $@
 
 clean:
-	rm -rf .venv demo build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf .venv demo build dist isc_core/numerics/compiled *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

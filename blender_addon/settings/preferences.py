@@ -60,9 +60,7 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
     )
     cache_folder: StringProperty(
         name="Cache Folder",
-        description=(
-            "Folder for compiled kernels and results, empty uses the extension's own folder"
-        ),
+        description="Folder for results, empty uses the extension's own folder",
         subtype="DIR_PATH",
         default="",
     )

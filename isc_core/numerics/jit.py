@@ -1,8 +1,8 @@
 """Loops over pixels that NumPy cannot express, as machine code.
 
-It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where one
-was shipped that runs on this machine; else from Numba, where it is installed. Without both, the
-same functions run as plain Python: slower, with equal results.
+It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where
+there is one for this machine and these sources; else from Numba, where it is installed. Without
+both, the same functions run as plain Python: slower, with equal results.
 
 Code that Numba compiled is cached between runs: beside the source if that folder is writable, else
 in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary
@@ -146,7 +146,7 @@ class Kernel:
     def compiled(self) -> Callable[..., Any]:
         """What a call runs: shipped code, Numba's dispatcher, or the function itself."""
         library = shipped_library()
-        if library is not None:
+        if library is not None and self.function in library:
             return library.kernel(self.function, self.signatures)
         return self._dispatcher if numba_available() else self.function
 

@@ -1,8 +1,8 @@
 """Kernels that were compiled ahead of time, called through ctypes.
 
 Problem: a program that compiles its kernels carries a compiler, with Numba and LLVM 200 MB of it,
-and compiles for 20 s when it is first used. The extension for Blender carries one shared library of
-half a megabyte instead.
+and compiles for 20 s when it is first used; the result depends on the processor. The extension for
+Blender, wheels, and the trees of developers carry a shared library of half a megabyte instead.
 
 The library has one function for each kernel and version of its types. It takes arrays as the
 objects that they are, and reads address, shape and strides from the fields that are part of NumPy's
@@ -11,12 +11,18 @@ binary interface, after it has compared the type. A call releases the interprete
 Arrays of other types or strides than the declared ones are copied for the call, and what the kernel
 wrote is copied back: slower, with the same result.
 
-Limits: a library is for one system and one kind of processor. It uses the instructions of
-x86-64-v3, those of processors since 2013; another one for older processors may lie beside it.
+A library knows the digest of the files that its kernels are written in. It is used only while these
+have that digest, so that nobody runs the code of another version.
+
+Limits: a library is for one system and one kind of processor. For Intel's and AMD's there are two:
+one uses the instructions of x86-64-v3, those of processors since 2013, the other is for older ones.
 """
 
 import ctypes
+import hashlib
 import operator
+import platform
+import sys
 from collections.abc import Callable, Sequence
 from functools import cache
 from pathlib import Path
@@ -27,18 +33,23 @@ import numpy as np
 from .kernel_types import Array, Scalar, Signature
 
 FOLDER = Path(__file__).with_name("compiled")
-"""Where shipped libraries lie, the preferred one last by name."""
+"""Where libraries lie, also those for other machines; the preferred one is the last by name."""
+_PROCESSORS = {"x86_64": "x86-64", "amd64": "x86-64", "arm64": "arm64", "aarch64": "arm64"}
+_SUFFIXES = {"win32": "dll", "darwin": "dylib"}
+_CORE = FOLDER.parents[1]
 _FITS, _MISFIT = 0, -1  # as in runtime.c
 
 
 @cache
 def shipped_library() -> "KernelLibrary | None":
-    """Return the library for this machine; None if none was shipped."""
-    for path in sorted(FOLDER.glob("kernels*"), reverse=True):
-        library = open_library(path)
-        if library is not None:
-            return library
-    return None
+    """Return the library for this machine; None if none was shipped that works on it."""
+    from .kernel_check import passes  # imports kernels, which look for this library
+
+    # Windows may show a dialog when it is to load a file that is not for it.
+    processor = _PROCESSORS.get(platform.machine().lower(), "none")
+    pattern = f"kernels-{processor}*.{_SUFFIXES.get(sys.platform, 'so')}"
+    opened = map(open_library, sorted(FOLDER.glob(pattern), reverse=True))
+    return next((one for one in opened if one is not None and passes(one)), None)
 
 
 def open_library(path: Path) -> "KernelLibrary | None":
@@ -51,14 +62,42 @@ def open_library(path: Path) -> "KernelLibrary | None":
     Returns
     -------
     KernelLibrary or None
-        None if it is for another system or processor.
+        None if it is for another system or processor, or for other sources than these.
     """
     try:
         loaded = ctypes.CDLL(str(path))
+        loaded.isc_sources.restype = ctypes.c_char_p
+        digest, *names = loaded.isc_sources().decode().split()
+        if not loaded.isc_processor_fits() or source_digest(names) != digest:
+            return None
     except OSError:
         return None
     loaded.isc_set_array_class(ctypes.py_object(np.ndarray))
-    return KernelLibrary(loaded) if loaded.isc_processor_fits() else None
+    return KernelLibrary(loaded)
+
+
+def source_digest(names: Sequence[str]) -> str:
+    """Return the digest of some files of `isc_core`.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Paths inside `isc_core`, with forward slashes.
+
+    Returns
+    -------
+    str
+        SHA-256.
+
+    Raises
+    ------
+    OSError
+        If one cannot be read.
+    """
+    digest = hashlib.sha256()
+    for name in names:
+        digest.update((_CORE / name).read_bytes())
+    return digest.hexdigest()
 
 
 def symbol(function: Callable[..., Any], version: int) -> str:
@@ -127,6 +166,10 @@ class KernelLibrary:
     def __init__(self, loaded: ctypes.CDLL) -> None:
         self._loaded = loaded
 
+    def __contains__(self, function: Callable[..., Any]) -> bool:
+        """Whether the library has a kernel: one that was written later may lie in a new file."""
+        return hasattr(self._loaded, symbol(function, 0))
+
     def kernel(
         self, function: Callable[..., Any], signatures: Sequence[Signature]
     ) -> Callable[..., Any]:
@@ -145,13 +188,10 @@ class KernelLibrary:
             Takes what the function takes. Raises MemoryError if its scratch memory is not to be
             had.
         """
-        entries = [
-            _Entry(self._loaded[symbol(function, version)], signature)
-            for version, signature in enumerate(signatures)
-        ]
+        entries = self.entries(function, signatures)
 
         def call(*values: Any) -> Any:
-            flat = _flat(values)
+            flat = flattened(values)
             for entry in entries:
                 fits, result = entry(flat)
                 if fits:
@@ -160,9 +200,42 @@ class KernelLibrary:
 
         return call
 
+    def entries(
+        self, function: Callable[..., Any], signatures: Sequence[Signature]
+    ) -> list["_Entry"]:
+        """Return the versions of a compiled kernel.
 
-def _flat(values: Sequence[Any]) -> list[Any]:
-    """The arguments, with the fields of tuples in place of these."""
+        Parameters
+        ----------
+        function : callable
+            As it was written.
+        signatures : sequence of Signature
+            Its versions.
+
+        Returns
+        -------
+        list
+            Each takes the list of `flattened` arguments, and returns whether they have its types,
+            and the result.
+        """
+        return [
+            _Entry(self._loaded[symbol(function, version)], signature)
+            for version, signature in enumerate(signatures)
+        ]
+
+
+def flattened(values: Sequence[Any]) -> list[Any]:
+    """Put the fields of tuples in place of these.
+
+    Parameters
+    ----------
+    values : sequence
+        Arguments of a kernel.
+
+    Returns
+    -------
+    list
+    """
     flat: list[Any] = []
     for value in values:
         if isinstance(value, tuple):

@@ -1,22 +1,25 @@
 """Make the library for a platform, on any other, with the C compiler of Zig.
 
-A library is kept by the text that it is made from, so that the zips of a platform for several
-versions of Python are built from one.
+Libraries are kept by what they are made from, so that the zips of a platform for several versions
+of Python are built from one.
 """
 
 import hashlib
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 from isc_core.errors import InputError
+from isc_core.io.atomic import new_file
+from isc_core.numerics.kernel_library import source_digest
 
 from .entries import entries
-from .portable_code import portable_code, versions
+from .portable_code import Version, portable_code, source_names, versions
 
-_RUNTIME = Path(__file__).with_name("runtime.c")
+_C_FOLDER = Path(__file__).parent
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,12 @@ MACHINES = {
         Machine(f"kernels-x86-64-v{level}.so", "x86_64-linux-gnu.2.28", f"x86_64_v{level}", level)
         for level in (2, 3)
     ),
+    "windows-x64": tuple(
+        Machine(f"kernels-x86-64-v{level}.dll", "x86_64-windows-gnu", f"x86_64_v{level}", level)
+        for level in (2, 3)
+    ),
+    "macos-arm64": (Machine("kernels-arm64.dylib", "aarch64-macos.13.0", "apple_m1"),),
+    "linux-arm64": (Machine("kernels-arm64.so", "aarch64-linux-gnu.2.28", "generic"),),
 }
 
 
@@ -69,51 +78,170 @@ def libraries_for(platform: str, cache_folder: Path) -> list[Path]:
     InputError
         If Numba or Zig is not installed, or compiling fails.
     """
-    if platform not in MACHINES:
+    return libraries(MACHINES.get(platform, ()), cache_folder)
+
+
+def libraries(machines: Sequence[Machine], cache_folder: Path) -> list[Path]:
+    """Return the libraries of some machines, making those that are missing.
+
+    Parameters
+    ----------
+    machines : sequence of Machine
+    cache_folder : Path
+        Folder of libraries that were made.
+
+    Returns
+    -------
+    list of Path
+
+    Raises
+    ------
+    InputError
+        If Numba or Zig is not installed, or compiling fails.
+    """
+    if not machines:
         return []
     try:
-        code, declared = _sources()
+        folder = cache_folder / _origin()
+        if all((folder / one.name).is_file() for one in machines):
+            return [folder / one.name for one in machines]
+        sources = _kept_sources(folder)
     except ImportError as error:
         raise InputError(
             f"the kernels cannot be compiled: {error}: install the extra dev"
         ) from error
-    return [_library(one, code, declared, cache_folder) for one in MACHINES[platform]]
+    return [library(one, *sources, folder) for one in machines]
 
 
-@cache
-def _sources() -> tuple[str, str]:
-    """The kernels, and the C around them."""
-    chosen = versions()
-    return portable_code(chosen), _RUNTIME.read_text(encoding="utf-8") + entries(chosen)
+def _origin() -> str:
+    """A name for all that libraries are made from."""
+    digest = hashlib.sha256()
+    for package in ("numba", "ziglang"):
+        digest.update(f"{package} {version(package)}\0".encode())
+    for name in ("arrays.h", "build.py", "entries.py", "portable_code.py", "runtime.c"):
+        digest.update((_C_FOLDER / name).read_bytes())
+    digest.update(source_digest(source_names()).encode())
+    return digest.hexdigest()[:16]
 
 
-def _library(machine: Machine, code: str, declared: str, cache_folder: Path) -> Path:
-    digest = hashlib.sha256(f"{machine}\0{code}\0{declared}".encode()).hexdigest()
-    folder = cache_folder / digest[:16]
+def _kept_sources(folder: Path) -> tuple[str, str]:
+    """What all libraries of a folder are compiled from; Numba needs half a minute for it."""
+    kept = folder / "kernels.ll", folder / "entries.c"
+    if not kept[1].is_file():
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, text in zip(kept, sources_of(versions()), strict=True):
+            with new_file(path) as partial:
+                partial.write_text(text, encoding="utf-8")
+    return kept[0].read_text(encoding="utf-8"), kept[1].read_text(encoding="utf-8")
+
+
+def sources_of(chosen: list[Version]) -> tuple[str, str]:
+    """Return what a library of some kernels is compiled from.
+
+    Parameters
+    ----------
+    chosen : list of Version
+
+    Returns
+    -------
+    code : str
+        The kernels, in LLVM's notation.
+    declared : str
+        The C around them.
+    """
+    names = source_names()
+    origin = f'#define SOURCES "{" ".join([source_digest(names), *names])}"\n'
+    around = c_text("arrays.h") + origin + c_text("runtime.c") + entries(chosen)
+    return portable_code(chosen), around
+
+
+def c_text(name: str) -> str:
+    """Return the text of a file in C beside this one.
+
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    str
+    """
+    return (_C_FOLDER / name).read_text(encoding="utf-8")
+
+
+def library(machine: Machine, code: str, declared: str, folder: Path) -> Path:
+    """Make a library, unless the folder has it.
+
+    Parameters
+    ----------
+    machine : Machine
+    code, declared : str
+        See `sources_of`.
+    folder : Path
+        Of libraries that are made from the same sources.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If Zig is not installed, or compiling fails.
+    """
     made = folder / machine.name
     if made.is_file():
         return made
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "kernels.ll").write_text(code, encoding="utf-8")
-    (folder / "entries.c").write_text(declared, encoding="utf-8")
+    place = folder / f"parts-{machine.name}"
+    place.mkdir(parents=True, exist_ok=True)
+    (place / "kernels.ll").write_text(code, encoding="utf-8")
+    (place / "entries.c").write_text(declared, encoding="utf-8")
     common = ["-target", machine.triple, "-O3", "-g0", "-fPIC"]
     kernels = [f"-mcpu={machine.processor}", "-Wno-override-module", "-c", "kernels.ll"]
     # The entries find out whether the processor is good enough for the kernels: on any.
     around = ["-fvisibility=hidden", f"-DLEVEL={machine.level}", "-c", "entries.c"]
-    _zig(folder, *common, *kernels, "-o", "kernels.o")
-    _zig(folder, *common, *around, "-o", "entries.o")
+    zig(place, *common, *kernels, "-o", "kernels.o")
+    zig(place, *common, *around, "-o", "entries.o")
     whole = ["-Wl,-z,defs"] if "linux" in machine.triple else []  # elsewhere the linker insists
-    objects = ["kernels.o", "entries.o", "-o", f"partial-{machine.name}"]
-    _zig(folder, *common, "-shared", "-s", *whole, *objects)
-    (folder / f"partial-{machine.name}").replace(made)
+    # The file's name is also in it, hence the folder.
+    zig(place, *common, "-shared", "-s", *whole, "kernels.o", "entries.o", "-o", machine.name)
+    (place / machine.name).replace(made)
     return made
 
 
-def _zig(folder: Path, *arguments: str) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", *arguments]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+def zig(folder: Path, *arguments: str) -> None:
+    """Run Zig's compiler for C.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder to work in.
+    *arguments : str
+
+    Raises
+    ------
+    InputError
+        If Zig is not installed, or compiling fails.
+    """
+    done = run([sys.executable, "-m", "ziglang", "cc", *arguments], folder)
     if done.returncode:
         lines = [
             line for line in done.stderr.splitlines() if "error" in line or "No module" in line
         ]
         raise InputError(f"the kernels cannot be compiled: {(lines or ['zig failed'])[0]}")
+
+
+def run(command: list[str], folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run a command.
+
+    Parameters
+    ----------
+    command : list of str
+    folder : Path
+        Folder to work in.
+
+    Returns
+    -------
+    subprocess.CompletedProcess
+    """
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)

@@ -9,7 +9,7 @@ from isc_core.numerics.kernel_types import Array, Scalar
 
 from .portable_code import Version
 
-_C_TYPES = {"i8": "int64_t", "f4": "float", "f8": "double", "b1": "uint8_t"}
+C_TYPES = {"i8": "int64_t", "f4": "float", "f8": "double", "b1": "uint8_t"}
 
 
 def entries(chosen: list[Version]) -> str:
@@ -29,9 +29,9 @@ def entries(chosen: list[Version]) -> str:
 
 def _entry(version: Version) -> str:
     types = version.signature.flat
-    result = _C_TYPES[version.signature.result.code] if version.signature.result else "void"
+    result = C_TYPES[version.signature.result.code] if version.signature.result else "void"
     taken = ", ".join(
-        f"const array *a{k}" if isinstance(one, Array) else f"{_C_TYPES[one.code]} a{k}"
+        f"const array *a{k}" if isinstance(one, Array) else f"{C_TYPES[one.code]} a{k}"
         for k, one in enumerate(types)
     )
     bodys = ", ".join(_parameters(one) for one in types)
@@ -58,7 +58,7 @@ def _entry(version: Version) -> str:
 
 def _parameters(one: Scalar | Array) -> str:
     if isinstance(one, Scalar):
-        return _C_TYPES[one.code]
+        return C_TYPES[one.code]
     return ", ".join(["void *, void *, int64_t, int64_t, void *", *["int64_t"] * (2 * one.axes)])
 
 

@@ -9,7 +9,9 @@ Limits: `_Plain` overrides a method that Numba documents as internal, hence the 
 code is for 64-bit processors with little-endian numbers.
 """
 
+import ast
 import importlib
+import importlib.util
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -92,6 +94,35 @@ def versions() -> list[Version]:
         for kernel in kernels()
         for number, signature in enumerate(kernel.signatures)
     ]
+
+
+def source_names() -> list[str]:
+    """Return the files that decide what kernels compute: theirs, those of constants that they
+    import, and that of the freedom of their arithmetic.
+
+    Returns
+    -------
+    list of str
+        Paths inside `isc_core`, with forward slashes, sorted.
+    """
+    modules = {Kernel.__module__} | {one.function.__module__ for one in kernels()}
+    for one in kernels():
+        function = one.function
+        for node in ast.parse(_path(function.__module__).read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom) and node.level:
+                used = {alias.name for alias in node.names} & {*function.__code__.co_names}
+                name = "." * node.level + (node.module or "")
+                if used:
+                    modules.add(importlib.util.resolve_name(name, _package(function.__module__)))
+    return sorted(_path(name).relative_to(ROOT / "isc_core").as_posix() for name in modules)
+
+
+def _package(module: str) -> str:
+    return module.rpartition(".")[0]
+
+
+def _path(module: str) -> Path:
+    return ROOT.joinpath(*module.split(".")).with_suffix(".py")
 
 
 def portable_code(chosen: list[Version]) -> str:

@@ -1,10 +1,6 @@
-/* What compiled kernels need besides themselves: arrays of NumPy, memory, a look at the processor.
+/* What compiled kernels need besides themselves: memory, a look at arrays and at the processor.
+   Comes after `arrays.h`, and a definition of SOURCES. */
 
-   Needs no header of Python or NumPy: the first fields of an array are part of NumPy's binary
-   interface, the same in versions 1 and 2. Limits: 64-bit, little-endian, not for free-threaded
-   Python, whose objects begin with other fields. */
-
-#include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 #if defined(__x86_64__)
@@ -16,26 +12,6 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* PyArray_Descr and PyArrayObject_fields, up to the last field that is read. */
-typedef struct {
-    intptr_t references;
-    void *class;
-    void *scalar;
-    char kind, type, byte_order, flags;
-    int number;
-} element;
-typedef struct {
-    intptr_t references;
-    void *class;
-    char *data;
-    int dimensions;
-    intptr_t *shape, *strides;
-    void *base;
-    element *elements;
-    int flags;
-} array;
-
-enum { CONTIGUOUS = 0x1, ALIGNED = 0x100 };
 enum { FITS = 0, MISFIT = -1 };
 
 static const void *array_class;
@@ -121,5 +97,8 @@ static int has_level(int level)
     return level == 0;
 #endif
 }
+
+/* Digest and names of the files that the kernels are written in, see `kernel_library`. */
+EXPORT const char *isc_sources(void) { return SOURCES; }
 
 EXPORT int isc_processor_fits(void) { return has_level(LEVEL); }

@@ -12,6 +12,7 @@ from blender_addon.packaging.archive import contents
 from blender_addon.packaging.kernels.build import libraries_for
 from blender_addon.packaging.kernels.portable_code import kernels, versions
 from blender_addon.packaging.targets import chosen
+from isc_core.numerics import kernel_library
 from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_library import open_library
 from isc_core.numerics.kernel_types import Array, Group, Scalar, signatures
@@ -166,3 +167,22 @@ def test_a_file_that_is_no_library_of_this_machine_is_passed_over(tmp_path: Path
     other = tmp_path / "kernels-other.so"
     other.write_bytes(b"MZ")
     assert open_library(other) is None
+
+
+def test_files_for_other_systems_and_processors_are_not_opened(tmp_path, monkeypatch):
+    for name in ("arm64.dylib", "arm64.so", "x86-64-v2.dll", "x86-64-v2.so", "x86-64-v3.so"):
+        (tmp_path / f"kernels-{name}").touch()
+    opened = []
+    monkeypatch.setattr(kernel_library, "FOLDER", tmp_path)
+    monkeypatch.setattr(kernel_library, "open_library", lambda path: opened.append(path.name))
+    for system, machine, names in (
+        ("linux", "x86_64", ["kernels-x86-64-v3.so", "kernels-x86-64-v2.so"]),
+        ("linux", "riscv64", []),
+        ("win32", "AMD64", ["kernels-x86-64-v2.dll"]),
+        ("darwin", "arm64", ["kernels-arm64.dylib"]),
+    ):
+        opened.clear()
+        monkeypatch.setattr(sys, "platform", system)
+        monkeypatch.setattr("platform.machine", lambda known=machine: known)
+        assert kernel_library.shipped_library.__wrapped__() is None
+        assert opened == names
