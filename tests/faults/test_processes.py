@@ -220,7 +220,7 @@ def test_edit_of_a_photo_that_changes_is_refused(
         photo.write_bytes(other)
         return found
 
-    monkeypatch.setattr("isc_core.cli.commands.edit.read_photo", exchanged)
+    monkeypatch.setattr("isc_core.cli.interface.result_photo.read_photo", exchanged)
     given = ["--photo", str(photo), "--mask", str(inputs / "mask.png"), "--quiet"]
     code, text = run(["edit", str(inputs / "result"), "relight", *given, "-o", str(output)])
     assert_refused(code, text)
