@@ -135,9 +135,8 @@ def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
     yield 20
     yield acc.shot("09_new_scene")
     acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
-    place = yield from acc.find("isc.return_to_scene")
-    if acc.check(place, "the button back is found"):
-        yield acc.click(*place, settle=2)
+    yield from press(acc, "isc.return_to_scene")
+    yield 1.5
     acc.check(bpy.context.scene.name == "Scene", "and leads back")
     bpy.context.scene.isc.own_scene = False
 
@@ -235,10 +234,8 @@ def begin(acc: Any) -> Iterator[float]:
     """Clicks the button."""
     acc.tab("ISC")
     yield 1
-    place = yield from acc.find("isc.decompose")
-    if acc.check(place, "the button is found"):
-        yield acc.click(*place, settle=0.5)
-        yield from until(lambda: shown().state == "running", 30)
+    yield from press(acc, "isc.decompose")
+    yield from until(lambda: shown().state == "running", 30)
 
 
 def escape(acc: Any) -> Iterator[float]:
@@ -248,9 +245,21 @@ def escape(acc: Any) -> Iterator[float]:
 
 def press_cancel(acc: Any) -> Iterator[float]:
     """Clicks the button."""
-    place = yield from acc.find("isc.cancel")
-    if acc.check(place, "the cancel button is found"):
-        yield acc.click(*place, settle=1)
+    yield from press(acc, "isc.cancel")
+    yield 0.5
+
+
+def press(acc: Any, operator: str) -> Iterator[float]:
+    """Clicks the button of an operator.
+
+    `find` asks what is under the mouse, which is what it was before while a busy window has not yet
+    read the mouse's movement: the search begins where no button is.
+    """
+    left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
+    yield acc.xdo(f"mousemove {left + width // 3} {top + height // 2}", 2)
+    place = yield from acc.find(operator)
+    if acc.check(place, f"the button of {operator} is found"):
+        yield acc.click(*place, settle=0.5)
 
 
 def keys(acc: Any, text: str, wait: float) -> float:
