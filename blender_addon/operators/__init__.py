@@ -17,8 +17,8 @@ from .notes import ISC_OT_show_notes
 from .photo_import import HANDLERS, ISC_OT_photo_as_object
 from .result import (
     ISC_OT_build_result,
-    ISC_OT_complete_result,
     ISC_OT_import_result,
+    ISC_OT_read_result,
     ISC_OT_return_to_scene,
 )
 
@@ -39,7 +39,7 @@ CLASSES = (
     ISC_OT_clear_points,
     ISC_OT_build_result,
     ISC_OT_import_result,
-    ISC_OT_complete_result,
+    ISC_OT_read_result,
     ISC_OT_return_to_scene,
     ISC_OT_save_asset,
     ISC_OT_recolour,

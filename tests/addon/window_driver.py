@@ -1,12 +1,13 @@
 """Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
-automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color, a
-second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a run, a new
-scene.
+automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color,
+glTF and USD, a second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a
+run, a new scene, the asset dragged into another file.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
     blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
     PHOTOS/photo.png --size 1280x800 \\
-        --timeout 600 --driver tests/addon/window_driver.py --out OUT
+        --timeout 700 --driver tests/addon/window_driver.py --out OUT
+then `window_reopened.py` looks at what this has written.
 `acc` is that script's helper: `find` moves the mouse until the button under it runs the operator,
 `shot` saves the screen, a number that is yielded is waited for. Exit code 1 where a check fails;
 OUT/measured.txt holds the longest calls.
@@ -32,6 +33,7 @@ def main(acc: Any) -> Iterator[float]:
     yield from mask(acc, measured)
     yield from create(acc, measured)
     yield from look_around(acc)
+    yield from export(acc)
     yield from second_run(acc, measured)
     yield from undo_and_redo(acc)
     yield from asset(acc)
@@ -42,6 +44,7 @@ def main(acc: Any) -> Iterator[float]:
     yield from load_during_a_run(acc, measured)
     yield from load_while_drawing(acc)
     yield from new_scene(acc, measured)
+    yield from another_file(acc)
     Path(acc.out, "measured.txt").write_text("\n".join(measured) + "\n")
 
 
@@ -100,6 +103,28 @@ def look_around(acc: Any) -> Iterator[float]:
         bpy.ops.isc.recolour("EXEC_DEFAULT", True, hue=0.8)
     yield 8
     yield acc.shot("08_recolored")
+
+
+def export(acc: Any) -> Iterator[float]:
+    """File > Export > glTF of what is shown, edited a moment before; USD where Blender has it."""
+    yield acc.xdo("mousemove 400 300", 1)
+    with acc.context():
+        bpy.ops.wm.call_menu(name="TOPBAR_MT_file_export")
+    yield 3
+    yield acc.shot("08_export")
+    yield acc.xdo("key Escape", 2)
+    material = bpy.data.objects[NAME].active_material
+    edits = material.node_tree.nodes["ISC Dichromatic"].inputs
+    with acc.context():
+        edits["Value"].default_value = 0.8
+        done = bpy.ops.export_scene.gltf(filepath=f"{acc.out}/{NAME}.glb", use_selection=True)
+        acc.check(done == {"FINISHED"}, "glTF is exported")
+        if bpy.app.build_options.usd:  # Debian's Blender is built without
+            path = f"{acc.out}/{NAME}.usdc"
+            done = bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True)
+            acc.check(done == {"FINISHED"}, "USD is exported")
+    bpy.ops.wm.save_as_mainfile(filepath=f"{acc.out}/scene.blend", copy=True)
+    yield 1
 
 
 def second_run(acc: Any, measured: list[str]) -> Iterator[float]:
@@ -228,6 +253,38 @@ def load_while_drawing(acc: Any) -> Iterator[float]:
     acc.check(objects() == [NAME], "a file is loaded while a box is drawn")
     acc.tab("ISC")
     yield 1
+
+
+def another_file(acc: Any) -> Iterator[float]:
+    """The asset is dragged with the mouse from the asset browser into a new file."""
+    bpy.ops.wm.read_homefile()
+    yield 3
+    with acc.context():
+        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.36)
+    yield 1
+    areas = [area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D"]
+    browser = min(areas, key=lambda area: area.y)
+    browser.ui_type = "ASSETS"
+    yield 3
+    shelf = browser.spaces.active.params
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    shelf.asset_library_reference = libraries[-1].name
+    shelf.filter_asset_id.filter_material = False
+    yield 5
+    yield acc.shot("14_asset_browser")
+    left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
+    goal = f"{left + width // 3} {top + height * 2 // 3}"
+    left, top, _, _ = acc.rect("FILE_BROWSER", "WINDOW")
+    start = f"mousemove {left + 60} {top + 60} sleep .5 mousedown 1 sleep .5"
+    way = f"mousemove_relative 30 -30 sleep .5 mousemove {goal} sleep 1.5"
+    yield acc.xdo(f"{start} {way}", 6)
+    yield acc.shot("14_asset_dragged")
+    yield acc.xdo("mouseup 1", 3)
+    acc.check(objects() == [NAME], f"the asset is in another file: {objects()}")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    yield _SHADERS
+    yield acc.shot("15_another_file")
+    bpy.ops.wm.save_as_mainfile(filepath=f"{acc.out}/another.blend")
 
 
 def begin(acc: Any) -> Iterator[float]:

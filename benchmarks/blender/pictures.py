@@ -1,0 +1,319 @@
+"""The pictures of docs/blender.md: five objects, a still life of them, a texture set, the window.
+
+  python -m benchmarks.blender.pictures objects -o FOLDER
+  python -m benchmarks.blender.pictures window OUT -o FOLDER
+
+The first form photographs the bodies of `studio_photos`, finds their masks by a click in the
+middle, decomposes them and builds their objects by the users' commands; what is in FOLDER/work is
+kept. The second form crops the screenshots in OUT, the folder of `tests/addon/window_driver.py`,
+made with a photo of the first form.
+
+Limits: the photo's camera looked down by some degrees; objects are tilted back by these, by hand as
+it were, to stand upright.
+"""
+
+import argparse
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+from PIL import Image, ImageDraw
+
+from blender_addon.files.result_arrays import ARRAYS, read_result
+from blender_addon.operators.texture_set import write_texture_set
+from blender_addon.scene.build import BuiltObject, build_object
+from blender_addon.scene.preparation import BuildOptions
+from isc_core.cli.main import main as isc
+from isc_core.errors import InputError
+
+from .still_life import still_life
+from .studio_photos import ABOVE, BODIES, photograph, render_picture, studio
+
+TURNS = (0, -45, 45, 180)  # degrees, about the vertical axis
+_SIDE, _GAP, _QUALITY = 190, 4, 82
+_BODY_SIZE = 2.0  # of the longer side, as the bodies have
+_TEXTURES = ("basecolor", "normal", "roughness", "specular", "height", "ao")
+_SIZE, _SAMPLES = "512", 16
+
+
+@dataclass(frozen=True)
+class Crop:
+    """A part of a screenshot.
+
+    Attributes
+    ----------
+    shot : str
+        Its name.
+    box : tuple of int
+        Left, top, right, bottom in pixels of a screen of 1280 x 800.
+    """
+
+    shot: str
+    box: tuple[int, int, int, int]
+
+
+_VIEW, _PANEL, _ALL = (2, 28, 764, 718), (764, 82, 1050, 520), (0, 0, 1280, 722)
+WINDOW: Mapping[str, tuple[Crop, ...]] = {
+    "window_rendered": (Crop("05_created", _ALL),),
+    "window_mask": (Crop("03_mask", _PANEL), Crop("04_running", _PANEL)),
+    "window_edits": (
+        Crop("06_orbit", _VIEW),
+        Crop("07_lamp_0", _VIEW),
+        Crop("07_lamp_1", _VIEW),
+        Crop("08_recolored", _VIEW),
+    ),
+    "window_export": (Crop("08_export", (0, 0, 764, 500)),),
+    "window_asset": (Crop("14_asset_dragged", _ALL), Crop("15_another_file", _ALL)),
+    "mask_box": (Crop("10_box", (2, 28, 1050, 718)),),
+}
+_WIDTHS = {"window_rendered": 1280, "mask_box": 735, "window_export": 620, "window_mask": 600}
+_WIDTH = 1000  # of the others
+
+
+def result_of(name: str, work: Path) -> Path:
+    """Return the result folder of a body's photo; made where it is missing.
+
+    Parameters
+    ----------
+    name : str
+        One of `BODIES`.
+    work : Path
+        Folder of photos, masks and results.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If a command fails.
+    """
+    photo, mask, result = work / f"{name}.png", work / f"{name}_mask.png", work / name
+    if not photo.is_file():
+        photograph(BODIES[name], photo)
+    middle = ",".join(str(side // 2) for side in Image.open(photo).size)
+    steps = (
+        (mask, ["mask", str(photo), "--auto", "--point", middle, "-o", str(mask)]),
+        (
+            result / ARRAYS,
+            ["decompose", str(photo), "--mask", str(mask), "--max-size", _SIZE, "--arrays"]
+            + ["--quiet", "-o", str(result)],
+        ),
+    )
+    for made, command in steps:
+        if not made.is_file() and isc(command) != 0:
+            raise InputError(f"isc {command[0]} failed for {photo}")
+    return result
+
+
+def build(result: Path) -> BuiltObject:
+    """Build an object into the current scene, upright on the table as its body was.
+
+    Parameters
+    ----------
+    result : Path
+        Its result folder.
+
+    Returns
+    -------
+    BuiltObject
+        The object.
+    """
+    options = BuildOptions(
+        size_metres=_BODY_SIZE, own_scene=False, light_and_camera=False, back="rounded"
+    )
+    built = build_object(read_result(result), options)
+    obj = built.object
+    obj.matrix_world = Matrix.Rotation(np.arctan(ABOVE), 4, "X")
+    stand(obj, Vector())
+    return built
+
+
+def stand(obj: bpy.types.Object, place: Vector) -> None:
+    """Move an object so that its lowest point touches the table and its middle is above a place.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object; rotation and scale are kept.
+    place : Vector
+        On the table, z = 0.
+    """
+    bpy.context.view_layer.update()
+    points = np.empty((len(obj.data.vertices), 3), np.float32)
+    obj.data.vertices.foreach_get("co", points.ravel())
+    seen = points @ np.array(obj.matrix_world.to_3x3()).T
+    low, high = seen.min(0), seen.max(0)
+    middle = (low + high) / 2
+    obj.location = place - Vector((middle[0], middle[1], low[2]))
+
+
+def objects_sheet(work: Path, results: Mapping[str, Path]) -> Image.Image:
+    """Return a sheet: a row for each object, its photo and its turns in the studio.
+
+    Parameters
+    ----------
+    work : Path
+        Folder of the photos, for renders too.
+    results : mapping of str to Path
+        Result folders.
+
+    Returns
+    -------
+    PIL.Image.Image
+        The sheet.
+    """
+    rows = []
+    for name, result in results.items():
+        row = [Image.open(work / f"{name}.png").convert("RGB")]
+        for turn in TURNS:
+            bpy.ops.wm.read_factory_settings(use_empty=True)
+            obj = build(result).object
+            obj.matrix_world = Matrix.Rotation(np.radians(turn), 4, "Z") @ obj.matrix_world
+            stand(obj, Vector())
+            bpy.context.view_layer.update()
+            studio(Vector((0, 0, obj.dimensions.z / 2)))
+            path = work / f"{name}_{turn}.png"
+            render_picture(path, (2 * _SIDE, 2 * _SIDE), _SAMPLES)
+            row.append(Image.open(path).convert("RGB"))
+        rows.append(row)
+    return sheet(rows, (_SIDE, _SIDE))
+
+
+def textures_sheet(work: Path, result: Path) -> Image.Image:
+    """Return a strip of the textures that *Export Texture Set* writes.
+
+    Parameters
+    ----------
+    work : Path
+        Folder of the textures.
+    result : Path
+        Result folder.
+
+    Returns
+    -------
+    PIL.Image.Image
+        The strip.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    built = build(result)
+    folder = work / "textures"
+    folder.mkdir(exist_ok=True)
+    write_texture_set(built, folder, "gourd", "generic", "PNG8", green_down=False)
+    files = [folder / f"gourd_{name}.png" for name in _TEXTURES]
+    pictures = [Image.open(path).convert("RGB") for path in files]
+    width, height = pictures[0].size
+    strip = sheet([pictures], (160, round(160 * height / width)))
+    draw = ImageDraw.Draw(strip)
+    for number, name in enumerate(_TEXTURES):
+        draw.text((number * (160 + _GAP) + 6, 4), name, fill="white", stroke_width=1)
+    return strip
+
+
+def sheet(rows: Sequence[Sequence[Image.Image]], size: tuple[int, int]) -> Image.Image:
+    """Return pictures in rows, each scaled to one size.
+
+    Parameters
+    ----------
+    rows : sequence of sequence of PIL.Image.Image
+        The pictures.
+    size : tuple of int
+        Width and height of each.
+
+    Returns
+    -------
+    PIL.Image.Image
+        The sheet.
+    """
+    across, down = size[0] + _GAP, size[1] + _GAP
+    whole = (across * max(map(len, rows)) - _GAP, down * len(rows) - _GAP)
+    made = Image.new("RGB", whole, "white")
+    for y, row in enumerate(rows):
+        for x, picture in enumerate(row):
+            scaled = picture.resize(size, Image.Resampling.LANCZOS)
+            made.paste(scaled, (x * across, y * down))
+    return made
+
+
+def window_picture(shots: Path, crops: Sequence[Crop], width: int) -> Image.Image:
+    """Return parts of screenshots beside each other, two in a row.
+
+    Parameters
+    ----------
+    shots : Path
+        Folder of the screenshots.
+    crops : sequence of Crop
+        The parts, of one size.
+    width : int
+        Of the picture in pixels.
+
+    Returns
+    -------
+    PIL.Image.Image
+        The picture.
+    """
+    parts = [Image.open(shots / f"{crop.shot}.png").convert("RGB").crop(crop.box) for crop in crops]
+    columns = min(2, len(parts))
+    across = (width - _GAP * (columns - 1)) // columns
+    size = (across, round(across * parts[0].height / parts[0].width))
+    return sheet([parts[i : i + columns] for i in range(0, len(parts), columns)], size)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make the pictures.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Command line, sys.argv by default.
+
+    Returns
+    -------
+    int
+        0, or 2 if something is missing.
+    """
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    commands = parser.add_subparsers(dest="command", required=True)
+    objects = commands.add_parser("objects", help="five objects")
+    window = commands.add_parser("window", help="screenshots")
+    window.add_argument("shots", type=Path, help="folder of the window's test")
+    for command in (objects, window):
+        command.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
+    options = parser.parse_args(arguments)
+    try:
+        made = _objects(options.output) if options.command == "objects" else _window(options.shots)
+    except (InputError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    for name, picture in made.items():
+        picture.save(options.output / f"{name}.jpg", quality=_QUALITY, optimize=True)
+    return 0
+
+
+def _objects(folder: Path) -> dict[str, Image.Image]:
+    work = folder / "work"
+    work.mkdir(parents=True, exist_ok=True)
+    results = {name: result_of(name, work) for name in BODIES}
+    made = {"objects": objects_sheet(work, results)}
+    made["textures"] = textures_sheet(work, results["gourd"])
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    still_life([build(result).object for result in results.values()], stand)
+    render_picture(work / "still_life.png", (1000, 560), 2 * _SAMPLES)
+    return made | {"still_life": Image.open(work / "still_life.png").convert("RGB")}
+
+
+def _window(shots: Path) -> dict[str, Image.Image]:
+    return {
+        name: window_picture(shots, crops, _WIDTHS.get(name, _WIDTH))
+        for name, crops in WINDOW.items()
+    }
+
+
+if __name__ == "__main__":
+    sys.exit(main())
