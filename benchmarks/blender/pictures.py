@@ -3,10 +3,9 @@
   python -m benchmarks.blender.pictures objects -o FOLDER
   python -m benchmarks.blender.pictures window OUT -o FOLDER
 
-The first form photographs the bodies of `studio_photos`, finds their masks by a click in the
-middle, decomposes them and builds their objects by the users' commands; what is in FOLDER/work is
-kept. The second form crops the screenshots in OUT, the folder of `tests/addon/window_driver.py`,
-made with a photo of the first form.
+The first form photographs the bodies of `studio_photos`, draws their masks, and decomposes them by
+the users' command; what is in FOLDER/work is kept. The second form crops the screenshots in OUT,
+the folder of `tests/addon/window_driver.py` with a photo of the first form.
 
 Limits: the photo's camera looked down by some degrees; objects are tilted back by these, by hand as
 it were, to stand upright.
@@ -31,7 +30,7 @@ from isc_core.cli.main import main as isc
 from isc_core.errors import InputError
 
 from .still_life import still_life
-from .studio_photos import ABOVE, BODIES, photograph, render_picture, studio
+from .studio_photos import ABOVE, BODIES, draw_mask, photograph, render_picture, studio
 
 TURNS = (0, -45, 45, 180)  # degrees, about the vertical axis
 _SIDE, _GAP, _QUALITY = 190, 4, 82
@@ -92,23 +91,17 @@ def result_of(name: str, work: Path) -> Path:
     Raises
     ------
     InputError
-        If a command fails.
+        If the command fails.
     """
     photo, mask, result = work / f"{name}.png", work / f"{name}_mask.png", work / name
+    body = BODIES[name]
     if not photo.is_file():
-        photograph(BODIES[name], photo)
-    middle = ",".join(str(side // 2) for side in Image.open(photo).size)
-    steps = (
-        (mask, ["mask", str(photo), "--auto", "--point", middle, "-o", str(mask)]),
-        (
-            result / ARRAYS,
-            ["decompose", str(photo), "--mask", str(mask), "--max-size", _SIZE, "--arrays"]
-            + ["--quiet", "-o", str(result)],
-        ),
-    )
-    for made, command in steps:
-        if not made.is_file() and isc(command) != 0:
-            raise InputError(f"isc {command[0]} failed for {photo}")
+        photograph(body, photo)
+    if not mask.is_file():
+        draw_mask(body, mask)
+    command = ["decompose", str(photo), "--mask", str(mask), "--max-size", _SIZE, "--arrays"]
+    if not (result / ARRAYS).is_file() and isc([*command, "--quiet", "-o", str(result)]) != 0:
+        raise InputError(f"cannot decompose {photo}")
     return result
 
 
