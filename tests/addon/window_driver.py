@@ -36,6 +36,7 @@ def main(acc: Any) -> Iterator[float]:
     yield from export(acc)
     yield from second_run(acc, measured)
     yield from undo_and_redo(acc)
+    yield from import_result(acc, measured)
     yield from asset(acc)
     yield from box(acc, measured)
     bpy.context.scene.isc.separator = "none"
@@ -111,6 +112,7 @@ def export(acc: Any) -> Iterator[float]:
     with acc.context():
         bpy.ops.wm.call_menu(name="TOPBAR_MT_file_export")
     yield 3
+    yield acc.xdo("mousemove 396 424 sleep .3 mousemove 400 426", 3)  # glTF, the last one
     yield acc.shot("08_export")
     yield acc.xdo("key Escape", 2)
     material = bpy.data.objects[NAME].active_material
@@ -147,6 +149,20 @@ def undo_and_redo(acc: Any) -> Iterator[float]:
     for _ in range(3):
         yield keys(acc, "ctrl+shift+z", 2)
     acc.check(objects() == [NAME], "redo brings it back")
+
+
+def import_result(acc: Any, measured: list[str]) -> Iterator[float]:
+    """The folder of the result, as if selected in the file browser."""
+    folder = next(Path.home().rglob("arrays.npz")).parent
+    acc.view3d()[1].spaces.active.shading.type = "SOLID"
+    with acc.context():
+        bpy.ops.isc.read_result("INVOKE_DEFAULT", directory=str(folder))
+    acc.check(shown().state == "running", "an import goes on while the window is used")
+    yield from ended(60)
+    note(acc, measured, "imported")
+    acc.check(shown().state == "done" and objects() == [NAME], f"a result: {shown().message}")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    yield 5
 
 
 def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
@@ -273,7 +289,7 @@ def another_file(acc: Any) -> Iterator[float]:
     yield 5
     yield acc.shot("14_asset_browser")
     left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
-    goal = f"{left + width // 3} {top + height * 2 // 3}"
+    goal = f"{left + width * 2 // 5} {top + height * 3 // 5}"
     left, top, _, _ = acc.rect("FILE_BROWSER", "WINDOW")
     start = f"mousemove {left + 60} {top + 60} sleep .5 mousedown 1 sleep .5"
     way = f"mousemove_relative 30 -30 sleep .5 mousemove {goal} sleep 1.5"
@@ -282,6 +298,8 @@ def another_file(acc: Any) -> Iterator[float]:
     yield acc.xdo("mouseup 1", 3)
     acc.check(objects() == [NAME], f"the asset is in another file: {objects()}")
     acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    with acc.context():
+        bpy.ops.view3d.view_selected()
     yield _SHADERS
     yield acc.shot("15_another_file")
     bpy.ops.wm.save_as_mainfile(filepath=f"{acc.out}/another.blend")

@@ -141,8 +141,8 @@ def render(path: str) -> np.ndarray:
     picture = bpy.data.images.load(f"{path}.exr")
     pixels = np.empty(4 * SIZE * SIZE, np.float32)
     picture.pixels.foreach_get(pixels)
-    picture.file_format = "PNG"
-    picture.save(filepath=f"{path}.png")
+    image.file_format, image.color_depth = "PNG", "8"
+    picture.save_render(f"{path}.png", scene=scene)
     Path(f"{path}.exr").unlink()
     return pixels.reshape(SIZE, SIZE, 4)
 
