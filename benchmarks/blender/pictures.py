@@ -166,17 +166,33 @@ def objects_sheet(work: Path, results: Mapping[str, Path]) -> Image.Image:
     for name, result in results.items():
         row = [Image.open(work / f"{name}.png").convert("RGB")]
         for turn in TURNS:
-            bpy.ops.wm.read_factory_settings(use_empty=True)
-            obj = build(result).object
-            obj.matrix_world = Matrix.Rotation(np.radians(turn), 4, "Z") @ obj.matrix_world
-            stand(obj, Vector())
-            bpy.context.view_layer.update()
-            studio(Vector((0, 0, obj.dimensions.z / 2)))
             path = work / f"{name}_{turn}.png"
-            render_picture(path, (2 * _SIDE, 2 * _SIDE), _SAMPLES)
+            if not path.is_file():
+                render_turned(result, turn, path)
             row.append(Image.open(path).convert("RGB"))
         rows.append(row)
     return sheet(rows, (_SIDE, _SIDE))
+
+
+def render_turned(result: Path, turn: float, path: Path) -> None:
+    """Render an object in the studio of the photos. Blender's file is emptied first.
+
+    Parameters
+    ----------
+    result : Path
+        Its result folder.
+    turn : float
+        Degrees about the vertical axis.
+    path : Path
+        PNG file to write.
+    """
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    obj = build(result).object
+    obj.matrix_world = Matrix.Rotation(np.radians(turn), 4, "Z") @ obj.matrix_world
+    stand(obj, Vector())
+    bpy.context.view_layer.update()
+    studio(Vector((0, 0, obj.dimensions.z / 2)))
+    render_picture(path, (2 * _SIDE, 2 * _SIDE), _SAMPLES)
 
 
 def textures_sheet(work: Path, result: Path) -> Image.Image:
@@ -295,10 +311,12 @@ def _objects(folder: Path) -> dict[str, Image.Image]:
     results = {name: result_of(name, work) for name in BODIES}
     made = {"objects": objects_sheet(work, results)}
     made["textures"] = textures_sheet(work, results["gourd"])
-    bpy.ops.wm.read_factory_settings(use_empty=True)
-    still_life([build(result).object for result in results.values()], stand)
-    render_picture(work / "still_life.png", (1000, 560), 2 * _SAMPLES)
-    return made | {"still_life": Image.open(work / "still_life.png").convert("RGB")}
+    whole = work / "still_life.png"
+    if not whole.is_file():
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        still_life([build(result).object for result in results.values()], stand)
+        render_picture(whole, (1000, 560), 2 * _SAMPLES)
+    return made | {"still_life": Image.open(whole).convert("RGB")}
 
 
 def _window(shots: Path) -> dict[str, Image.Image]:

@@ -22,9 +22,9 @@ _PLACES = (
 )
 _BOOK = 0.28  # thickness
 _LAMPS = (
-    ((4.6, -2.6, 2.2), 1.0, 420.0, (1.0, 0.78, 0.55)),
+    ((4.6, -2.6, 2.2), 1.0, 600.0, (1.0, 0.78, 0.55)),
     ((-4.5, 2.0, 4.0), 2.5, 160.0, (0.55, 0.72, 1.0)),
-    ((-3.0, -5.0, 3.0), 2.0, 60.0, (1.0, 1.0, 1.0)),
+    ((-3.0, -5.0, 3.0), 2.0, 110.0, (1.0, 1.0, 1.0)),
 )
 
 
@@ -46,7 +46,7 @@ def still_life(
         stand(obj, Vector((x, y, 0)))
     objects[2].location.z += 2 * _BOOK
     _add_books(Vector((1.8, 1.05, 0)))
-    _add_ball(Vector((0.45, -1.35, 0.38)), 0.38)
+    _add_ball(Vector((0.62, -1.6, 0.32)), 0.32)
     _add_candle(Vector((3.05, -0.1, 0)))
     middle = Vector((0.1, 0, 0.95))
     for place, size, watts, color in _LAMPS:
@@ -92,6 +92,6 @@ def _add_candle(place: Vector) -> None:
     fire.scale.z = 2.0
     glow = new_material("flame", (1, 0.6, 0.2), 0.5)
     surface = glow.node_tree.nodes["Principled BSDF"].inputs
-    surface["Emission Color"].default_value = (1, 0.55, 0.18, 1)
-    surface["Emission Strength"].default_value = 25
+    surface["Emission Color"].default_value = (1, 0.42, 0.08, 1)
+    surface["Emission Strength"].default_value = 5
     fire.data.materials.append(glow)
