@@ -55,22 +55,37 @@ class Crop:
     box: tuple[int, int, int, int]
 
 
-_VIEW, _PANEL, _ALL = (2, 28, 764, 718), (764, 82, 1050, 520), (0, 0, 1280, 722)
-WINDOW: Mapping[str, tuple[Crop, ...]] = {
-    "window_rendered": (Crop("05_created", _ALL),),
-    "window_mask": (Crop("03_mask", _PANEL), Crop("04_running", _PANEL)),
-    "window_edits": (
-        Crop("06_orbit", _VIEW),
-        Crop("07_lamp_0", _VIEW),
-        Crop("07_lamp_1", _VIEW),
-        Crop("08_recolored", _VIEW),
+@dataclass(frozen=True)
+class WindowPicture:
+    """Parts of screenshots beside each other.
+
+    Attributes
+    ----------
+    crops : tuple of Crop
+        The parts, of one size.
+    columns : int
+        How many in a row.
+    width : int
+        Of the picture in pixels.
+    """
+
+    crops: tuple[Crop, ...]
+    columns: int
+    width: int
+
+
+_PANEL, _OBJECT, _FLOOR = (764, 82, 1050, 520), (370, 90, 740, 640), (2, 55, 702, 700)
+_EDITS = ("06_orbit", "07_lamp_0", "07_lamp_1", "08_recolored")
+WINDOW: Mapping[str, WindowPicture] = {
+    "window_rendered": WindowPicture((Crop("05_created", (0, 0, 1280, 722)),), 1, 1200),
+    "window_mask": WindowPicture((Crop("03_mask", _PANEL), Crop("04_running", _PANEL)), 2, 600),
+    "window_edits": WindowPicture(tuple(Crop(shot, _OBJECT) for shot in _EDITS), 4, 1000),
+    "window_export": WindowPicture((Crop("08_export", (230, 100, 764, 460)),), 1, 480),
+    "window_asset": WindowPicture(
+        (Crop("14_asset_dragged", _FLOOR), Crop("15_another_file", _FLOOR)), 2, 1000
     ),
-    "window_export": (Crop("08_export", (0, 0, 764, 500)),),
-    "window_asset": (Crop("14_asset_dragged", _ALL), Crop("15_another_file", _ALL)),
-    "mask_box": (Crop("10_box", (2, 28, 1050, 718)),),
+    "mask_box": WindowPicture((Crop("10_box", (2, 28, 1050, 718)),), 1, 735),
 }
-_WIDTHS = {"window_rendered": 1280, "mask_box": 735, "window_export": 620, "window_mask": 600}
-_WIDTH = 1000  # of the others
 
 
 def result_of(name: str, work: Path) -> Path:
@@ -250,28 +265,28 @@ def sheet(rows: Sequence[Sequence[Image.Image]], size: tuple[int, int]) -> Image
     return made
 
 
-def window_picture(shots: Path, crops: Sequence[Crop], width: int) -> Image.Image:
-    """Return parts of screenshots beside each other, two in a row.
+def window_picture(shots: Path, what: WindowPicture) -> Image.Image:
+    """Return a picture of the window.
 
     Parameters
     ----------
     shots : Path
         Folder of the screenshots.
-    crops : sequence of Crop
-        The parts, of one size.
-    width : int
-        Of the picture in pixels.
+    what : WindowPicture
+        Its parts.
 
     Returns
     -------
     PIL.Image.Image
         The picture.
     """
-    parts = [Image.open(shots / f"{crop.shot}.png").convert("RGB").crop(crop.box) for crop in crops]
-    columns = min(2, len(parts))
-    across = (width - _GAP * (columns - 1)) // columns
+    parts = [
+        Image.open(shots / f"{crop.shot}.png").convert("RGB").crop(crop.box) for crop in what.crops
+    ]
+    across = (what.width - _GAP * (what.columns - 1)) // what.columns
     size = (across, round(across * parts[0].height / parts[0].width))
-    return sheet([parts[i : i + columns] for i in range(0, len(parts), columns)], size)
+    rows = range(0, len(parts), what.columns)
+    return sheet([parts[first : first + what.columns] for first in rows], size)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -320,10 +335,7 @@ def _objects(folder: Path) -> dict[str, Image.Image]:
 
 
 def _window(shots: Path) -> dict[str, Image.Image]:
-    return {
-        name: window_picture(shots, crops, _WIDTHS.get(name, _WIDTH))
-        for name, crops in WINDOW.items()
-    }
+    return {name: window_picture(shots, what) for name, what in WINDOW.items()}
 
 
 if __name__ == "__main__":

@@ -93,7 +93,7 @@ def look_around(acc: Any) -> Iterator[float]:
     for _ in range(2):
         yield keys(acc, "KP_6", 1)
     obj, lamp = bpy.data.objects[NAME], bpy.data.objects["Light"]
-    view.shading.use_scene_lights = True
+    view.shading.use_scene_lights = view.shading.use_scene_world = True
     yield _SHADERS
     for number, side in enumerate((-1.5, 1.5)):
         lamp.location = (obj.location.x + side, obj.location.y - 2, obj.location.z + 1.5)
@@ -191,8 +191,8 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
     side = 0.45 * min(width, height)
     x, y = (left + acc.rect("VIEW_3D", "UI")[0]) / 2, top + height / 2
     start, end = (
-        (int(x - side * 0.8), int(y - side * 0.8)),
-        (int(x + side * 0.8), int(y + side * 0.8)),
+        (int(x - side * 0.6), int(y - side)),
+        (int(x + side * 0.6), int(y + side)),
     )
     drag = (
         f"mousemove {start[0]} {start[1]} sleep 1 mousedown 1 sleep 1 mousemove {end[0]} {end[1]}"
