@@ -4,8 +4,9 @@
   python -m benchmarks.blender.pictures window OUT -o FOLDER
 
 The first form photographs the bodies of `studio_photos`, draws their masks, and decomposes them by
-the users' command; what is in FOLDER/work is kept. The second form crops the screenshots in OUT,
-the folder of `tests/addon/window_driver.py` with a photo of the first form.
+the users' command with the model mdr, which takes every highlight that colour shows; what is in
+FOLDER/work is kept. The second form crops the screenshots in OUT, the folder of
+`tests/addon/window_driver.py` with a photo of the first form.
 
 Limits: the photo's camera looked down by some degrees; objects are tilted back by these, by hand as
 it were, to stand upright.
@@ -114,9 +115,10 @@ def result_of(name: str, work: Path) -> Path:
         photograph(body, photo)
     if not mask.is_file():
         draw_mask(body, mask)
-    command = ["decompose", str(photo), "--mask", str(mask), "--max-size", _SIZE, "--arrays"]
-    if not (result / ARRAYS).is_file() and isc([*command, "--quiet", "-o", str(result)]) != 0:
-        raise InputError(f"cannot decompose {photo}")
+    if not (result / ARRAYS).is_file():
+        command = ["decompose", str(photo), "--mask", str(mask), "--max-size", _SIZE]
+        if isc([*command, "--model", "mdr", "--arrays", "--quiet", "-o", str(result)]) != 0:
+            raise InputError(f"cannot decompose {photo}")
     return result
 
 
@@ -236,7 +238,8 @@ def textures_sheet(work: Path, result: Path) -> Image.Image:
     strip = sheet([pictures], (160, round(160 * height / width)))
     draw = ImageDraw.Draw(strip)
     for number, name in enumerate(_TEXTURES):
-        draw.text((number * (160 + _GAP) + 6, 4), name, fill="white", stroke_width=1)
+        place = (number * (160 + _GAP) + 6, 4)
+        draw.text(place, name, fill="white", stroke_width=1, stroke_fill="black")
     return strip
 
 
