@@ -75,7 +75,7 @@ class WindowPicture:
     width: int
 
 
-_PANEL, _OBJECT, _FLOOR = (764, 82, 1050, 520), (370, 90, 740, 640), (2, 55, 702, 700)
+_PANEL, _OBJECT, _FLOOR = (764, 82, 1050, 520), (370, 90, 740, 640), (150, 55, 850, 700)
 _EDITS = ("06_orbit", "07_lamp_0", "07_lamp_1", "08_recolored")
 WINDOW: Mapping[str, WindowPicture] = {
     "window_rendered": WindowPicture((Crop("05_created", (0, 0, 1280, 722)),), 1, 1200),

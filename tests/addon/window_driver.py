@@ -84,7 +84,7 @@ def create(acc: Any, measured: list[str]) -> Iterator[float]:
 
 
 def look_around(acc: Any) -> Iterator[float]:
-    """Orbit, move the lamp, recolor."""
+    """Orbit, gloss, move the lamp, recolor."""
     view = acc.view3d()[1].spaces.active
     for _ in range(2):
         yield keys(acc, "KP_4", 1)
@@ -95,9 +95,11 @@ def look_around(acc: Any) -> Iterator[float]:
     obj, lamp = bpy.data.objects[NAME], bpy.data.objects["Light"]
     view.shading.use_scene_lights = view.shading.use_scene_world = True
     yield _SHADERS
-    for number, side in enumerate((-1.5, 1.5)):
-        lamp.location = (obj.location.x + side, obj.location.y - 2, obj.location.z + 1.5)
-        lamp.data.energy = 200
+    edits = material_inputs()
+    edits["Specular Level"].default_value, edits["Roughness"].default_value = 1.0, 0.25
+    lamp.data.energy = 500
+    for number, side in enumerate((-0.8, 2.5)):  # the cube would throw its shadow from further left
+        lamp.location = (obj.location.x + side, obj.location.y - 3.5, obj.location.z + 1.5)
         yield 8
         yield acc.shot(f"07_lamp_{number}")
     with acc.context():
@@ -115,10 +117,8 @@ def export(acc: Any) -> Iterator[float]:
     yield acc.xdo("mousemove 396 424 sleep .3 mousemove 400 426", 3)  # glTF, the last one
     yield acc.shot("08_export")
     yield acc.xdo("key Escape", 2)
-    material = bpy.data.objects[NAME].active_material
-    edits = material.node_tree.nodes["ISC Dichromatic"].inputs
     with acc.context():
-        edits["Value"].default_value = 0.8
+        material_inputs()["Value"].default_value = 0.8
         done = bpy.ops.export_scene.gltf(filepath=f"{acc.out}/{NAME}.glb", use_selection=True)
         acc.check(done == {"FINISHED"}, "glTF is exported")
         if bpy.app.build_options.usd:  # Debian's Blender is built without
@@ -191,8 +191,8 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
     side = 0.45 * min(width, height)
     x, y = (left + acc.rect("VIEW_3D", "UI")[0]) / 2, top + height / 2
     start, end = (
-        (int(x - side * 0.6), int(y - side)),
-        (int(x + side * 0.6), int(y + side)),
+        (int(x - side * 0.6), int(y - side * 0.94)),
+        (int(x + side * 0.6), int(y + side * 0.94)),
     )
     drag = (
         f"mousemove {start[0]} {start[1]} sleep 1 mousedown 1 sleep 1 mousemove {end[0]} {end[1]}"
@@ -365,6 +365,11 @@ def shown() -> Any:
 def objects() -> list[str]:
     """Meshes that the extension made."""
     return [thing.name for thing in bpy.data.objects if thing.type == "MESH" and "isc_key" in thing]
+
+
+def material_inputs() -> Any:
+    """What *Edit Object* shows."""
+    return bpy.data.objects[NAME].active_material.node_tree.nodes["ISC Dichromatic"].inputs
 
 
 def workers() -> list[int]:
