@@ -36,7 +36,8 @@ from .studio_photos import ABOVE, BODIES, draw_mask, photograph, render_picture,
 TURNS = (0, -45, 45, 180)  # degrees, about the vertical axis
 _SIDE, _GAP, _QUALITY = 190, 4, 82
 _BODY_SIZE = 2.0  # of the longer side, as the bodies have
-_TEXTURES = ("basecolor", "normal", "roughness", "specular", "height", "ao")
+_TEXTURES = ("basecolor", "normal", "height", "roughness", "specular")
+_FEW_TRIANGLES = 1500  # as in a game: the normal map holds what the mesh does not
 _SIZE, _SAMPLES = "512", 16
 
 
@@ -122,13 +123,15 @@ def result_of(name: str, work: Path) -> Path:
     return result
 
 
-def build(result: Path) -> BuiltObject:
+def build(result: Path, triangles: int = 50_000) -> BuiltObject:
     """Build an object into the current scene, upright on the table as its body was.
 
     Parameters
     ----------
     result : Path
         Its result folder.
+    triangles : int, optional
+        As of `BuildOptions`.
 
     Returns
     -------
@@ -136,7 +139,11 @@ def build(result: Path) -> BuiltObject:
         The object.
     """
     options = BuildOptions(
-        size_metres=_BODY_SIZE, own_scene=False, light_and_camera=False, back="rounded"
+        size_metres=_BODY_SIZE,
+        own_scene=False,
+        light_and_camera=False,
+        back="rounded",
+        triangles=triangles,
     )
     built = build_object(read_result(result), options)
     obj = built.object
@@ -213,7 +220,7 @@ def render_turned(result: Path, turn: float, path: Path) -> None:
 
 
 def textures_sheet(work: Path, result: Path) -> Image.Image:
-    """Return a strip of the textures that *Export Texture Set* writes.
+    """Return a strip of textures that *Export Texture Set* writes.
 
     Parameters
     ----------
@@ -228,7 +235,7 @@ def textures_sheet(work: Path, result: Path) -> Image.Image:
         The strip.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    built = build(result)
+    built = build(result, _FEW_TRIANGLES)
     folder = work / "textures"
     folder.mkdir(exist_ok=True)
     write_texture_set(built, folder, "gourd", "generic", "PNG8", green_down=False)

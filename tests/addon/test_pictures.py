@@ -28,6 +28,7 @@ def test_a_leaning_body_stands_upright(angles: tuple[float, float]) -> None:
     assert upright(leaning).vertices[np.argmax(gourd(60, 61).vertices[:, 1]), 1] > 0.9, "top up"
 
 
+@pytest.mark.slow
 def test_bodies_rest_on_the_table(blender: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(studio_photos, "_TEXELS", 64)
     for body in BODIES.values():
