@@ -34,7 +34,7 @@ from .still_life import still_life
 from .studio_photos import ABOVE, BODIES, draw_mask, photograph, render_picture, studio
 
 TURNS = (0, -45, 45, 180)  # degrees, about the vertical axis
-_SIDE, _GAP, _QUALITY = 190, 4, 82
+_SIDE, _GAP, _QUALITY = 190, 4, 75
 _BODY_SIZE = 2.0  # of the longer side, as the bodies have
 _TEXTURES = ("basecolor", "normal", "height", "roughness", "specular")
 _FEW_TRIANGLES = 1500  # as in a game: the normal map holds what the mesh does not
