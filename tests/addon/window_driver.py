@@ -287,6 +287,9 @@ def another_file(acc: Any) -> Iterator[float]:
     shelf.asset_library_reference = libraries[-1].name
     shelf.filter_asset_id.filter_material = False
     yield 5
+    region = next(region for region in browser.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(area=browser, region=region):
+        acc.check(not bpy.ops.asset.catalogs_save.poll(), "no catalog waits to be saved")
     yield acc.shot("14_asset_browser")
     left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
     goal = f"{left + width * 2 // 5} {top + height * 3 // 5}"
