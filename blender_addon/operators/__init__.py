@@ -23,8 +23,8 @@ from .photo_points import (
 )
 from .result import (
     ISC_OT_build_result,
-    ISC_OT_complete_result,
     ISC_OT_import_result,
+    ISC_OT_read_result,
     ISC_OT_return_to_scene,
 )
 
@@ -47,7 +47,7 @@ CLASSES = (
     ISC_OT_clear_highlights,
     ISC_OT_build_result,
     ISC_OT_import_result,
-    ISC_OT_complete_result,
+    ISC_OT_read_result,
     ISC_OT_return_to_scene,
     ISC_OT_save_asset,
     ISC_OT_recolour,

@@ -57,6 +57,22 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
     return message
 
 
+def error_line(error: RuntimeError) -> str:
+    """Return what an operator that was called from Python has reported.
+
+    Parameters
+    ----------
+    error : RuntimeError
+        As Blender raises it.
+
+    Returns
+    -------
+    str
+        Its first line, without "Error: ".
+    """
+    return str(error).strip().splitlines()[0].removeprefix("Error: ")
+
+
 def is_about_mask(message: str) -> bool:
     """Return whether a message advises to make a mask.
 

@@ -12,7 +12,7 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..datablocks.staging import completed
-from ..files.result_arrays import ARRAYS, DESCRIPTION, read_result
+from ..files.result_arrays import DESCRIPTION, read_result
 from ..scene.build import (
     BuiltObject,
     StagedObject,
@@ -23,6 +23,7 @@ from ..scene.build import (
 )
 from ..scene.preparation import prepare
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
+from .messages import error_line
 from .modal import WorkerOperator
 from .request import (
     DecomposeRequest,
@@ -31,9 +32,9 @@ from .request import (
     request_from_json,
     store_request,
 )
-from .run_steps import arrays_steps
+from .run_steps import import_steps
 from .viewport import activate, show, started_in
-from .worker_run import ImportSteps, RunOutput, WorkerRun, require_no_active_run
+from .worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder, require_no_active_run
 
 # Objects whose datablocks are made, until they are placed: operators take plain values only.
 _staged: dict[str, StagedObject] = {}
@@ -80,7 +81,7 @@ def build_in_steps(
         # From Python, an operator pushes an undo step only if told to.
         bpy.ops.isc.build_result("EXEC_DEFAULT", True, directory=folder, request=request.to_json())
     except RuntimeError as error:
-        raise InputError(str(error).strip().splitlines()[0].removeprefix("Error: ")) from error
+        raise InputError(error_line(error)) from error
     finally:
         _staged.pop(folder).blocks.discard()
     built = find_built(bpy.context.object)
@@ -178,6 +179,7 @@ class ISC_OT_import_result(bpy.types.Operator):
         name="Folder", description="Result folder of isc decompose", subtype="DIR_PATH"
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
+    _selected = False  # in the file browser
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser.
@@ -195,46 +197,45 @@ class ISC_OT_import_result(bpy.types.Operator):
             {"RUNNING_MODAL"}; Blender calls `execute` once a folder is selected.
         """
         del event
+        self._selected = True
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Build the object; a worker first adds missing arrays.
+        """Build the object.
 
         Parameters
         ----------
         context : bpy.types.Context
-            Blender's context.
+            Blender's context; not used.
 
         Returns
         -------
         set of str
-            {"FINISHED"}, or {"CANCELLED"} after an error has been reported; the result of
-            `ISC_OT_complete_result` where arrays are missing.
+            As of `ISC_OT_read_result`, which runs in the background if the folder was selected in
+            the file browser; {"CANCELLED"} after an error has been reported.
         """
+        del context
         folder = Path(bpy.path.abspath(self.directory))
         if not self.directory or not (folder / DESCRIPTION).is_file():
             self.report(
                 {"ERROR"}, f"{folder} is no result: select a folder that isc decompose has written"
             )
             return {"CANCELLED"}
-        if not (folder / ARRAYS).is_file():
-            return set(bpy.ops.isc.complete_result("INVOKE_DEFAULT", directory=str(folder)))
         try:
-            view = started_in(context)
-            self.report({"INFO"}, build_as_undo_step(context, RunOutput(folder), view=view))
-        except InputError as error:
-            self.report({"ERROR"}, str(error))
+            how = "INVOKE_DEFAULT" if self._selected else "EXEC_DEFAULT"
+            return set(bpy.ops.isc.read_result(how, directory=str(folder)))
+        except RuntimeError as error:
+            self.report({"ERROR"}, error_line(error))
             return {"CANCELLED"}
-        return {"FINISHED"}
 
 
-class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
-    """Add the arrays that Blender reads to a result folder, then build its object."""
+class ISC_OT_read_result(WorkerOperator, bpy.types.Operator):
+    """Read a result folder, and build its object."""
 
-    bl_idname = "isc.complete_result"
-    bl_label = "Complete Result"
-    bl_description = "Add arrays.npz to a result folder without it, and build its object"
+    bl_idname = "isc.read_result"
+    bl_label = "Read Result"
+    bl_description = "Read a result folder and build its object, in the background"
     bl_options = {"INTERNAL"}
 
     directory: StringProperty(name="Folder", description="Result folder", subtype="DIR_PATH")
@@ -260,13 +261,16 @@ class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
         require_no_active_run()
         folder = Path(self.directory)
         environment = worker_environment(read_preferences(context))
-        view = started_in(context)
-        return WorkerRun(
-            f"Import {folder.name}",
-            arrays_steps(folder, environment),
-            lambda context, output: build_in_steps(context, output, view=view),
-            create_run_folder(None, "import"),
-        )
+        view, request = started_in(context), _panel_request(context.scene)
+        own = create_run_folder(None, "import")
+
+        def finish(context: Any, output: RunOutput) -> ImportSteps:
+            message = yield from build_in_steps(context, output, request, view)
+            remove_folder(own)
+            return message
+
+        steps = import_steps(folder, request.build, environment)
+        return WorkerRun(f"Import {folder.name}", steps, finish, own)
 
 
 class ISC_OT_return_to_scene(bpy.types.Operator):

@@ -1,5 +1,5 @@
-"""The work of each kind of run, as steps for `WorkerRun`: decompose a photo, segment a mask, add
-the arrays of a result.
+"""The work of each kind of run, as steps for `WorkerRun`: decompose a photo, segment a mask, read
+a result.
 """
 
 import shutil
@@ -133,8 +133,7 @@ def decompose_steps(
         if exported is not None and exported.parent == folder:
             exported.unlink(missing_ok=True)
     result = prepared.result.folder
-    notes = tuple(translate_message(note, {}) for note in result_notes(result))
-    return RunOutput(result, notes, prepared)
+    return RunOutput(result, _notes(result), prepared)
 
 
 def _cached_result(
@@ -274,24 +273,32 @@ def _mask_steps(
     return RunOutput(mask)
 
 
-def arrays_steps(result: Path, environment: WorkerEnvironment) -> RunSteps:
-    """Add the arrays that Blender reads to a result folder without them.
+def import_steps(result: Path, build: BuildOptions, environment: WorkerEnvironment) -> RunSteps:
+    """Read a result folder; a worker first adds the arrays that Blender reads where it has none.
 
     Parameters
     ----------
     result : Path
         Result folder.
+    build : BuildOptions
+        What will be built of it.
     environment : WorkerEnvironment
         What the worker runs with.
 
     Returns
     -------
     RunOutput
-        The result folder.
+        The result folder, and what is built of it.
     """
     if not (result / ARRAYS).is_file():
         yield from _run_worker(lambda: start_arrays(result, environment), {})
-    return RunOutput(result)
+    arrays = yield from _in_thread(partial(read_result, result), _READING)
+    prepared = yield from _in_thread(partial(prepare, arrays, build, with_photo=True), _READING)
+    return RunOutput(result, _notes(result), prepared)
+
+
+def _notes(result: Path) -> tuple[str, ...]:
+    return tuple(translate_message(note, {}) for note in result_notes(result))
 
 
 def result_notes(result: Path) -> list[str]:

@@ -20,7 +20,9 @@ from ..datablocks.provenance import require_local
 from .build import BuiltObject
 from .collection import use_standard_view
 
-CATALOG, CATALOG_PATH = "5d1b3c5e-6a0f-4b57-9d0b-1c5a3f0e8a11", "ISC/Photo Objects"
+CATALOG = "5d1b3c5e-6a0f-4b57-9d0b-1c5a3f0e8a11"
+# Blender adds a parent that is missing in the file, and then asks to save its catalogs.
+CATALOG_PATHS = {"0b4f7a52-3c1d-4e57-8f60-9a2c6d1e7b34": "ISC", CATALOG: "ISC/Photo Objects"}
 _CATALOGS = "blender_assets.cats.txt"
 _HEADER = (
     "# This is an Asset Catalog Definition file for Blender.\n"
@@ -68,11 +70,9 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
         _mark(block)
     _set_preview(built)
     _pack_images(built.object)
-    if CATALOG not in catalogs:
+    if entries := _missing_entries(catalogs):
         with new_file(library / _CATALOGS) as partial:
-            name = CATALOG_PATH.replace("/", "-")
-            entry = f"{CATALOG}:{CATALOG_PATH}:{name}\n"
-            partial.write_text((catalogs or _HEADER) + entry, encoding="utf-8")
+            partial.write_text((catalogs or _HEADER) + entries, encoding="utf-8")
     with new_file(path) as partial:
         blocks = {built.object, built.material}
         bpy.data.libraries.write(str(partial), blocks, fake_user=True, compress=True)
@@ -94,6 +94,15 @@ def _read_catalogs(library: Path) -> str:
         text = (library / _CATALOGS).read_text(encoding="utf-8")
         return text if text.endswith("\n") else text + "\n"
     return ""
+
+
+def _missing_entries(catalogs: str) -> str:
+    """Lines of the catalogs that a library lacks; its user may have a parent of that path."""
+    return "".join(
+        f"{number}:{path}:{path.replace('/', '-')}\n"
+        for number, path in CATALOG_PATHS.items()
+        if number not in catalogs and (number == CATALOG or f":{path}:" not in catalogs)
+    )
 
 
 def _mark(block: Any) -> None:

@@ -29,6 +29,9 @@ from .photo_highlights import show_highlights
 
 SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")
+# Values of the fit, the user's where they are no longer what the material stores of the fit.
+_FITTED = ("Specular Level", "Roughness")
+_FIT = "isc_fitted_gloss"
 
 
 @dataclass(frozen=True)
@@ -106,12 +109,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         # The photo's highlights emit no light: rays toward them would only add noise.
         material.cycles.emission_sampling = "NONE"
     group = _add_surface(tree, maps, with_variation=specular.source != "none")
-    for name, value in kept.items():
-        group.inputs[name].default_value = value
-    level = specular.level if specular.source != "none" else 0.0
-    group.inputs["Specular Level"].default_value = level
-    group.inputs["Roughness"].default_value = specular.roughness
-    group.inputs["Specular Share"].default_value = specular.share
+    _set_values(material, group, specular, kept)
     if maps.specular is not None:
         material["isc_highlights"] = maps.specular
     if specular.source == "image":
@@ -162,7 +160,30 @@ def _edited_values(material: bpy.types.Material) -> dict[str, float]:
     node = dichromatic_node(material)
     if node is None:
         return {}
-    return {name: node.inputs[name].default_value for name in _EDITED if name in node.inputs}
+    names = [name for name in _EDITED if name in node.inputs]
+    if _FIT in material:
+        fit = zip(_FITTED, material[_FIT], strict=True)
+        names += [name for name, value in fit if node.inputs[name].default_value != value]
+    return {name: node.inputs[name].default_value for name in names}
+
+
+def _set_values(
+    material: bpy.types.Material,
+    group: bpy.types.Node,
+    specular: SpecularSettings,
+    kept: dict[str, float],
+) -> None:
+    """Set the values of the fit, then those of the user; without highlights there is no level."""
+    inputs, matte = group.inputs, specular.source == "none"
+    for name, value in zip(_FITTED, (specular.level, specular.roughness), strict=True):
+        inputs[name].default_value = value
+    if matte:
+        inputs["Specular Level"].default_value = 0.0
+    material[_FIT] = [inputs[name].default_value for name in _FITTED]
+    inputs["Specular Share"].default_value = specular.share
+    for name, value in kept.items():
+        if not (matte and name == "Specular Level"):
+            inputs[name].default_value = value
 
 
 def _add_surface(

@@ -47,8 +47,9 @@ def test_an_asset_can_be_appended_elsewhere(addon: Any, built: BuiltObject, tmp_
     files = sorted(path.name for path in (tmp_path / "assets").iterdir())
     assert files == ["blender_assets.cats.txt", "bump-2.blend", "bump.blend"]
     catalogs = (tmp_path / "assets" / files[0]).read_text().splitlines()
-    assert catalogs[2] == "abc:Mine:Mine" and len(catalogs) == 4
-    assert catalogs[3] == f"{CATALOG}:ISC/Photo Objects:ISC-Photo Objects"
+    assert catalogs[2] == "abc:Mine:Mine" and len(catalogs) == 5
+    assert catalogs[3].endswith(":ISC:ISC"), "a parent that is missing is an unsaved change"
+    assert catalogs[4] == f"{CATALOG}:ISC/Photo Objects:ISC-Photo Objects"
     picture = pixels_of(built.object.preview)
     alpha = picture[..., 3]
     assert 0.3 < (alpha > 0.5).mean() < 0.9 and alpha[0, 0] == 0, "the object alone"

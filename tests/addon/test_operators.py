@@ -3,7 +3,10 @@
 import importlib.util
 import json
 import shutil
+import threading
+import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,15 +16,17 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import operators  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
+from blender_addon.operators import run_steps, worker_run  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
 from blender_addon.operators.mask import box_from_corners  # noqa: E402
 from blender_addon.operators.messages import join_notes, translate_message  # noqa: E402
 from blender_addon.operators.photo_canvas import point_at  # noqa: E402
 from blender_addon.operators.request import parse_points, request_from_settings  # noqa: E402
+from blender_addon.operators.result import ISC_OT_read_result  # noqa: E402
 from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
 from blender_addon.panels import wrap_text  # noqa: E402
 from blender_addon.scene.build import find_built  # noqa: E402
-from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.decomposition.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
@@ -441,6 +446,57 @@ def test_missing_arrays_are_added_to_a_folder(addon: Any, tmp_path: Path) -> Non
     assert (
         find_built(addon.context.object) is not None and (tmp_path / "cup" / "arrays.npz").is_file()
     )
+
+
+def imported_until(addon: Any, folder: Path, ready: bool) -> WorkerRun:
+    """An import from the file browser that has begun, until it is ready or one step further."""
+    operator = SimpleNamespace(directory=str(folder))
+    run = begin_run(ISC_OT_read_result.prepare(operator, addon.context))  # type: ignore[arg-type]
+    while run.step().state == "running":
+        time.sleep(0.01)
+    if not ready:
+        run.import_result(addon.context)
+    return run
+
+
+@pytest.mark.parametrize("ready", [True, False])
+def test_a_cancelled_import_leaves_nothing(
+    addon: Any, bump_folder: Path, ready: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(worker_run, "IMPORT_SECONDS", 0.0)  # one step at a time
+    before = census(addon)
+    run = imported_until(addon, bump_folder, ready)
+    assert run.status.state == "ready" and (ready or census(addon) != before)
+    run.cancel()
+    assert run.status.state == "cancelled" and census(addon) == before
+    assert not run.folder.exists() and (bump_folder / "arrays.npz").is_file()
+
+
+def test_an_import_prepares_in_a_thread_what_the_panel_said(
+    addon: Any, bump_folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = []
+
+    def noted(*arguments: Any, **options: Any) -> Any:
+        threads.append(threading.current_thread())
+        return prepare(*arguments, **options)
+
+    monkeypatch.setattr(run_steps, "prepare", noted)
+    addon.context.scene.isc.size_metres = 0.3
+    run = imported_until(addon, bump_folder, True)
+    addon.context.scene.isc.size_metres = 0.7  # for the next one
+    while not run.ended:
+        run.import_result(addon.context)
+    assert threads and threading.main_thread() not in threads
+    assert max(addon.context.object.dimensions) == pytest.approx(0.3, rel=0.02)
+    assert run.status.message.startswith("bump created") and not run.folder.exists()
+
+
+def test_an_import_waits_for_the_run_that_is_active(addon: Any, bump_folder: Path) -> None:
+    run = imported_until(addon, bump_folder, True)
+    message = error_of(addon.ops.isc.import_result, directory=str(bump_folder))
+    assert message == "Import bump is running: wait for it, or cancel it first"
+    run.cancel()
 
 
 def test_a_folder_without_a_result_is_refused(

@@ -379,7 +379,29 @@ def test_edited_values_are_kept(blender: Any, result: ResultArrays) -> None:
         node.inputs[name].default_value
         for name in ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Roughness")
     ]
-    assert kept == pytest.approx([0.7, 2.5, 0.2, 1.3, 0.9, 0.3])
+    assert kept == pytest.approx([0.7, 2.5, 0.2, 1.3, 0.9, 0.9])
+
+
+def gloss_of(built: Any) -> list[float]:
+    return [
+        group_node(built).inputs[name].default_value for name in ("Specular Level", "Roughness")
+    ]
+
+
+def test_gloss_is_that_of_the_fit_until_it_is_set_by_hand(
+    blender: Any, result: ResultArrays
+) -> None:
+    first, second = (
+        replace(result, specular_level=level, roughness=roughness)
+        for level, roughness in ((0.6, 0.4), (1.2, 0.3))
+    )
+    assert gloss_of(build(first)) == pytest.approx([0.6, 0.4])
+    built = build(second)
+    assert gloss_of(built) == pytest.approx([1.2, 0.3]), "a new fit"
+    group_node(built).inputs["Specular Level"].default_value = 2.0
+    assert gloss_of(build(first)) == pytest.approx([2.0, 0.4]), "the level is the user's"
+    assert gloss_of(build(first, specular_from="none")) == pytest.approx([0.0, 0.4])
+    assert gloss_of(build(first)) == pytest.approx([0.6, 0.4]), "chosen anew"
 
 
 def test_the_group_is_shared_and_other_versions_are_not_changed(

@@ -1,12 +1,13 @@
 """Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
-automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color, a
-second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a run, a new
-scene.
+automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color,
+glTF and USD, a second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a
+run, a new scene, the asset dragged into another file.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
     blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
     PHOTOS/photo.png --size 1280x800 \\
-        --timeout 600 --driver tests/addon/window_driver.py --out OUT
+        --timeout 700 --driver tests/addon/window_driver.py --out OUT
+then `window_reopened.py` looks at what this has written.
 `acc` is that script's helper: `find` moves the mouse until the button under it runs the operator,
 `shot` saves the screen, a number that is yielded is waited for. Exit code 1 where a check fails;
 OUT/measured.txt holds the longest calls.
@@ -32,16 +33,21 @@ def main(acc: Any) -> Iterator[float]:
     yield from mask(acc, measured)
     yield from create(acc, measured)
     yield from look_around(acc)
+    yield from export(acc)
     yield from second_run(acc, measured)
     yield from undo_and_redo(acc)
+    yield from import_result(acc, measured)
     yield from asset(acc)
     yield from box(acc, measured)
-    bpy.context.scene.isc.separator = "none"
+    settings = bpy.context.scene.isc
+    settings.separator, settings.max_size = "none", 2048  # nothing in the cache; time to press
     yield from cancel(acc, measured, "Esc", escape)
     yield from cancel(acc, measured, "Cancel", press_cancel)
+    settings.max_size = 512
     yield from load_during_a_run(acc, measured)
     yield from load_while_drawing(acc)
     yield from new_scene(acc, measured)
+    yield from another_file(acc)
     Path(acc.out, "measured.txt").write_text("\n".join(measured) + "\n")
 
 
@@ -80,7 +86,7 @@ def create(acc: Any, measured: list[str]) -> Iterator[float]:
 
 
 def look_around(acc: Any) -> Iterator[float]:
-    """Orbit, move the lamp, recolor."""
+    """Orbit, gloss, move the lamp, recolor."""
     view = acc.view3d()[1].spaces.active
     for _ in range(2):
         yield keys(acc, "KP_4", 1)
@@ -89,11 +95,13 @@ def look_around(acc: Any) -> Iterator[float]:
     for _ in range(2):
         yield keys(acc, "KP_6", 1)
     obj, lamp = bpy.data.objects[NAME], bpy.data.objects["Light"]
-    view.shading.use_scene_lights = True
+    view.shading.use_scene_lights = view.shading.use_scene_world = True
     yield _SHADERS
-    for number, side in enumerate((-1.5, 1.5)):
-        lamp.location = (obj.location.x + side, obj.location.y - 2, obj.location.z + 1.5)
-        lamp.data.energy = 200
+    edits = material_inputs()
+    edits["Specular Level"].default_value, edits["Roughness"].default_value = 1.0, 0.25
+    lamp.data.energy = 500
+    for number, side in enumerate((-0.8, 2.5)):  # the cube would throw its shadow from further left
+        lamp.location = (obj.location.x + side, obj.location.y - 3.5, obj.location.z + 1.5)
         yield 8
         yield acc.shot(f"07_lamp_{number}")
     with acc.context():
@@ -102,16 +110,38 @@ def look_around(acc: Any) -> Iterator[float]:
     yield acc.shot("08_recolored")
 
 
+def export(acc: Any) -> Iterator[float]:
+    """File > Export > glTF of what is shown, edited a moment before; USD where Blender has it."""
+    yield acc.xdo("mousemove 400 300", 1)
+    with acc.context():
+        bpy.ops.wm.call_menu(name="TOPBAR_MT_file_export")
+    yield 3
+    yield acc.xdo("mousemove 396 424 sleep .3 mousemove 400 426", 3)  # glTF, the last one
+    yield acc.shot("08_export")
+    yield acc.xdo("key Escape", 2)
+    with acc.context():
+        material_inputs()["Value"].default_value = 0.8
+        done = bpy.ops.export_scene.gltf(filepath=f"{acc.out}/{NAME}.glb", use_selection=True)
+        acc.check(done == {"FINISHED"}, "glTF is exported")
+        if bpy.app.build_options.usd:  # Debian's Blender is built without
+            path = f"{acc.out}/{NAME}.usdc"
+            done = bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True)
+            acc.check(done == {"FINISHED"}, "USD is exported")
+    bpy.ops.wm.save_as_mainfile(filepath=f"{acc.out}/scene.blend", copy=True)
+    yield 1
+
+
 def second_run(acc: Any, measured: list[str]) -> Iterator[float]:
     """The same photo with other output: from the cache."""
-    bpy.context.scene.isc.closed_back = True
+    bpy.context.scene.isc.back = "flat"
     began = time.monotonic()
     yield from begin(acc)
     yield from ended(100)
     seconds = time.monotonic() - began
     note(acc, measured, f"second run, other output options, in {seconds:.1f} s")
     acc.check(shown().message == f"{NAME} updated", f"the second run: {shown().message}")
-    bpy.context.scene.isc.closed_back = False
+    acc.check(material_inputs()["Specular Level"].default_value == 1, "edits of gloss are kept")
+    bpy.context.scene.isc.back = "rounded"
 
 
 def undo_and_redo(acc: Any) -> Iterator[float]:
@@ -122,6 +152,20 @@ def undo_and_redo(acc: Any) -> Iterator[float]:
     for _ in range(3):
         yield keys(acc, "ctrl+shift+z", 2)
     acc.check(objects() == [NAME], "redo brings it back")
+
+
+def import_result(acc: Any, measured: list[str]) -> Iterator[float]:
+    """The folder of the result, as if selected in the file browser."""
+    folder = next(Path.home().rglob("arrays.npz")).parent
+    acc.view3d()[1].spaces.active.shading.type = "SOLID"
+    with acc.context():
+        bpy.ops.isc.read_result("INVOKE_DEFAULT", directory=str(folder))
+    acc.check(shown().state == "running", "an import goes on while the window is used")
+    yield from ended(60)
+    note(acc, measured, "imported")
+    acc.check(shown().state == "done" and objects() == [NAME], f"a result: {shown().message}")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    yield 5
 
 
 def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
@@ -135,9 +179,8 @@ def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
     yield 20
     yield acc.shot("09_new_scene")
     acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
-    place = yield from acc.find("isc.return_to_scene")
-    if acc.check(place, "the button back is found"):
-        yield acc.click(*place, settle=2)
+    yield from press(acc, "isc.return_to_scene")
+    yield 1.5
     acc.check(bpy.context.scene.name == "Scene", "and leads back")
     bpy.context.scene.isc.own_scene = False
 
@@ -151,8 +194,8 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
     side = 0.45 * min(width, height)
     x, y = (left + acc.rect("VIEW_3D", "UI")[0]) / 2, top + height / 2
     start, end = (
-        (int(x - side * 0.8), int(y - side * 0.8)),
-        (int(x + side * 0.8), int(y + side * 0.8)),
+        (int(x - side * 0.6), int(y - side * 0.94)),
+        (int(x + side * 0.6), int(y + side * 0.94)),
     )
     drag = (
         f"mousemove {start[0]} {start[1]} sleep 1 mousedown 1 sleep 1 mousemove {end[0]} {end[1]}"
@@ -231,14 +274,49 @@ def load_while_drawing(acc: Any) -> Iterator[float]:
     yield 1
 
 
+def another_file(acc: Any) -> Iterator[float]:
+    """The asset is dragged with the mouse from the asset browser into a new file."""
+    bpy.ops.wm.read_homefile()
+    yield 3
+    with acc.context():
+        bpy.ops.screen.area_split(direction="HORIZONTAL", factor=0.36)
+    yield 1
+    areas = [area for area in bpy.context.window.screen.areas if area.type == "VIEW_3D"]
+    browser = min(areas, key=lambda area: area.y)
+    browser.ui_type = "ASSETS"
+    yield 3
+    shelf = browser.spaces.active.params
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    shelf.asset_library_reference = libraries[-1].name
+    shelf.filter_asset_id.filter_material = False
+    yield 5
+    region = next(region for region in browser.regions if region.type == "WINDOW")
+    with bpy.context.temp_override(area=browser, region=region):
+        acc.check(not bpy.ops.asset.catalogs_save.poll(), "no catalog waits to be saved")
+    yield acc.shot("14_asset_browser")
+    left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
+    goal = f"{left + width * 2 // 5} {top + height * 3 // 5}"
+    left, top, _, _ = acc.rect("FILE_BROWSER", "WINDOW")
+    start = f"mousemove {left + 60} {top + 60} sleep .5 mousedown 1 sleep .5"
+    way = f"mousemove_relative 30 -30 sleep .5 mousemove {goal} sleep 1.5"
+    yield acc.xdo(f"{start} {way}", 6)
+    yield acc.shot("14_asset_dragged")
+    yield acc.xdo("mouseup 1", 3)
+    acc.check(objects() == [NAME], f"the asset is in another file: {objects()}")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    with acc.context():
+        bpy.ops.view3d.view_selected()
+    yield _SHADERS
+    yield acc.shot("15_another_file")
+    bpy.ops.wm.save_as_mainfile(filepath=f"{acc.out}/another.blend")
+
+
 def begin(acc: Any) -> Iterator[float]:
     """Clicks the button."""
     acc.tab("ISC")
     yield 1
-    place = yield from acc.find("isc.decompose")
-    if acc.check(place, "the button is found"):
-        yield acc.click(*place, settle=0.5)
-        yield from until(lambda: shown().state == "running", 30)
+    yield from press(acc, "isc.decompose")
+    yield from until(lambda: shown().state == "running", 30)
 
 
 def escape(acc: Any) -> Iterator[float]:
@@ -248,9 +326,21 @@ def escape(acc: Any) -> Iterator[float]:
 
 def press_cancel(acc: Any) -> Iterator[float]:
     """Clicks the button."""
-    place = yield from acc.find("isc.cancel")
-    if acc.check(place, "the cancel button is found"):
-        yield acc.click(*place, settle=1)
+    yield from press(acc, "isc.cancel")
+    yield 0.5
+
+
+def press(acc: Any, operator: str) -> Iterator[float]:
+    """Clicks the button of an operator.
+
+    `find` asks what is under the mouse, which is what it was before while a busy window has not yet
+    read the mouse's movement: the search begins where no button is.
+    """
+    left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
+    yield acc.xdo(f"mousemove {left + width // 3} {top + height // 2}", 2)
+    place = yield from acc.find(operator)
+    if acc.check(place, f"the button of {operator} is found"):
+        yield acc.click(*place, settle=0.5)
 
 
 def keys(acc: Any, text: str, wait: float) -> float:
@@ -281,6 +371,11 @@ def shown() -> Any:
 def objects() -> list[str]:
     """Meshes that the extension made."""
     return [thing.name for thing in bpy.data.objects if thing.type == "MESH" and "isc_key" in thing]
+
+
+def material_inputs() -> Any:
+    """What *Edit Object* shows."""
+    return bpy.data.objects[NAME].active_material.node_tree.nodes["ISC Dichromatic"].inputs
 
 
 def workers() -> list[int]:
