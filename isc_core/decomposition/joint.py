@@ -40,8 +40,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian
-from ..networks.scene_network import ScenePrediction, predict_scene
+from ..networks.scene_network import (
+    LayerPrediction,
+    ScenePrediction,
+    predict_layers,
+    predict_scene,
+)
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
@@ -148,6 +154,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     """
     options, monitor, working = options or JointOptions(), task.monitor, task.working
     split, layers = separated_first(task)
+    task = replace(task, split=None)
     with task.clock.stage("separation"):
         layers, residual = supported_layers(
             working.image, layers, working.mask, task.prediction, options, working.clipped
@@ -189,7 +196,7 @@ def supported_layers(
     image: np.ndarray,
     split: Separation,
     mask: np.ndarray,
-    seen: ScenePrediction | None = None,
+    seen: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
     clipped: np.ndarray | None = None,
 ) -> tuple[Separation, ResidualHighlights | None]:
@@ -203,7 +210,7 @@ def supported_layers(
         By colour.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction, optional
+    seen : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -232,7 +239,7 @@ def supported_layers(
     hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
     diffuse = np.where(chosen, cleaner, inside)
     if clipped is not None and hidden.any():
-        whole = continue_under_clipped(diffuse, inside, clipped, mask, seen.shading.log_shading)
+        whole = continue_under_clipped(diffuse, inside, clipped, mask, seen.log_shading)
         diffuse = np.where(hidden[..., None], whole, diffuse)
     if residual is not None and kept.any():
         return split, ResidualHighlights(diffuse, residual.unreliable & kept)
@@ -249,7 +256,7 @@ def detect_residual_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
-    seen: ScenePrediction | None = None,
+    seen: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
 ) -> ResidualHighlights | None:
     """Find highlights that a separation by colour has left in the diffuse image.
@@ -262,7 +269,7 @@ def detect_residual_highlights(
         The separation's diffuse layer.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction, optional
+    seen : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -272,21 +279,36 @@ def detect_residual_highlights(
     ResidualHighlights or None
         None if no highlights stand out.
     """
-    options, inside = options or JointOptions(), mask[..., None]
+    options = options or JointOptions()
     expected = sure_ratio(seen or predict_scene(image, mask), options.network)
-    taken = np.log(
-        np.maximum(np.where(inside, image, 1), 1e-9)
-        / np.maximum(np.where(inside, diffuse, 1), 1e-9)
-    )
-    left = np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
+    left = np.empty(image.shape, np.result_type(image, diffuse, expected))
+    for block in row_blocks(mask.shape):
+        rows = block.rows
+        left[rows] = _left(image[rows], diffuse[rows], expected[rows], mask[rows])
     if not highlights_stand_out(left, mask, options.network):
         return None
     much = left.mean(axis=2) > options.unreliable_from
     unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask
     if unreliable[mask].mean() > _HALF:
         unreliable = np.zeros_like(mask)
-    cleaner = limit_tint(diffuse, diffuse * np.exp(-left), options.network.tint)
-    return ResidualHighlights(cleaner.astype(diffuse.dtype), unreliable)
+    cleaner = np.empty_like(diffuse)
+    for block in row_blocks(mask.shape):
+        before = diffuse[block.rows]
+        after = before * np.exp(-left[block.rows])
+        cleaner[block.rows] = limit_tint(before, after, options.network.tint)
+    return ResidualHighlights(cleaner, unreliable)
+
+
+def _left(
+    image: np.ndarray, diffuse: np.ndarray, expected: np.ndarray, mask: np.ndarray
+) -> np.ndarray:
+    """What the network expects (h, w, 3) of log(I / D), beyond what is taken off."""
+    inside = mask[..., None]
+    taken = np.log(
+        np.maximum(np.where(inside, image, 1), 1e-9)
+        / np.maximum(np.where(inside, diffuse, 1), 1e-9)
+    )
+    return np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
 
 
 def without_unreliable(confidence: np.ndarray, residual: ResidualHighlights | None) -> np.ndarray:
@@ -385,9 +407,13 @@ def _split(
     """
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale and (residual is not None or start.specular.any()):
-        seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
         start, of_maps = supported_layers(
-            photo.image, start, photo.mask, seen, options, photo.clipped
+            photo.image,
+            start,
+            photo.mask,
+            predict_layers(photo.image, photo.mask, task.options.scene_network),
+            options,
+            photo.clipped,
         )
         residual = None if residual is None else of_maps
         if residual is not None:

@@ -26,7 +26,12 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
-from ..networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
+from ..networks.scene_network import (
+    LayerPrediction,
+    SceneNetwork,
+    ScenePrediction,
+    predict_scene,
+)
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .support.checks import check_arrays
@@ -113,12 +118,12 @@ def separate(
     return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))
 
 
-def sure_ratio(seen: ScenePrediction, options: NetworkOptions) -> np.ndarray:
+def sure_ratio(seen: ScenePrediction | LayerPrediction, options: NetworkOptions) -> np.ndarray:
     """Return how much of the predicted log ratio of a photo and its diffuse image is sure.
 
     Parameters
     ----------
-    seen : ScenePrediction
+    seen : ScenePrediction or LayerPrediction
     options : NetworkOptions
         `doubt` is used.
 
