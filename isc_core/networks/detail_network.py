@@ -31,12 +31,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.blocks import block_means
+from ..imaging.tiles import Place
 from .encoder_decoder import EncoderDecoder
 from .loader import Parameters
 
 INPUTS = 12
 LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
 MULTIPLE = BLOCK * 2 ** (LEVELS - 1)  # sides of the network's frame
+REACH = 80  # pixels, a multiple: what a value of the relief depends on is nearer
+BOUND = 64.0  # of the values of layers, which are below 17 on photos
 DARK = 0.01  # of the mean light
 COARSE = 8  # pixels: low frequencies are averages of so many
 WEAK = 0.15  # a gain below which slopes are not told
@@ -50,7 +53,7 @@ class DetailNetwork(EncoderDecoder):
 
     title = "detail network"
     file = "detail_network.npz"
-    inputs, outputs, block = INPUTS, 1, BLOCK
+    inputs, outputs, block, bound = INPUTS, 1, BLOCK, BOUND
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""
@@ -154,6 +157,27 @@ def raised(values: np.ndarray) -> np.ndarray:
     (2 H, 2 W) or (2 H, 2 W, C) ndarray
     """
     return _raised_rows(_raised_rows(values).swapaxes(0, 1)).swapaxes(0, 1)
+
+
+def raised_at(values: np.ndarray, place: Place) -> np.ndarray:
+    """Return a part of `raised`.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+    place : tuple of slice
+        Rows and columns of the result, with even ends.
+
+    Returns
+    -------
+    (n, m) or (n, m, C) ndarray
+    """
+    wide = tuple(slice(max(one.start // 2 - 1, 0), one.stop // 2 + 1) for one in place)
+    rows, columns = (
+        slice(one.start - 2 * near.start, one.stop - 2 * near.start)
+        for one, near in zip(place, wide, strict=True)
+    )
+    return raised(values[wide])[rows, columns]
 
 
 def _raised_rows(values: np.ndarray) -> np.ndarray:

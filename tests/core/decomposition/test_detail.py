@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import isc_core
-from isc_core.decomposition import detail
 from isc_core.decomposition.detail import fine_relief, shading_gain, slopes
 from isc_core.decomposition.layers import shaded
 from isc_core.decomposition.settings import Settings
@@ -62,12 +61,18 @@ def test_a_level_that_is_not_asked_for_adds_nothing() -> None:
     assert not fine_relief(diffuse, mask, height, LIGHT, 100).any()
 
 
-def test_tiles_have_no_seams(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("tile", [80, 128, 336])
+def test_tiles_of_any_size_give_the_same_relief(tile: int) -> None:
     diffuse, mask, height = ball(400)
-    whole = fine_relief(diffuse, mask, height, LIGHT, 4096)
-    monkeypatch.setattr(detail, "_TILE", 128)
-    tiled = fine_relief(diffuse, mask, height, LIGHT, 4096)
-    assert np.abs(tiled - whole).max() < 1e-3 * np.abs(whole).max()
+    whole = fine_relief(diffuse, mask, height, LIGHT, 4096, tile=512)
+    assert np.array_equal(whole, fine_relief(diffuse, mask, height, LIGHT, 4096, tile=tile))
+    assert whole.any()
+
+
+def test_tiles_smaller_than_their_overlap_are_refused() -> None:
+    diffuse, mask, height = ball(97)
+    with pytest.raises(InputError, match=r"tiles of 72 pixels are smaller than their overlap"):
+        fine_relief(diffuse, mask, height, LIGHT, 4096, tile=72)
 
 
 def test_the_place_in_the_frame_does_not_matter() -> None:
