@@ -233,8 +233,8 @@ def supported_layers(
     split = replace(
         split,
         diffuse=np.where(chosen, split.diffuse, inside),
-        specular=np.where(chosen, split.specular, 0),
-        residual=np.where(chosen, split.residual, 0),
+        specular=_only(split.specular, kept),
+        residual=_only(split.residual, kept),
     )
     hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
     diffuse = np.where(chosen, cleaner, inside)
@@ -244,6 +244,15 @@ def supported_layers(
     if residual is not None and kept.any():
         return split, ResidualHighlights(diffuse, residual.unreliable & kept)
     return _with_diffuse(split, diffuse) if hidden.any() else split, None
+
+
+def _only(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
+    found = np.zeros_like(layer)
+    for block in row_blocks(kept.shape, pixels=1 << 14):
+        if kept[block.rows].any():
+            found[block.rows] = np.where(kept[block.rows][..., None], layer[block.rows], 0)
+    return found
 
 
 def _with_diffuse(split: Separation, diffuse: np.ndarray) -> Separation:

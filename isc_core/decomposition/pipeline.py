@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
+from ..imaging.row_blocks import row_blocks
 from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
 from ..photo import Photo
 from ..progress import Monitor
@@ -197,10 +198,16 @@ def assemble(
     else:
         normal, shading, light = before_camera(estimate, camera, mask, known_light=known_light)
         brdf = lobe_before_camera(estimate, camera, normal, mask)
-    reflectance = np.where(
-        mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0
-    ).astype(np.float32)
-    image = np.where(mask[..., None], photo.image, 0).astype(np.float32)
+    reflectance, image = (np.empty((*mask.shape, 3), np.float32) for _ in range(2))
+    relative, lowest = np.empty(mask.shape, np.float32), height[mask].min()
+    for block in row_blocks(mask.shape):
+        rows, inside = block.rows, mask[block.rows]
+        here = inside[..., None]
+        reflectance[rows] = np.where(
+            here, split.diffuse[rows] / np.where(here, shading[rows], 1), 0
+        )
+        image[rows] = np.where(here, photo.image[rows], 0)
+        relative[rows] = np.where(inside, height[rows] - lowest, 0)
     return Decomposition(
         image,
         split.diffuse,
@@ -209,7 +216,7 @@ def assemble(
         reflectance,
         shading,
         normal,
-        np.where(mask, height - height[mask].min(), 0).astype(np.float32),
+        relative,
         mask,
         _confidence(split, normal, photo),
         light,

@@ -140,7 +140,9 @@ def save(
         (partial / "maps").mkdir()
         for name, letters in SINGLE.items():
             values = getattr(decomposition, name)
-            write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
+            whole = name in COLOR_MAPS
+            planes = {letters: values} if whole else _planes(values, list(letters))
+            write_channels(partial / "maps" / f"{name}.exr", planes)
         monitor.report("building the mesh", 0.4)
         d = decomposition
         built = mesh_of(d, mesh)
@@ -346,7 +348,10 @@ def _planes(values: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
 def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict[str, np.ndarray]:
     channels: dict[str, np.ndarray] = {}
     for name, letters in layers.items():
-        channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
+        if letters == "RGB":
+            channels[name] = maps[name]
+        else:
+            channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
     return channels
 
 
