@@ -228,22 +228,41 @@ def supported_layers(
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
     kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds)
-    inside = np.where(mask[..., None], image, 0).astype(split.diffuse.dtype)
-    chosen = kept[..., None]
     split = replace(
         split,
-        diffuse=np.where(chosen, split.diffuse, inside),
+        diffuse=_given_back(split.diffuse, image, kept, mask),
         specular=_only(split.specular, kept),
         residual=_only(split.residual, kept),
     )
     hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
-    diffuse = np.where(chosen, cleaner, inside)
+    diffuse = split.diffuse
+    if residual is not None:
+        diffuse = _given_back(cleaner, image, kept, mask, out=cleaner)
     if clipped is not None and hidden.any():
-        whole = continue_under_clipped(diffuse, inside, clipped, mask, seen.log_shading)
-        diffuse = np.where(hidden[..., None], whole, diffuse)
+        whole = continue_under_clipped(diffuse, image, clipped, mask, seen.log_shading)
+        diffuse = diffuse if residual is not None else diffuse.copy()
+        np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
         return split, ResidualHighlights(diffuse, residual.unreliable & kept)
     return _with_diffuse(split, diffuse) if hidden.any() else split, None
+
+
+def _given_back(
+    diffuse: np.ndarray,
+    image: np.ndarray,
+    kept: np.ndarray,
+    mask: np.ndarray,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """A diffuse layer (H, W, 3) where highlights are kept, and the image elsewhere on the object;
+    it may take the place of the layer.
+    """
+    found = np.empty_like(diffuse) if out is None else out
+    for block in row_blocks(mask.shape):
+        rows = block.rows
+        inside = np.where(mask[rows][..., None], image[rows], 0).astype(diffuse.dtype)
+        found[rows] = np.where(kept[rows][..., None], diffuse[rows], inside)
+    return found
 
 
 def _only(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:

@@ -251,5 +251,6 @@ def _predicted(
         shares = contributions(options.model, lamps, inside, np.zeros_like(inside))[0]
         image[block.rows][here] = shares[:, None] * light.strength_light
     given = seen.specular_at(seen.inside)
-    left = np.square(given - image[seen.inside]).sum() / max(float(np.square(given).sum()), 1e-300)
-    return image, float(np.clip(1 - left, 0, 1))
+    error = given - image[seen.inside]
+    left, total = (float(np.square(one, out=one).sum()) for one in (error, given))
+    return image, float(np.clip(1 - left / max(total, 1e-300), 0, 1))

@@ -26,6 +26,7 @@ from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
+from ..io.memory import LARGE, give_back_memory
 from ..io.printable_names import readable
 from ..photo.camera import Camera
 from ..photo.grabcut import encoded_mask
@@ -145,6 +146,8 @@ def save(
             write_channels(partial / "maps" / f"{name}.exr", planes)
         monitor.report("building the mesh", 0.4)
         d = decomposition
+        if d.mask.size > LARGE:
+            give_back_memory()
         built = mesh_of(d, mesh)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
