@@ -38,6 +38,7 @@ from ..imaging.tiles import Place, tiles_of
 from ..networks.detail_network import (
     MULTIPLE,
     REACH,
+    TILE,
     DetailNetwork,
     predict_relief,
     raised_at,
@@ -52,7 +53,6 @@ _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
 _STEP = 0.02  # of slopes, for the derivative of shading
-TILE = 768  # pixels: side of the tiles, a multiple of the network's `MULTIPLE`
 SMALLEST_TILE = 160  # twice the network's reach: smaller tiles take several times as long
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..networks.detail_network import DetailNetwork
+from ..networks.detail_network import TILE, DetailNetwork
 from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
@@ -153,7 +153,7 @@ class DecompositionTask:
     normal_estimate: NormalEstimate | None = None
     shading_estimate: ShadingEstimate | None = None
     light_coefficients: LightCoefficientsEstimate | None = None
-    tile: int = 768
+    tile: int = TILE
     silhouette: np.ndarray | None = None
     options: SolveOptions = field(default_factory=SolveOptions)
 

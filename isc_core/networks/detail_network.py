@@ -40,6 +40,7 @@ LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
 MULTIPLE = BLOCK * 2 ** (LEVELS - 1)  # sides of the network's frame
 REACH = 80  # pixels, a multiple: what a value of the relief depends on is nearer
 BOUND = 64.0  # of the values of layers, which are below 17 on photos
+TILE = 768  # pixels of a tile's side, without what is around it, where memory suffices
 DARK = 0.01  # of the mean light
 COARSE = 8  # pixels: low frequencies are averages of so many
 WEAK = 0.15  # a gain below which slopes are not told
