@@ -17,7 +17,7 @@ Citation: Y. Wexler, E. Shechtman and M. Irani 2007, doi:10.1109/TPAMI.2007.60; 
 values: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x.
 
 Objects whose box has more than a million pixels are filled hole by hole, each from its
-surroundings, as wide as the hole and more.
+surroundings, half as wide as the hole.
 
 Limits: light that the separation has left around a hole flows into it. A hole without known pixels
 around it is filled smoothly.
@@ -92,7 +92,7 @@ def _windows(
     cells = padded.reshape(rows, _CELL, columns, _CELL).any(axis=(1, 3))
     labels, _ = ndimage.label(ndimage.binary_dilation(cells, _TOUCHING), _TOUCHING)
     for k, part in enumerate(ndimage.find_objects(labels), 1):
-        length = _CELL * max(one.stop - one.start for one in part)
+        length = _CELL * max(1, max(one.stop - one.start for one in part) // 2)
         while True:
             near = tuple(
                 slice(max(_CELL * one.start - length, 0), min(_CELL * one.stop + length, size))
