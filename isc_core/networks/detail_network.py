@@ -33,6 +33,7 @@ import numpy as np
 from ..imaging.blocks import block_means
 from ..imaging.tiles import Place
 from .encoder_decoder import EncoderDecoder
+from .layers import space_to_depth
 from .loader import Parameters
 
 INPUTS = 12
@@ -127,7 +128,11 @@ def predict_relief(
         Pixels toward the viewer; 0 outside of the mask, and without what half the size can hold.
     """
     network = network or DetailNetwork.shipped()
-    relief = network(channels_of(image, mask, slope, gain, belief))
+    # Channels are handed over and not kept: they take more room than the photo.
+    maps, _ = network.walked_blocks(
+        space_to_depth(channels_of(image, mask, slope, gain, belief), BLOCK)
+    )
+    relief = HEIGHT_UNIT * maps[..., 0]
     return np.where(mask, band(np.where(mask, relief, 0)), 0)
 
 
@@ -222,19 +227,14 @@ def channels_of(
     bound = np.clip(gain, -STEEPEST, STEEPEST)
     change = (parts[0] - low[0]) / ((bound * bound).sum(axis=2) + WEAK**2)
     least = np.clip(bound * change[..., None], -STEEPEST, STEEPEST)
-    channels = [
-        *(part - smooth for part, smooth in zip(parts, low, strict=True)),
-        low[0],
-        np.ones_like(inside),
-        -p / length,
-        -q / length,
-        bound[..., 0],
-        bound[..., 1],
-        least[..., 0],
-        least[..., 1],
-        np.full_like(inside, belief),
-    ]
-    return (np.stack(channels, axis=2) * inside[..., None]).astype(np.float32)
+    found = np.empty((*mask.shape, INPUTS), np.float32)
+    for k, (part, smooth) in enumerate(zip(parts, low, strict=True)):
+        found[..., k] = (part - smooth) * inside
+    found[..., 3], found[..., 4] = low[0] * inside, inside
+    found[..., 5], found[..., 6] = -p / length * inside, -q / length * inside
+    found[..., 7:9], found[..., 9:11] = bound * inside[..., None], least * inside[..., None]
+    found[..., 11] = np.float32(belief) * inside
+    return found
 
 
 def _spread(values: np.ndarray) -> np.ndarray:

@@ -100,8 +100,22 @@ class EncoderDecoder(Network):
         levels : list of ndarray
             The encoder's maps, the finest first.
         """
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, levels = space_to_depth(channels, self.block), []
+        return self.walked_blocks(space_to_depth(channels, self.block))
+
+    def walked_blocks(self, layer: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Go down and up again, from channels in blocks; they are not kept.
+
+        Parameters
+        ----------
+        layer : (H / block, W / block, block^2 inputs) ndarray
+            Of `space_to_depth`.
+
+        Returns
+        -------
+        maps, levels
+            As of `walked`.
+        """
+        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
         for level in range(self.depth):
             layer = conv_block(layer if level == 0 else block_means(layer, 2), steps, self.bound)
             levels.append(layer)
