@@ -40,6 +40,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.bounding_box import mask_diagonal
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian
 from ..networks.scene_network import (
@@ -461,7 +462,7 @@ def _split(
 
 def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """`values` (H, W, 3), replaced by averages of the nearest known ones where not `known`."""
-    diagonal = _diagonal(mask)
+    diagonal = mask_diagonal(mask)
     answer, settled = np.zeros_like(values), np.zeros(known.shape)
     for reach in _REACHES:
         sigma = max(reach * diagonal, 1.0)
@@ -473,8 +474,3 @@ def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.nd
         settled += share[..., 0]
     rest = values[known].mean(axis=0)
     return np.where(known[..., None], values, answer + (1 - settled)[..., None] * rest)
-
-
-def _diagonal(mask: np.ndarray) -> float:
-    rows, columns = np.nonzero(mask)
-    return float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1))

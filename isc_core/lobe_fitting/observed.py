@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
 from ..imaging.row_blocks import row_blocks
 from ..scene.light_estimate import LightEstimate
 from ..shading.brdf.directions import unit
@@ -252,8 +253,8 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
         raise InputError(
             f"height has shape {height.shape}: give finite (H, W) pixels like the mask"
         )
-    rows, columns = np.nonzero(mask)
-    low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])
+    box = mask_slices(mask)
+    low, high = np.array([part.start for part in box]), np.array([part.stop - 1 for part in box])
     (row, column), radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
     middle = float((height[mask].min() + height[mask].max()) / 2)
     return Places(height, (float(row), float(column), middle), radius)

@@ -243,9 +243,8 @@ def build_mesh(
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
-    limited = limit_rim(height, mask, options.rim)
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    stride, grid, fewer = _triangulated(limited, normal, mask, view, options.triangles)
+    stride, grid, fewer, pixels = _surface(height, normal, mask, view, options, camera)
     vertex_pixel = grid.vertices * stride
     row, column = vertex_pixel.T
     if fewer:
@@ -254,15 +253,8 @@ def build_mesh(
     else:
         smooth = facing(normal[row, column].astype(np.float32), directions_at(view, row, column))
         detail, tangents = flat_normals(mask.shape), None
-    if camera is None:
-        pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
-    else:
-        points = lifted_points(limited, camera, object_axis(camera, mask))[row, column]
-        pixels = points * (camera.focal_length / -points[:, 2].mean())
     middle = (pixels.min(0) + pixels.max(0)) / 2
-    size = options.metres_per_pixel or options.longest_side / max(
-        np.ptp(np.argwhere(mask), axis=0) + 1
-    )
+    size = options.metres_per_pixel or options.longest_side / max(mask[mask_slices(mask)].shape)
     color, k = base_color(reflectance, mask, options.bleed)
     mesh = TexturedMesh(
         (pixels - middle) * size,
@@ -288,6 +280,25 @@ def build_mesh(
         camera,
         None if camera is None else -middle * size,
     )
+
+
+def _surface(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    view: np.ndarray,
+    options: MeshOptions,
+    camera: Camera | None,
+) -> tuple[int, Triangulation, bool, np.ndarray]:
+    """As `_triangulated`, and the places (V, 3) of the vertices, in pixels."""
+    limited = limit_rim(height, mask, options.rim)
+    stride, grid, fewer = _triangulated(limited, normal, mask, view, options.triangles)
+    row, column = (grid.vertices * stride).T
+    if camera is None:
+        places = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
+        return stride, grid, fewer, places
+    points = lifted_points(limited, camera, object_axis(camera, mask))[row, column]
+    return stride, grid, fewer, points * (camera.focal_length / -points[:, 2].mean())
 
 
 def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:
@@ -497,12 +508,13 @@ def _triangulated(
         )
     if not budget or 2 * np.count_nonzero(cells) <= budget:
         return 1, _full_grid(cells), False
-    cosine, stride = np.empty(mask.shape, np.result_type(normal, view)), 1
+    cosine, stride = np.empty(mask.shape, np.float32), 1
     for block in row_blocks(mask.shape):
         toward = view if view.ndim == 1 else view[block.rows]
         cosine[block.rows] = (normal[block.rows] * toward).sum(axis=-1)
     while True:
-        thinned = height[::stride, ::stride] / stride, cells, cosine[::stride, ::stride]
+        thin = height if stride == 1 else height[::stride, ::stride] / stride
+        thinned = thin, cells, cosine[::stride, ::stride]
         if (found := adaptive_triangles(*thinned, budget)) is not None:
             return stride, found, True
         coarser = _cells_inside(mask, 2 * stride)

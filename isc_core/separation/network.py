@@ -26,6 +26,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_diagonal
 from ..networks.scene_network import (
     LayerPrediction,
     SceneNetwork,
@@ -150,8 +151,7 @@ def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, options: NetworkOp
     -------
     bool
     """
-    rows, columns = np.nonzero(mask)
-    diagonal = float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1))
+    diagonal = mask_diagonal(mask)
     side = max(3, 2 * round(_SPECK * diagonal) + 1)
     broad = ndimage.grey_opening(ratio.mean(axis=2), side)[mask]
     return float(broad.max() - np.quantile(broad, _MOST_SHARE)) > options.stands_out

@@ -30,6 +30,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
@@ -88,9 +89,8 @@ def highlight_evidence(
     bright = float(np.quantile(mean_channel(image)[mask], 0.99))
     labels, count = ndimage.label(removed > max(_FAINT * bright, 1e-12))
     dark = _DARK * bright + 1e-12
-    rows, columns = np.nonzero(mask)
     # whole pixels; the ring beyond it is two wide
-    reach = max(2, int(_RING * np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
+    reach = max(2, int(_RING * mask_diagonal(mask)))
     numbers, found = list[int](), list[list[float]]()
     for k, box in enumerate(ndimage.find_objects(labels, count), 1):
         wide = tuple(slice(max(0, one.start - reach - 3), one.stop + reach + 3) for one in box)
