@@ -46,9 +46,9 @@ __all__ = [
 ]
 
 # Memory at its peak: of the libraries, and for a pixel of the working photo and of the maps.
-_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 240
+_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 260
 # While fine relief is found: for a pixel of the maps, and of a tile with what is around it.
-_RELIEF_BYTES, _TILE_BYTES = 140, 180
+_RELIEF_BYTES, _TILE_BYTES = 110, 170
 _REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
