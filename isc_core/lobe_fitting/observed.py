@@ -144,11 +144,29 @@ class Observed:
         return channel_means(self.specular, self.inside)
 
     def specular_at(self, where: np.ndarray) -> np.ndarray:
-        """Specular light (n, 3) of float at pixels `where` (H, W) of bool."""
+        """Return the specular light of some pixels in doubles.
+
+        Parameters
+        ----------
+        where : (H, W) ndarray of bool
+
+        Returns
+        -------
+        (n, 3) ndarray
+        """
         return np.asarray(self.specular[where], float)
 
     def normal_at(self, where: np.ndarray | tuple[slice, slice]) -> np.ndarray:
-        """Normals (..., 3) of float at some pixels."""
+        """Return the normals of some pixels in doubles.
+
+        Parameters
+        ----------
+        where : (H, W) ndarray of bool, or slices
+
+        Returns
+        -------
+        (..., 3) ndarray
+        """
         return np.asarray(self.normal[where], float)
 
 

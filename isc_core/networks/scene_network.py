@@ -210,7 +210,8 @@ class LayerPrediction:
 
     Attributes
     ----------
-    log_ratio, ratio_scale
+    log_ratio : (H, W, 3) ndarray
+    ratio_scale : (H, W) ndarray
         As in `ScenePrediction`.
     log_shading : (H, W, 3) ndarray
         That of `ScenePrediction.shading`.

@@ -13,7 +13,7 @@ completely or not at all (see `io.atomic`).
 import json
 import math
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -128,7 +128,7 @@ def save(
         channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
     if decomposition.visibility is not None:
         channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
-    if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
+    if broken := sorted(_broken(channels)):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     # The pool inside the folder: the preview is done, or has failed, before the folder is removed.
     with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(1) as pool:
@@ -161,6 +161,15 @@ def save(
         monitor.report("drawing the preview", 0.7)
         preview.result()
         monitor.report("writing maps", 1.0)
+
+
+def _broken(channels: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """The channels with values that are not finite."""
+    for name, values in channels.items():
+        planes = {name: values}
+        if values.ndim == 3:
+            planes = _planes(values, [f"{name}.{letter}" for letter in "RGB"])
+        yield from (plane for plane in planes if not np.isfinite(planes[plane]).all())
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:
