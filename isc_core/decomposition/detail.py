@@ -17,19 +17,32 @@ Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image c
 Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from shading: A. Pentland
 1990, doi:10.1007/BF00054993.
 
+Tiles: the network sees one tile at a time with all that its values depend on around it, and sums
+exactly: relief is the same, bit for bit, for tiles of any size.
+
 Limits: relief is where the light from SIRFS says; where that light is from the wrong side, dents
-become bumps. The network sees one tile at a time, so memory is bounded by the maps' own.
+become bumps.
 """
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
 
 from ..imaging.blocks import block_means
 from ..imaging.bounding_box import mask_slices
-from ..networks.detail_network import MULTIPLE, DetailNetwork, predict_relief, raised
+from ..imaging.row_blocks import row_blocks
+from ..imaging.tiles import Place, tiles_of
+from ..networks.detail_network import (
+    MULTIPLE,
+    REACH,
+    TILE,
+    DetailNetwork,
+    predict_relief,
+    raised_at,
+)
 from ..progress import Monitor
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
@@ -40,7 +53,7 @@ _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
 _STEP = 0.02  # of slopes, for the derivative of shading
-_TILE, _HALO = 768, 64  # pixels, multiples of the network's `MULTIPLE`
+SMALLEST_TILE = 160  # twice the network's reach: smaller tiles take several times as long
 
 
 @dataclass(frozen=True)
@@ -57,16 +70,48 @@ class Level:
     image: np.ndarray
     mask: np.ndarray
 
-    @property
-    def relative(self) -> np.ndarray:
-        """The image over the object's mean light."""
-        return self.image / np.float32(max(float(self.image[self.mask].mean(dtype=float)), 1e-9))
+    @cached_property
+    def mean(self) -> np.float32:
+        """The object's mean light."""
+        return np.float32(max(float(self.image[self.mask].mean(dtype=float)), 1e-9))
 
     def halved(self) -> "Level":
         """Return the next coarser level; sides are even."""
-        share = block_means(self.mask.astype(np.float32), 2)
-        image = block_means(np.where(self.mask[..., None], self.image, 0), 2)
-        return Level(image / np.maximum(share, 1e-9)[..., None], share >= 0.5)
+        rows, columns = (n // 2 for n in self.mask.shape)
+        image, mask = np.empty((rows, columns, 3), np.float32), np.empty((rows, columns), bool)
+        for block in row_blocks((rows, 4 * columns)):
+            here = slice(2 * block.rows.start, 2 * block.rows.stop)
+            inside = self.mask[here]
+            share = block_means(inside.astype(np.float32), 2)
+            light = block_means(np.where(inside[..., None], self.image[here], 0), 2)
+            image[block.rows] = light / np.maximum(share, 1e-9)[..., None]
+            mask[block.rows] = share >= 0.5
+        return Level(image, mask)
+
+
+@dataclass(frozen=True)
+class _Smooth:
+    """What is known of the smooth surface on a level, interpolated where it is asked for.
+
+    Attributes
+    ----------
+    maps : (h, w, 4) ndarray
+        Slopes and derivatives of log shading by them: of the level, or of the next coarser one.
+    coarser : bool
+    """
+
+    maps: np.ndarray
+    coarser: bool
+
+    def at(self, place: Place) -> tuple[np.ndarray, np.ndarray]:
+        """Return slopes and derivatives (n, m, 2) at some rows and columns, of even numbers."""
+        part = raised_at(self.maps, place) if self.coarser else self.maps[place]
+        return part[..., :2], part[..., 2:]
+
+    def finer(self, shape: tuple[int, ...]) -> "_Smooth":
+        """Return the same for the next finer level; `shape` is that of this one."""
+        whole = np.concatenate(self.at((slice(0, shape[0]), slice(0, shape[1]))), axis=2)
+        return _Smooth(whole.astype(np.float32), True)
 
 
 def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneEstimate:
@@ -100,6 +145,7 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
             task.settings.detail,
             task.monitor.part(0.96, 0.98),
             task.options.detail_network,
+            tile=task.tile,
         )
     return replace(estimate, height=estimate.height + relief)
 
@@ -113,6 +159,8 @@ def fine_relief(
     monitor: Monitor | None = None,
     network: DetailNetwork | None = None,
     rule: ReliefRule | None = None,
+    *,
+    tile: int = TILE,
 ) -> np.ndarray:
     """Find the relief that a smooth height lacks.
 
@@ -132,6 +180,9 @@ def fine_relief(
         By default the shipped one.
     rule : ReliefRule, optional
         By default the shipped one.
+    tile : int
+        Side of the tiles that the network sees, pixels, a multiple of 8: memory alone depends on
+        it.
 
     Returns
     -------
@@ -140,14 +191,17 @@ def fine_relief(
 
     Raises
     ------
+    InputError
+        If the tiles are smaller than their overlap.
     Cancelled
         If the monitor cancels.
     """
     rule = rule or RULE
     pyramid = Pyramid.of(diffuse, mask, height, light)
     evidence = pyramid.evidence()
-    relief = pyramid.relief(finest, rule.belief(evidence), monitor, network)
-    return relief * np.float32(rule.factor)
+    relief = pyramid.relief(finest, rule.belief(evidence), monitor, network, tile)
+    relief *= np.float32(rule.factor)
+    return relief
 
 
 @dataclass(frozen=True)
@@ -188,8 +242,10 @@ class Pyramid:
         Pyramid
         """
         frame = _Frame.around(mask)
-        inside = np.where(mask[..., None], diffuse, 0).astype(np.float32)
-        levels = [Level(frame.window.cut(inside, 0), frame.window.cut(mask, False))]
+        inside = frame.window.cut(mask, False)
+        image = frame.window.cut(diffuse, 0).astype(np.float32, copy=False)
+        np.copyto(image, 0, where=~inside[..., None])
+        levels = [Level(image, inside)]
         for _ in range(frame.halvings):
             levels.append(levels[-1].halved())
         slope = slopes(frame.coarsest(height))
@@ -197,10 +253,11 @@ class Pyramid:
 
     def evidence(self) -> Evidence | None:
         """Return what the whole object says of relief; None where it is too small."""
-        telling = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest())
-        return mean_evidence(
-            [evidence_of(level.relative, level.mask, gain) for level, _, _, gain in telling]
-        )
+        telling, found = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest()), []
+        for level, _, smooth in telling:
+            _, gain = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
+            found.append(evidence_of(level.image / level.mean, level.mask, gain))
+        return mean_evidence(found)
 
     def relief(
         self,
@@ -208,12 +265,13 @@ class Pyramid:
         belief: float,
         monitor: Monitor | None = None,
         network: DetailNetwork | None = None,
+        tile: int = TILE,
     ) -> np.ndarray:
         """Find the relief, R_0 of the module.
 
         Parameters
         ----------
-        finest, monitor, network
+        finest, monitor, network, tile
             As for `fine_relief`.
         belief : float
             What the object's fine changes are: -1 paint, 0 unknown, 1 relief.
@@ -225,27 +283,34 @@ class Pyramid:
 
         Raises
         ------
+        InputError
+            If the tiles are smaller than their overlap.
         Cancelled
             If the monitor cancels.
         """
         monitor = monitor or Monitor()
-        coarsest = self.levels[-1].mask.shape
+        coarsest, done = self.levels[-1].mask.shape, 0.0
         relief: np.ndarray = np.zeros(tuple(n // 2 for n in coarsest), np.float32)
-        for k, (level, length, slope, gain) in enumerate(self._from_coarsest()):
-            monitor.report("fine relief", k / len(self.levels))
-            relief = 2 * raised(relief)
+        for level, length, smooth in self._from_coarsest():
+            relief = _enlarged(relief)
+            share = 0.75 * level.mask.size / self.levels[0].mask.size
             if length <= finest:
-                relief += _band(level, slope, gain, belief, network)
+                _add_band(
+                    relief, level, smooth, belief, network, tile, monitor.part(done, done + share)
+                )
+            done += share
         whole = self.frame.window.put(relief, self.mask.shape)
-        return np.where(self.mask, whole, np.float32(0))
+        whole[~self.mask] = 0
+        return whole
 
-    def _from_coarsest(self) -> Iterator[tuple[Level, float, np.ndarray, np.ndarray]]:
-        """Each level with the object's length, the slopes and the gains, the coarsest first."""
-        slope, gain = self.slope, self.gain
+    def _from_coarsest(self) -> Iterator[tuple[Level, float, _Smooth]]:
+        """Each level with the object's length and the smooth surface, the coarsest first."""
+        smooth = _Smooth(np.concatenate([self.slope, self.gain], axis=2), False)
         for k in range(len(self.levels) - 1, -1, -1):
-            if k < len(self.levels) - 1:
-                slope, gain = (raised(part.astype(np.float32)) for part in (slope, gain))
-            yield self.levels[k], self.frame.length / 2**k, slope, gain
+            level = self.levels[k]
+            yield level, self.frame.length / 2**k, smooth
+            if k:
+                smooth = smooth.finer(level.mask.shape)
 
 
 @dataclass(frozen=True)
@@ -280,35 +345,41 @@ class _Frame:
         return coarse
 
 
-def _band(
+def _enlarged(relief: np.ndarray) -> np.ndarray:
+    """A relief on the next finer level, in its pixels."""
+    rows, columns = (2 * n for n in relief.shape)
+    fine = np.empty((rows, columns), np.float32)
+    for block in row_blocks((rows // 2, 2 * columns)):
+        here = slice(2 * block.rows.start, 2 * block.rows.stop)
+        fine[here] = 2 * raised_at(relief, (here, slice(0, columns)))
+    return fine
+
+
+def _add_band(
+    relief: np.ndarray,
     level: Level,
-    slope: np.ndarray,
-    gain: np.ndarray,
+    smooth: _Smooth,
     belief: float,
     network: DetailNetwork | None,
-) -> np.ndarray:
-    """The band (h, w) of a level, tile by tile; tiles overlap by what the network looks at."""
-    image, mask = level.relative, level.mask
-    height, width = mask.shape
-    band = np.zeros((height, width), np.float32)
-    for top in range(0, height, _TILE):
-        for left in range(0, width, _TILE):
-            inner = slice(top, min(top + _TILE, height)), slice(left, min(left + _TILE, width))
-            if not mask[inner].any():
-                continue
-            outer = tuple(
-                slice(max(one.start - _HALO, 0), min(one.stop + _HALO, size))
-                for one, size in zip(inner, (height, width), strict=True)
-            )
-            found = predict_relief(
-                image[outer], mask[outer], slope[outer], gain[outer], belief, network
-            )
-            own = tuple(
-                slice(one.start - wide.start, one.stop - wide.start)
-                for one, wide in zip(inner, outer, strict=True)
-            )
-            band[inner] = found[own]
-    return band
+    side: int,
+    monitor: Monitor,
+) -> None:
+    """Add the band of a level to `relief` (h, w), tile by tile; tiles overlap by what the network
+    looks at.
+    """
+    tiles = list(tiles_of(level.mask, side, REACH, MULTIPLE))
+    for k, tile in enumerate(tiles):
+        monitor.report("fine relief", k / len(tiles))
+        slope, gain = smooth.at(tile.outer)
+        found = predict_relief(
+            level.image[tile.outer] / level.mean,
+            level.mask[tile.outer],
+            slope,
+            gain,
+            belief,
+            network,
+        )
+        relief[tile.inner] += found[tile.own]
 
 
 def slopes(height: np.ndarray) -> np.ndarray:

@@ -31,6 +31,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.resampling import nearest_samples
+from ..imaging.row_blocks import row_blocks
 from ..imaging.upsampling import enlarged
 from ..networks.scene_network import ScenePrediction
 from ..photo import Photo
@@ -183,14 +184,22 @@ def with_expected_error(d: Decomposition, seen: ScenePrediction, working: Photo)
             )
             for map_ in (normal, shading)
         )
-    maps = np.zeros((*mask.shape, 2))
-    maps[mask] = np.stack(Evidence.of(seen, normal, shading, mask).errors(), axis=1)
+    small = np.zeros((*mask.shape, 2))
+    small[mask] = np.stack(Evidence.of(seen, normal, shading, mask).errors(), axis=1)
     if mask.shape != d.mask.shape:
         rows, columns = ndimage.distance_transform_edt(
             ~mask, return_distances=False, return_indices=True
         )
-        maps = enlarged(maps[rows, columns], d.mask.shape, 1 / factor)
-    maps = np.where(d.mask[..., None], maps, 0).astype(np.float32)
+        small = small[rows, columns]
+    maps = np.empty((*d.mask.shape, 2), np.float32)
+    for block in row_blocks(d.mask.shape):
+        inside, start = d.mask[block.rows], (block.rows.start, 0)
+        near = (
+            small[block.rows]
+            if mask.shape == d.mask.shape
+            else enlarged(small, inside.shape, 1 / factor, start)
+        )
+        maps[block.rows] = np.where(inside[..., None], near, 0)
     error, diagnostics = ExpectedError(maps[..., 0], maps[..., 1]), d.provenance.diagnostics
     means = (round(float(part[d.mask].mean(dtype=float)), 4) for part in np.moveaxis(maps, -1, 0))
     diagnostics = replace(diagnostics, expected_error=ExpectedErrorDiagnostics(*means))

@@ -40,8 +40,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.bounding_box import mask_diagonal
+from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian
-from ..networks.scene_network import ScenePrediction, predict_scene
+from ..networks.scene_network import (
+    LayerPrediction,
+    ScenePrediction,
+    predict_layers,
+    predict_scene,
+)
 from ..photo.highlight_marks import HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
@@ -149,6 +156,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     """
     options, monitor, working = options or JointOptions(), task.monitor, task.working
     split, layers = separated_first(task)
+    task = replace(task, split=None)
     with task.clock.stage("separation"):
         layers, residual = supported_layers(
             working.image,
@@ -196,7 +204,7 @@ def supported_layers(
     image: np.ndarray,
     split: Separation,
     mask: np.ndarray,
-    seen: ScenePrediction | None = None,
+    seen: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
     clipped: np.ndarray | None = None,
     marks: HighlightMarks | None = None,
@@ -211,7 +219,7 @@ def supported_layers(
         By colour.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction, optional
+    seen : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -231,22 +239,50 @@ def supported_layers(
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
     kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds, marks)
-    inside = np.where(mask[..., None], image, 0).astype(split.diffuse.dtype)
-    chosen = kept[..., None]
     split = replace(
         split,
-        diffuse=np.where(chosen, split.diffuse, inside),
-        specular=np.where(chosen, split.specular, 0),
-        residual=np.where(chosen, split.residual, 0),
+        diffuse=_given_back(split.diffuse, image, kept, mask),
+        specular=_only(split.specular, kept),
+        residual=_only(split.residual, kept),
     )
     hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
-    diffuse = np.where(chosen, cleaner, inside)
+    diffuse = split.diffuse
+    if residual is not None:
+        diffuse = _given_back(cleaner, image, kept, mask, out=cleaner)
     if clipped is not None and hidden.any():
-        whole = continue_under_clipped(diffuse, inside, clipped, mask, seen.shading.log_shading)
-        diffuse = np.where(hidden[..., None], whole, diffuse)
+        whole = continue_under_clipped(diffuse, image, clipped, mask, seen.log_shading)
+        diffuse = diffuse if residual is not None else diffuse.copy()
+        np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
         return split, ResidualHighlights(diffuse, residual.unreliable & kept)
     return _with_diffuse(split, diffuse) if hidden.any() else split, None
+
+
+def _given_back(
+    diffuse: np.ndarray,
+    image: np.ndarray,
+    kept: np.ndarray,
+    mask: np.ndarray,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """A diffuse layer (H, W, 3) where highlights are kept, and the image elsewhere on the object;
+    it may take the place of the layer.
+    """
+    found = np.empty_like(diffuse) if out is None else out
+    for block in row_blocks(mask.shape):
+        rows = block.rows
+        inside = np.where(mask[rows][..., None], image[rows], 0).astype(diffuse.dtype)
+        found[rows] = np.where(kept[rows][..., None], diffuse[rows], inside)
+    return found
+
+
+def _only(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
+    found = np.zeros_like(layer)
+    for block in row_blocks(kept.shape, pixels=1 << 14):
+        if kept[block.rows].any():
+            found[block.rows] = np.where(kept[block.rows][..., None], layer[block.rows], 0)
+    return found
 
 
 def _with_diffuse(split: Separation, diffuse: np.ndarray) -> Separation:
@@ -259,7 +295,7 @@ def detect_residual_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
-    seen: ScenePrediction | None = None,
+    seen: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
 ) -> ResidualHighlights | None:
     """Find highlights that a separation by colour has left in the diffuse image.
@@ -272,7 +308,7 @@ def detect_residual_highlights(
         The separation's diffuse layer.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction, optional
+    seen : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -282,21 +318,36 @@ def detect_residual_highlights(
     ResidualHighlights or None
         None if no highlights stand out.
     """
-    options, inside = options or JointOptions(), mask[..., None]
+    options = options or JointOptions()
     expected = sure_ratio(seen or predict_scene(image, mask), options.network)
-    taken = np.log(
-        np.maximum(np.where(inside, image, 1), 1e-9)
-        / np.maximum(np.where(inside, diffuse, 1), 1e-9)
-    )
-    left = np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
+    left = np.empty(image.shape, np.result_type(image, diffuse, expected))
+    for block in row_blocks(mask.shape):
+        rows = block.rows
+        left[rows] = _left(image[rows], diffuse[rows], expected[rows], mask[rows])
     if not highlights_stand_out(left, mask, options.network):
         return None
     much = left.mean(axis=2) > options.unreliable_from
     unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask
     if unreliable[mask].mean() > _HALF:
         unreliable = np.zeros_like(mask)
-    cleaner = limit_tint(diffuse, diffuse * np.exp(-left), options.network.tint)
-    return ResidualHighlights(cleaner.astype(diffuse.dtype), unreliable)
+    cleaner = np.empty_like(diffuse)
+    for block in row_blocks(mask.shape):
+        before = diffuse[block.rows]
+        after = before * np.exp(-left[block.rows])
+        cleaner[block.rows] = limit_tint(before, after, options.network.tint)
+    return ResidualHighlights(cleaner, unreliable)
+
+
+def _left(
+    image: np.ndarray, diffuse: np.ndarray, expected: np.ndarray, mask: np.ndarray
+) -> np.ndarray:
+    """What the network expects (h, w, 3) of log(I / D), beyond what is taken off."""
+    inside = mask[..., None]
+    taken = np.log(
+        np.maximum(np.where(inside, image, 1), 1e-9)
+        / np.maximum(np.where(inside, diffuse, 1), 1e-9)
+    )
+    return np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
 
 
 def without_unreliable(confidence: np.ndarray, residual: ResidualHighlights | None) -> np.ndarray:
@@ -395,9 +446,14 @@ def _split(
     """
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale and (residual is not None or start.specular.any()):
-        seen = predict_scene(photo.image, photo.mask, task.options.scene_network)
         start, of_maps = supported_layers(
-            photo.image, start, photo.mask, seen, options, photo.clipped, photo.marks
+            photo.image,
+            start,
+            photo.mask,
+            predict_layers(photo.image, photo.mask, task.options.scene_network),
+            options,
+            photo.clipped,
+            photo.marks,
         )
         residual = None if residual is None else of_maps
         if residual is not None:
@@ -417,7 +473,7 @@ def _split(
 
 def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """`values` (H, W, 3), replaced by averages of the nearest known ones where not `known`."""
-    diagonal = _diagonal(mask)
+    diagonal = mask_diagonal(mask)
     answer, settled = np.zeros_like(values), np.zeros(known.shape)
     for reach in _REACHES:
         sigma = max(reach * diagonal, 1.0)
@@ -429,8 +485,3 @@ def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.nd
         settled += share[..., 0]
     rest = values[known].mean(axis=0)
     return np.where(known[..., None], values, answer + (1 - settled)[..., None] * rest)
-
-
-def _diagonal(mask: np.ndarray) -> float:
-    rows, columns = np.nonzero(mask)
-    return float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1))

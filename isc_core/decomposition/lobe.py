@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..lobe_fitting import PixelData, RecoveredScene, fit_lobe
+from ..lobe_fitting.observed import channel_means
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import LobeDiagnostics, LobeStatus
@@ -108,13 +109,15 @@ def fit_specular(
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
         options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True)
+        # Without specular light nothing is fitted: what the fit relies on need not be known.
+        shines = float(channel_means(split.specular, photo.mask).max()) > options.darkest
         fit = fit_lobe(
             split.specular,
             normal,
             photo.mask,
             options=options,
             pixels=PixelData(clipped=photo.clipped, height=shape.height),
-            recovered=_recovered(shading, task),
+            recovered=_recovered(shading, task) if shines else None,
             monitor=monitor,
         )
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))

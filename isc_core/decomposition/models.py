@@ -122,7 +122,8 @@ class _Ahead:
         """
         if self._kernels is not None:
             self._kernels.result()
-        return task if self._split is None else replace(task, split=self._split.result())
+        split, self._split = self._split, None  # it is not kept while the task is solved
+        return task if split is None else replace(task, split=split.result())
 
     def __enter__(self) -> "_Ahead":
         return self

@@ -23,6 +23,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..imaging.row_blocks import row_blocks
 from ..io.focal_length import pixels_of_35mm
 from ..numerics.linear import solve_linear
 from ..photo import Photo
@@ -98,21 +99,32 @@ def before_camera(
     normal = lifted_normals(estimate.height, camera, axis).astype(np.float32)
     normal[~mask] = VIEW
     light = light_from_reference(estimate.light)
-    basis = real_sh(normal[mask].astype(float))
     if not known_light:
-        seen = np.einsum("nk,kc->nc", real_sh(flat[mask].astype(float)), light)
-        light = _refitted(basis, seen, turned_light(light, rotation_between(VIEW, -axis)))
+        expected = turned_light(light, rotation_between(VIEW, -axis))
+        light = _refitted(normal, flat, light, expected, mask)
     shading = np.zeros((*mask.shape, 3), np.float32)
-    shading[mask] = np.exp(np.einsum("nk,kc->nc", basis, light))
+    for block in row_blocks(mask.shape):
+        inside = mask[block.rows]
+        basis = real_sh(normal[block.rows][inside].astype(float))
+        shading[block.rows][inside] = np.exp(np.einsum("nk,kc->nc", basis, light))
     return normal, shading, light
 
 
-def _refitted(basis: np.ndarray, log_shading: np.ndarray, expected: np.ndarray) -> np.ndarray:
-    """The light (9, 3) whose log shading is nearest on the basis (N, 9)."""
-    count = len(basis)
-    gram = np.einsum("nk,nl->kl", basis, basis) / count + _LIGHT_WEIGHT * np.eye(9)
-    right = np.einsum("nk,nc->kc", basis, log_shading) / count + _LIGHT_WEIGHT * expected
-    return solve_linear(gram, right)
+def _refitted(
+    normal: np.ndarray, flat: np.ndarray, light: np.ndarray, expected: np.ndarray, mask: np.ndarray
+) -> np.ndarray:
+    """The light (9, 3), `expected` or so, whose log shading of the normals is nearest to that of
+    the normals without a camera, `flat`, under `light`; sums are those of blocks of rows.
+    """
+    gram, right, count = np.zeros((9, 9)), np.zeros((9, 3)), np.count_nonzero(mask)
+    for block in row_blocks(mask.shape):
+        inside = mask[block.rows]
+        basis, before = (real_sh(part[block.rows][inside].astype(float)) for part in (normal, flat))
+        gram += np.einsum("nk,nl->kl", basis, basis)
+        right += np.einsum("nk,nc->kc", basis, np.einsum("nk,kc->nc", before, light))
+    return solve_linear(
+        gram / count + _LIGHT_WEIGHT * np.eye(9), right / count + _LIGHT_WEIGHT * expected
+    )
 
 
 def lobe_before_camera(

@@ -15,7 +15,9 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
-from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
+from ..imaging.row_blocks import row_blocks
+from ..io.memory import LARGE, enough_memory, free_memory, give_back_memory, require_memory
+from ..networks.detail_network import MULTIPLE, REACH, TILE
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -24,6 +26,7 @@ from ..shading.perspective import view_directions
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import share_in_blocks
+from .detail import SMALLEST_TILE
 from .expected_error import with_expected_error
 from .layers import shaded
 from .models import DecompositionTask, SceneEstimate, Settings, solve
@@ -43,7 +46,9 @@ __all__ = [
 ]
 
 # Memory at its peak: of the libraries, and for a pixel of the working photo and of the maps.
-_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 320
+_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 260
+# While fine relief is found: for a pixel of the maps, and of a tile with what is around it.
+_RELIEF_BYTES, _TILE_BYTES = 110, 170
 _REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
@@ -75,8 +80,8 @@ def decompose(
     name : str, optional
         Name of the photo in the result.
     memory : int, optional
-        Bytes that the work may need at most; by default what is free. The result does not depend
-        on it.
+        Bytes that the work may need at most; by default what is free. Fine relief is found in
+        smaller tiles where that suffices. The result does not depend on it.
     monitor : Monitor, optional
         Receives progress; can cancel.
 
@@ -113,9 +118,12 @@ def decompose(
                 "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
                 "or use a larger photo"
             )
+    tile = _tile_within(memory, working.mask.size, maps.mask.size)
     with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
         estimate = solve(
-            DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
+            DecompositionTask(
+                working, maps, settings, constraints, prior_set, monitor, clock, tile=tile
+            )
         )
     monitor.report("maps", 0.98)
     provenance = Provenance(
@@ -144,12 +152,24 @@ def _working(photo: Photo, maps: Photo) -> Photo:
     return maps if working.scale == maps.scale else working
 
 
+def _tile_within(allowed: int | None, working_size: int, maps_size: int) -> int:
+    """The side of the largest tiles for which memory suffices, or of the smallest ones."""
+    allowed = free_memory() if allowed is None else allowed
+    if allowed is None:
+        return TILE
+    fixed = _LEAST_BYTES + _WORKING_BYTES * working_size + _RELIEF_BYTES * maps_size
+    looked_at = int(np.sqrt(max(allowed - fixed, 0) / _TILE_BYTES))
+    return int(np.clip((looked_at - 2 * REACH) // MULTIPLE * MULTIPLE, SMALLEST_TILE, TILE))
+
+
 def _within_memory(
     name: str, working_size: int, shape: tuple[int, ...], allowed: int | None
 ) -> AbstractContextManager[None]:
     """Refuse a photo that needs more memory than allowed; errors of the block say how much."""
     work = f"{name}: {shape[1]} x {shape[0]} pixels to decompose"
-    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * shape[0] * shape[1]
+    maps_size, looked_at = shape[0] * shape[1], SMALLEST_TILE + 2 * REACH
+    most = max(_MAPS_BYTES * maps_size, _RELIEF_BYTES * maps_size + _TILE_BYTES * looked_at**2)
+    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + most
     require_memory(work, needed, allowed, _REMEDY)
     return enough_memory(work, needed, _REMEDY)
 
@@ -206,10 +226,16 @@ def assemble(
     else:
         normal, shading, light = before_camera(estimate, camera, mask, known_light=known_light)
         brdf = lobe_before_camera(estimate, camera, normal, mask)
-    reflectance = np.where(
-        mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0
-    ).astype(np.float32)
-    image = np.where(mask[..., None], photo.image, 0).astype(np.float32)
+    reflectance, image = (np.empty((*mask.shape, 3), np.float32) for _ in range(2))
+    relative, lowest = np.empty(mask.shape, np.float32), height[mask].min()
+    for block in row_blocks(mask.shape):
+        rows, inside = block.rows, mask[block.rows]
+        here = inside[..., None]
+        reflectance[rows] = np.where(
+            here, split.diffuse[rows] / np.where(here, shading[rows], 1), 0
+        )
+        image[rows] = np.where(here, photo.image[rows], 0)
+        relative[rows] = np.where(inside, height[rows] - lowest, 0)
     return Decomposition(
         image,
         split.diffuse,
@@ -218,7 +244,7 @@ def assemble(
         reflectance,
         shading,
         normal,
-        np.where(mask, height - height[mask].min(), 0).astype(np.float32),
+        relative,
         mask,
         _confidence(split, normal, photo),
         light,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..networks.detail_network import DetailNetwork
+from ..networks.detail_network import TILE, DetailNetwork
 from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
@@ -133,6 +133,8 @@ class DecompositionTask:
         Predicted log shading at the working scale.
     light_coefficients : LightCoefficientsEstimate or None
         Predicted coefficients of the light.
+    tile : int
+        Side of the tiles that fine relief is found in, pixels; results do not depend on it.
     silhouette : (h, w) ndarray of bool or None
         Outline of the object in `working`; None where it is the working photo's mask.
     options : SolveOptions
@@ -151,6 +153,7 @@ class DecompositionTask:
     normal_estimate: NormalEstimate | None = None
     shading_estimate: ShadingEstimate | None = None
     light_coefficients: LightCoefficientsEstimate | None = None
+    tile: int = TILE
     silhouette: np.ndarray | None = None
     options: SolveOptions = field(default_factory=SolveOptions)
 

@@ -39,3 +39,19 @@ def mask_box(mask: np.ndarray) -> tuple[int, int, int, int]:
         int(columns.stop - columns.start),
         int(rows.stop - rows.start),
     )
+
+
+def mask_diagonal(mask: np.ndarray) -> float:
+    """Return the diagonal of the smallest box around a mask, in pixels.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        At least one pixel is set.
+
+    Returns
+    -------
+    float
+    """
+    _, _, width, height = mask_box(mask)
+    return float(np.hypot(height, width))

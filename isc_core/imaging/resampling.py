@@ -160,7 +160,7 @@ def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -
         np.minimum(((np.arange(n) + 0.5) / factor).astype(int), m - 1)
         for n, m in zip(shape, values.shape, strict=True)
     )
-    return np.asarray(values, float)[np.ix_(rows, columns)]
+    return np.asarray(values[np.ix_(rows, columns)], float)
 
 
 def _apply(plane: np.ndarray, down: sparse.csr_array, right: sparse.csr_array) -> np.ndarray:

@@ -14,6 +14,8 @@ Limits: texture does not continue into a hole; the fill is smooth.
 
 import numpy as np
 
+from ..imaging.row_blocks import row_blocks
+
 
 def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Interpolate all pixels that are not known.
@@ -31,6 +33,32 @@ def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     return _pull_push(
         np.where(known[..., None], values, 0).astype(np.float32), known.astype(np.float32)
     )
+
+
+def fill_at(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Interpolate some pixels that are not known; needs less memory than `fill`.
+
+    Parameters
+    ----------
+    values : (H, W, C) float32 ndarray
+    known : (H, W) bool ndarray
+        At least one pixel.
+    wanted : (H, W) bool ndarray
+        None of them is known.
+
+    Returns
+    -------
+    (n, C) float32 ndarray
+        What `fill` gives there.
+    """
+    parts = []
+    for block in row_blocks((-(-len(known) // 2), known.shape[1])):
+        rows = slice(2 * block.rows.start, 2 * block.rows.stop)
+        here = known[rows]
+        inside = np.where(here[..., None], values[rows], 0).astype(np.float32)
+        parts.append(pull(inside, here.astype(np.float32)))
+    coarse = _pull_push(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+    return _pushed(coarse, np.nonzero(wanted))
 
 
 def _pull_push(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -82,14 +110,19 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     (H, W, C) ndarray
     """
     at = np.nonzero(~known)
+    filled = values.copy()
+    filled[at] = _pushed(coarse, at)
+    return filled
+
+
+def _pushed(coarse: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
+    """The values (n, C) of a coarser level at fine pixels."""
     (row, next_row), (column, next_column) = (
         _nearest_blocks(index, size) for index, size in zip(at, coarse.shape, strict=False)
     )
     upper = 0.75 * coarse[row, column] + 0.25 * coarse[row, next_column]
     lower = 0.75 * coarse[next_row, column] + 0.25 * coarse[next_row, next_column]
-    filled = values.copy()
-    filled[at] = 0.75 * upper + 0.25 * lower
-    return filled
+    return np.asarray(0.75 * upper + 0.25 * lower)
 
 
 def _nearest_blocks(index: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:

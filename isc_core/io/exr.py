@@ -32,8 +32,9 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     Parameters
     ----------
     path : Path
-    channels : mapping of str to (H, W) ndarray
-        All of one shape.
+    channels : mapping of str to (H, W) or (H, W, 3) ndarray
+        All of one height and width. A colour image is written as it is: NAME stands for NAME.R,
+        NAME.G and NAME.B, and RGB for R, G and B.
 
     Raises
     ------

@@ -79,11 +79,11 @@ def fit_under(
     """
     from scipy.optimize import minimize_scalar
 
-    specular, normal, mask = seen.specular, seen.normal, seen.mask
+    mask = seen.mask
     environment = _checked(radiance)
     convention = CONVENTION[options.model]
     if not radiance.any():
-        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, specular.shape)
+        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
     least = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
     rungs = np.linspace(np.log(least), np.log(ALPHAS[1]), _RUNGS)
     tried = [_try(environment, pixels, options, rung) for rung in rungs]
@@ -97,11 +97,10 @@ def fit_under(
     )
     chosen = _try(environment, pixels, options, float(found.x))
     alpha = float(np.exp(chosen.log_alpha))
-    strength, image = _coloured(environment, pixels, chosen, normal, mask, options)
-    total = float(np.square(specular[mask]).sum())
-    explained = float(
-        np.clip(1 - np.square(specular[mask] - image[mask]).sum() / max(total, 1e-300), 0, 1)
-    )
+    strength, image = _coloured(environment, pixels, chosen, seen, options)
+    given = seen.specular_at(mask)
+    left, total = np.square(given - image[mask]).sum(), float(np.square(given).sum())
+    explained = float(np.clip(1 - left / max(total, 1e-300), 0, 1))
     sd_alpha, sd_strength, allowed = _deviations(environment, pixels, chosen, options)
     far = [t for t in tried if abs(t.log_alpha - chosen.log_alpha) > np.log(_FLAT)]
     flat = any(t.loss - chosen.loss < allowed or _alike(t, chosen, pixels) for t in far)
@@ -199,8 +198,7 @@ def _coloured(
     environment: SplitEnvironment,
     pixels: Pixels,
     best: _Try,
-    normal: np.ndarray,
-    mask: np.ndarray,
+    seen: Observed,
     options: LobeFitOptions,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The strength (3,) of each channel and the predicted image (H, W, 3)."""
@@ -210,6 +208,6 @@ def _coloured(
     strength = (scaled * pixels.colour).sum(axis=0) / np.maximum(
         (scaled * shape).sum(axis=0), 1e-300
     )
-    image = np.zeros(normal.shape, np.float32)
-    image[mask] = table_of(environment, options.model, alpha, normal[mask]) * strength
+    image, inside = np.zeros(seen.normal.shape, np.float32), seen.normal_at(seen.mask)
+    image[seen.mask] = table_of(environment, options.model, alpha, inside) * strength
     return strength, image

@@ -312,7 +312,8 @@ def _step(seen: Observed, pixels: Pixels) -> float:
     """
     row, column = pixels.cell[int(np.argmax(pixels.value))]
     near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
-    cosines = (seen.normal[near] @ seen.normal[row, column])[seen.inside[near]]
+    normals, middle = seen.normal_at(near), np.asarray(seen.normal[row, column], float)
+    cosines = (normals @ middle)[seen.inside[near]]
     return float(np.clip(np.arccos(np.clip(cosines.min(), -1, 1)), ALPHAS[0], 1))
 
 
@@ -370,7 +371,7 @@ def _coloured(
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
     cells = np.argwhere(seen.mask)
     place = np.zeros((len(cells), 3)) if seen.places is None else seen.places.at(cells)
-    inside = seen.normal[seen.mask]
+    inside = seen.normal_at(seen.mask)
     values = contributions(problem.model, lamps, inside, place).T @ gains
     if not problem.thresholded:
         values = np.maximum(
@@ -378,7 +379,7 @@ def _coloured(
         )
     image = np.zeros(seen.specular.shape, np.float32)
     image[seen.mask] = values
-    counted, given = seen.inside[seen.mask], seen.specular[seen.mask]
+    counted, given = seen.inside[seen.mask], seen.specular_at(seen.mask)
     left = given - (np.maximum(values - lamps.base[0], 0) if problem.thresholded else values)
     explained = 1 - np.square(left[counted]).sum() / max(
         float(np.square(given[counted]).sum()), 1e-300

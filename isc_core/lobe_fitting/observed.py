@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
+from ..imaging.row_blocks import row_blocks
 from ..scene.light_estimate import LightEstimate
 from ..shading.brdf.directions import unit
 
@@ -134,7 +136,56 @@ class Observed:
     @property
     def peak(self) -> float:
         """The largest mean over the channels."""
-        return float(self.specular[self.inside].mean(axis=1).max()) if self.inside.any() else 0.0
+        return float(self.brightness.max()) if self.inside.any() else 0.0
+
+    @property
+    def brightness(self) -> np.ndarray:
+        """Means over the channels (n,) of the specular light where pixels count."""
+        return channel_means(self.specular, self.inside)
+
+    def specular_at(self, where: np.ndarray) -> np.ndarray:
+        """Return the specular light of some pixels in doubles.
+
+        Parameters
+        ----------
+        where : (H, W) ndarray of bool
+
+        Returns
+        -------
+        (n, 3) ndarray
+        """
+        return np.asarray(self.specular[where], float)
+
+    def normal_at(self, where: np.ndarray | tuple[slice, slice]) -> np.ndarray:
+        """Return the normals of some pixels in doubles.
+
+        Parameters
+        ----------
+        where : (H, W) ndarray of bool, or slices
+
+        Returns
+        -------
+        (..., 3) ndarray
+        """
+        return np.asarray(self.normal[where], float)
+
+
+def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Average the channels of some pixels.
+
+    Parameters
+    ----------
+    values : (H, W, 3) ndarray
+    where : (H, W) ndarray of bool
+
+    Returns
+    -------
+    (n,) ndarray of float
+    """
+    blocks = (block.rows for block in row_blocks(where.shape))
+    return np.concatenate(
+        [np.asarray(values[rows][where[rows]], float).mean(axis=1) for rows in blocks]
+    )
 
 
 def observe(
@@ -160,18 +211,13 @@ def observe(
     Returns
     -------
     Observed
-        As arrays of float.
 
     Raises
     ------
     InputError
         If the arrays do not fit together.
     """
-    specular, normal, mask = (
-        np.asarray(specular, float),
-        np.asarray(normal, float),
-        np.asarray(mask),
-    )
+    specular, normal, mask = (np.asarray(values) for values in (specular, normal, mask))
     shape = mask.shape
     if (
         mask.ndim != 2
@@ -183,7 +229,9 @@ def observe(
         raise InputError(f"{shapes} have to be (H, W, 3), (H, W, 3) and (H, W) bool")
     pixels = pixels or PixelData()
     confidence = (
-        np.ones(shape) if pixels.confidence is None else np.asarray(pixels.confidence, float)
+        np.broadcast_to(1.0, shape)
+        if pixels.confidence is None
+        else np.asarray(pixels.confidence, float)
     )
     clipped = np.zeros(shape, bool) if pixels.clipped is None else np.asarray(pixels.clipped)
     if confidence.shape != shape or clipped.shape != shape or clipped.dtype != bool:
@@ -196,18 +244,23 @@ def observe(
         and (confidence[mask] <= 1).all()
     ):
         raise InputError("the confidence has to be within [0, 1] inside the mask")
-    unit(normal[mask], "normal")
+    _check_unit(normal, mask, "normal")
     if silhouette_normals is not None:
-        silhouette_normals = np.asarray(silhouette_normals, float)
+        silhouette_normals = np.asarray(silhouette_normals)
         if silhouette_normals.shape != normal.shape:
             raise InputError(
                 f"silhouette_normals has shape {silhouette_normals.shape}: give (H, W, 3) like the "
                 "normals"
             )
-        unit(silhouette_normals[mask], "silhouette_normals")
+        _check_unit(silhouette_normals, mask, "silhouette_normals")
     inside = mask & (confidence > 0) & (normal[..., 2] > 0)
     places = _places(pixels.height, mask)
     return Observed(specular, normal, mask, confidence, clipped, inside, places, silhouette_normals)
+
+
+def _check_unit(vectors: np.ndarray, mask: np.ndarray, name: str) -> None:
+    for block in row_blocks(mask.shape):
+        unit(vectors[block.rows][mask[block.rows]], name)
 
 
 def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
@@ -218,8 +271,8 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
         raise InputError(
             f"height has shape {height.shape}: give finite (H, W) pixels like the mask"
         )
-    rows, columns = np.nonzero(mask)
-    low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])
+    box = mask_slices(mask)
+    low, high = np.array([part.start for part in box]), np.array([part.stop - 1 for part in box])
     (row, column), radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
     middle = float((height[mask].min() + height[mask].max()) / 2)
     return Places(height, (float(row), float(column), middle), radius)

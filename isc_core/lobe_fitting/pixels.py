@@ -82,7 +82,7 @@ def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixe
         The same for the same image.
     """
     inside = seen.inside
-    value = seen.specular[inside].mean(axis=1)
+    value = seen.brightness
     order = np.argsort(-value, kind="stable")
     peak = float(value[order[:_PEAK_PIXELS]].mean())
     bright = int((value > _BRIGHT * peak).sum())
@@ -96,9 +96,9 @@ def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixe
     sigma = np.sqrt((noise[0] * peak) ** 2 + (noise[1] * value[taken]) ** 2)
     cell = np.argwhere(inside)[taken]
     return Pixels(
-        normal=seen.normal[inside][taken],
+        normal=np.asarray(seen.normal[inside][taken], float),
         place=np.zeros((len(taken), 3)) if seen.places is None else seen.places.at(cell),
-        colour=seen.specular[inside][taken],
+        colour=np.asarray(seen.specular[inside][taken], float),
         value=value[taken],
         sigma=np.maximum(sigma, np.finfo(float).tiny),
         weight=np.concatenate(weights) * seen.confidence[inside][taken],

@@ -46,6 +46,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_slices
+from ..imaging.row_blocks import row_blocks
 from ..imaging.upsampling import enlarged
 from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import (
@@ -58,7 +59,7 @@ from ..scene.lobe_fit import (
 )
 from ..shading.brdf.ggx import F0
 from .lamps import ALPHAS, Lamps, contributions
-from .observed import Observed
+from .observed import Observed, channel_means
 from .pixels import Pixels
 from .starts import light_of_half_vector
 
@@ -111,10 +112,10 @@ def fit_recovered(
         With one light.
     """
     convention, inside = CONVENTION[options.model], seen.inside
-    light_there = shading[inside].astype(float).mean(axis=1)
+    light_there = channel_means(shading, inside)
     brightest, mirrored_light = (
         float(np.percentile(light_there, _BRIGHTEST)),
-        seen.specular[inside].mean(axis=1),
+        seen.brightness,
     )
     if brightest <= 0 or mirrored_light.sum() < _LEAST_SHARE * light_there.sum():
         return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
@@ -189,35 +190,46 @@ def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     inside = mask[box]
     width = _BLUR * float(np.sqrt(inside.sum()))
     step = max(1, int(width / _BLOCKS))
-    layers = np.where(inside[..., None], np.dstack([normal[box], np.ones(inside.shape)]), 0)
     sums = np.dstack(
         [
             ndimage.gaussian_filter(layer, width / step, mode="constant")
-            for layer in _block_sums(layers, step)
+            for layer in _block_sums(normal[box], inside, step)
         ]
     )
-    sums = enlarged(sums, inside.shape, step)
-    means = sums[..., :3] / np.maximum(sums[..., 3:], 1e-9)
-    means[..., 2] = np.maximum(means[..., 2], _FLATTEST)
     blurred = np.zeros(normal.shape)
     blurred[..., 2] = 1
-    blurred[mask] = (means / np.linalg.norm(means, axis=-1, keepdims=True))[inside]
+    of_box = blurred[box]
+    for block in row_blocks(inside.shape):
+        here = inside[block.rows]
+        near = enlarged(sums, here.shape, step, (block.rows.start, 0))
+        means = near[..., :3] / np.maximum(near[..., 3:], 1e-9)
+        means[..., 2] = np.maximum(means[..., 2], _FLATTEST)
+        unit = means / np.linalg.norm(means, axis=-1, keepdims=True)
+        of_box[block.rows][here] = unit[here]
     return blurred
 
 
-def _block_sums(layers: np.ndarray, step: int) -> np.ndarray:
-    """Sums (C, h, w) of layers (H, W, C) over blocks of `step` x `step` pixels, zero-padded."""
-    padded = np.pad(layers, [(0, -n % step) for n in layers.shape[:2]] + [(0, 0)])
-    rows, columns = (n // step for n in padded.shape[:2])
-    return padded.reshape(rows, step, columns, step, -1).sum(axis=(1, 3)).transpose(2, 0, 1)
+def _block_sums(normal: np.ndarray, inside: np.ndarray, step: int) -> np.ndarray:
+    """Sums (4, h, w) of the normals inside and their number, over blocks of `step` x `step`
+    pixels.
+    """
+    sums = []
+    for block in row_blocks((-(-len(inside) // step), step * inside.shape[1])):
+        rows = slice(step * block.rows.start, step * block.rows.stop)
+        here = inside[rows]
+        layers = np.where(here[..., None], np.dstack([normal[rows], np.ones(here.shape)]), 0)
+        padded = np.pad(layers, [(0, -n % step) for n in here.shape] + [(0, 0)])
+        height, width = (n // step for n in padded.shape[:2])
+        sums.append(padded.reshape(height, step, width, step, -1).sum(axis=(1, 3)))
+    return np.concatenate(sums).transpose(2, 0, 1)
 
 
 def _light_direction(seen: Observed, normal: np.ndarray) -> np.ndarray:
     """From the highlight's mean normal, or the mean of it and the silhouette's."""
-    weight = np.square(seen.specular[seen.inside].mean(axis=1)) * seen.confidence[seen.inside]
+    weight = np.square(seen.brightness) * seen.confidence[seen.inside]
     half = _unit(weight @ normal[seen.inside])
     if seen.silhouette_normals is not None:
-        half = _unit(half + _unit(weight @ seen.silhouette_normals[seen.inside]))
+        half = _unit(half + _unit(weight @ np.asarray(seen.silhouette_normals[seen.inside], float)))
     return light_of_half_vector(half)
 
 
@@ -232,12 +244,13 @@ def _predicted(
     lamps = Lamps(
         light.direction[None], np.zeros(1), np.zeros(1), np.zeros(1), float(np.log(alpha))
     )
-    inside = normal[seen.mask]
     image = np.zeros(seen.specular.shape, np.float32)
-    image[seen.mask] = (
-        contributions(options.model, lamps, inside, np.zeros_like(inside))[0][:, None]
-        * light.strength_light
-    )
-    given = seen.specular[seen.inside]
-    left = np.square(given - image[seen.inside]).sum() / max(float(np.square(given).sum()), 1e-300)
-    return image, float(np.clip(1 - left, 0, 1))
+    for block in row_blocks(seen.mask.shape):
+        here = seen.mask[block.rows]
+        inside = normal[block.rows][here]
+        shares = contributions(options.model, lamps, inside, np.zeros_like(inside))[0]
+        image[block.rows][here] = shares[:, None] * light.strength_light
+    given = seen.specular_at(seen.inside)
+    error = given - image[seen.inside]
+    left, total = (float(np.square(one, out=one).sum()) for one in (error, given))
+    return image, float(np.clip(1 - left / max(total, 1e-300), 0, 1))

@@ -19,6 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..imaging.row_blocks import row_blocks
 from ..scene.decomposition import Decomposition
 from ..shading.brdf.ggx import F0
 from ..shading.brdf.roughness import alpha_from_blender
@@ -77,13 +78,15 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
     from ..shading.lobe_rendering import Lobe, lobe_in_environment
 
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
-    normal = d.normal[d.mask].astype(float)
-    layer = lobe_in_environment(lobe, normal, resampled(environment, _ROWS), d.view_inside)
-    seen = d.image[d.mask]
-    # A channel of zero carries no information: cameras clip colours outside their gamut there.
-    room = np.divide(
-        seen, layer, out=np.full(layer.shape, np.inf), where=(layer > 1e-9) & (seen > 0)
-    )
-    return float(
-        np.percentile(room.min(-1), _SHARE, method="lower")
-    )  # infinite values cannot be interpolated
+    radiance, view = resampled(environment, _ROWS), d.view
+    room = list[np.ndarray]()
+    for block in row_blocks(d.mask.shape):
+        inside = d.mask[block.rows]
+        seen, normal = d.image[block.rows][inside], d.normal[block.rows][inside].astype(float)
+        toward = view if view.ndim == 1 else view[block.rows][inside]
+        layer = lobe_in_environment(lobe, normal, radiance, toward)
+        # A channel of zero carries no information: cameras clip colours outside their gamut there.
+        lit = (layer > 1e-9) & (seen > 0)
+        room.append(np.divide(seen, layer, out=np.full(layer.shape, np.inf), where=lit).min(-1))
+    # infinite values cannot be interpolated
+    return float(np.percentile(np.concatenate(room), _SHARE, method="lower"))

@@ -31,12 +31,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.blocks import block_means
+from ..imaging.tiles import Place
 from .encoder_decoder import EncoderDecoder
+from .layers import space_to_depth
 from .loader import Parameters
 
 INPUTS = 12
 LEVELS, BLOCK = 3, 2  # pixels go in and come out in blocks
 MULTIPLE = BLOCK * 2 ** (LEVELS - 1)  # sides of the network's frame
+REACH = 80  # pixels, a multiple: what a value of the relief depends on is nearer
+BOUND = 64.0  # of the values of layers, which are below 17 on photos
+TILE = 768  # pixels of a tile's side, without what is around it, where memory suffices
 DARK = 0.01  # of the mean light
 COARSE = 8  # pixels: low frequencies are averages of so many
 WEAK = 0.15  # a gain below which slopes are not told
@@ -50,7 +55,7 @@ class DetailNetwork(EncoderDecoder):
 
     title = "detail network"
     file = "detail_network.npz"
-    inputs, outputs, block = INPUTS, 1, BLOCK
+    inputs, outputs, block, bound = INPUTS, 1, BLOCK, BOUND
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""
@@ -123,7 +128,11 @@ def predict_relief(
         Pixels toward the viewer; 0 outside of the mask, and without what half the size can hold.
     """
     network = network or DetailNetwork.shipped()
-    relief = network(channels_of(image, mask, slope, gain, belief))
+    # Channels are handed over and not kept: they take more room than the photo.
+    maps, _ = network.walked_blocks(
+        space_to_depth(channels_of(image, mask, slope, gain, belief), BLOCK)
+    )
+    relief = HEIGHT_UNIT * maps[..., 0]
     return np.where(mask, band(np.where(mask, relief, 0)), 0)
 
 
@@ -154,6 +163,27 @@ def raised(values: np.ndarray) -> np.ndarray:
     (2 H, 2 W) or (2 H, 2 W, C) ndarray
     """
     return _raised_rows(_raised_rows(values).swapaxes(0, 1)).swapaxes(0, 1)
+
+
+def raised_at(values: np.ndarray, place: Place) -> np.ndarray:
+    """Return a part of `raised`.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+    place : tuple of slice
+        Rows and columns of the result, with even ends.
+
+    Returns
+    -------
+    (n, m) or (n, m, C) ndarray
+    """
+    wide = tuple(slice(max(one.start // 2 - 1, 0), one.stop // 2 + 1) for one in place)
+    rows, columns = (
+        slice(one.start - 2 * near.start, one.stop - 2 * near.start)
+        for one, near in zip(place, wide, strict=True)
+    )
+    return raised(values[wide])[rows, columns]
 
 
 def _raised_rows(values: np.ndarray) -> np.ndarray:
@@ -197,19 +227,14 @@ def channels_of(
     bound = np.clip(gain, -STEEPEST, STEEPEST)
     change = (parts[0] - low[0]) / ((bound * bound).sum(axis=2) + WEAK**2)
     least = np.clip(bound * change[..., None], -STEEPEST, STEEPEST)
-    channels = [
-        *(part - smooth for part, smooth in zip(parts, low, strict=True)),
-        low[0],
-        np.ones_like(inside),
-        -p / length,
-        -q / length,
-        bound[..., 0],
-        bound[..., 1],
-        least[..., 0],
-        least[..., 1],
-        np.full_like(inside, belief),
-    ]
-    return (np.stack(channels, axis=2) * inside[..., None]).astype(np.float32)
+    found = np.empty((*mask.shape, INPUTS), np.float32)
+    for k, (part, smooth) in enumerate(zip(parts, low, strict=True)):
+        found[..., k] = (part - smooth) * inside
+    found[..., 3], found[..., 4] = low[0] * inside, inside
+    found[..., 5], found[..., 6] = -p / length * inside, -q / length * inside
+    found[..., 7:9], found[..., 9:11] = bound * inside[..., None], least * inside[..., None]
+    found[..., 11] = np.float32(belief) * inside
+    return found
 
 
 def _spread(values: np.ndarray) -> np.ndarray:

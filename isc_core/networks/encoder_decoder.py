@@ -34,6 +34,9 @@ class EncoderDecoder(Network):
         Channels of a pixel.
     block : int
         Pixels of a block's side.
+    bound : float or None
+        Of the values of layers: a map's values then depend on their surroundings alone, see
+        `layers.convolved`.
     weights : tuple of (9, inputs, outputs) float32 ndarray
         Two for each level down, two for each level up from the coarsest, the output.
     biases : tuple of (outputs,) float32 ndarray
@@ -42,6 +45,7 @@ class EncoderDecoder(Network):
     inputs: ClassVar[int]
     outputs: ClassVar[int]
     block: ClassVar[int]
+    bound: ClassVar[float | None] = None
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -96,15 +100,37 @@ class EncoderDecoder(Network):
         levels : list of ndarray
             The encoder's maps, the finest first.
         """
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        layer, levels = space_to_depth(channels, self.block), []
+        return self.walked_blocks(space_to_depth(channels, self.block))
+
+    def walked_blocks(self, layer: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Go down and up again, from channels in blocks; they are not kept.
+
+        Parameters
+        ----------
+        layer : (H / block, W / block, block^2 inputs) ndarray
+            Of `space_to_depth`.
+
+        Returns
+        -------
+        maps, levels
+            As of `walked`.
+        """
+        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
         for level in range(self.depth):
-            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps)
+            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps, self.bound)
             levels.append(layer)
         for skip in levels[-2::-1]:
-            finer = layer.repeat(2, axis=0).repeat(2, axis=1)
-            layer = conv_block(np.concatenate([skip, finer], axis=2), steps)
-        return depth_to_space(convolved(layer, *next(steps)), self.block), levels
+            layer = conv_block(_beside(skip, layer), steps, self.bound)
+        return depth_to_space(convolved(layer, *next(steps), self.bound), self.block), levels
+
+
+def _beside(skip: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """The encoder's map (H, W, C) and beside it the map (H / 2, W / 2, D) below it, repeated."""
+    both = np.empty((*skip.shape[:2], skip.shape[2] + coarse.shape[2]), np.float32)
+    both[..., : skip.shape[2]] = skip
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        both[row::2, column::2, skip.shape[2] :] = coarse
+    return both
 
 
 @dataclass(frozen=True)

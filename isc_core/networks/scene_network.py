@@ -36,7 +36,7 @@ from ..scene.light_estimate import LightEstimate, mirrored_places
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 from .encoder_decoder import PhotoNetwork
-from .frame import at_full_size, framed
+from .frame import NetworkFrame, at_full_size, framed
 from .layers import inputs_of, softmax
 from .loader import Parameters
 
@@ -205,6 +205,24 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class LayerPrediction:
+    """What the network says of a photo's layers.
+
+    Attributes
+    ----------
+    log_ratio : (H, W, 3) ndarray
+    ratio_scale : (H, W) ndarray
+        As in `ScenePrediction`.
+    log_shading : (H, W, 3) ndarray
+        That of `ScenePrediction.shading`.
+    """
+
+    log_ratio: np.ndarray
+    ratio_scale: np.ndarray
+    log_shading: np.ndarray
+
+
+@dataclass(frozen=True)
 class ScenePrediction:
     """What the network says of a photo.
 
@@ -238,6 +256,11 @@ class ScenePrediction:
     edge: np.ndarray
 
     @property
+    def log_shading(self) -> np.ndarray:
+        """Expected log shading (H, W, 3)."""
+        return self.shading.log_shading
+
+    @property
     def lamps(self) -> LightEstimate:
         """What is known of the lamps."""
         none, one, several = (float(share) for share in self.counts)
@@ -263,10 +286,7 @@ def predict_scene(
     """
     network = network or SceneNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    direct = network(frame.image, frame.mask)
-    mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
-    maps = _settled(direct.maps), _settled(mirrored.maps[:, ::-1]) * _MIRRORED
-    small = 0.5 * (maps[0] + maps[1])
+    small, direct, mirrored = _asked(frame, network)
     factors = dict(zip(TEMPERATURES, network.temperatures, strict=True))
     full = at_full_size(small, frame, mask)
     part = {head: full[..., place] for head, place in HEADS.items()}
@@ -279,9 +299,45 @@ def predict_scene(
             # the standard deviation of a Laplace distribution
             _scale(part[Head.SHADING_SCALE], mask, np.sqrt(2) * factors["shading"]),
         ),
-        *_light_of(direct.vector, mirrored.vector, factors["light"]),
+        *_light_of(direct, mirrored, factors["light"]),
         1 / (1 + np.exp(-part[Head.EDGE][..., 0])) * mask,
     )
+
+
+def predict_layers(
+    image: np.ndarray, mask: np.ndarray, network: SceneNetwork | None = None
+) -> LayerPrediction:
+    """Predict the layers and the shading of a photo: half of the memory of `predict_scene`.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) bool ndarray
+    network : SceneNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    LayerPrediction
+    """
+    network = network or SceneNetwork.shipped()
+    frame = framed(image, mask, SIDE, LONG_SIDE)
+    small, _, _ = _asked(frame, network)
+    factor = network.temperatures[TEMPERATURES.index("ratio")]
+    ratio, log_scale, shading = (
+        at_full_size(small[..., HEADS[head]], frame, mask)
+        for head in (Head.RATIO, Head.RATIO_SCALE, Head.SHADING)
+    )
+    return LayerPrediction(ratio, _scale(log_scale, mask, factor), shading)
+
+
+def _asked(frame: NetworkFrame, network: SceneNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The maps (SIDE, SIDE, CHANNELS), and the vectors of the photo and of its mirror image."""
+    direct = network(frame.image, frame.mask)
+    mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
+    maps = _settled(direct.maps), _settled(mirrored.maps[:, ::-1]) * _MIRRORED
+    return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 
 
 _MIRRORED = np.ones(CHANNELS, np.float32)

@@ -55,6 +55,7 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.bounding_box import mask_slices
+from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import linear_to_srgb
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
@@ -266,14 +267,11 @@ def build_mesh(
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
-    limited = limit_rim(height, mask, options.rim)
     make = _open_sheet if options.back is Back.OPEN else _closed
-    shape = make(limited, normal, mask, options, camera)
+    shape = make(limit_rim(height, mask, options.rim), normal, mask, options, camera)
     pixels = shape.places
     middle = (pixels.min(0) + pixels.max(0)) / 2
-    size = options.metres_per_pixel or options.longest_side / max(
-        np.ptp(np.argwhere(mask), axis=0) + 1
-    )
+    size = options.metres_per_pixel or options.longest_side / max(mask[mask_slices(mask)].shape)
     color, k = base_color(reflectance, mask, options.bleed)
     mesh = TexturedMesh(
         (pixels - middle) * size,
@@ -389,8 +387,8 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     """
     bright = float(np.percentile(reflectance[mask].max(-1).astype(np.float64), 99.5))
     k = _BRIGHT / bright if bright > 0 else 1.0
-    mean = reflectance[mask].astype(np.float64).mean(0)
-    depth = ndimage.distance_transform_edt(mask)
+    mean = reflectance[mask].mean(0, dtype=np.float64)
+    depth = _depth_near(mask, 2 * _widest_fading(mask) + 3)
     rings = dark_rings(reflectance, depth)
     inner = depth > rings
     near, source = nearest_inside(inner, bleed + rings)
@@ -398,6 +396,23 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     color.reshape(-1, 3)[near] = reflectance.reshape(-1, 3)[source]
     color *= k
     return color, k
+
+
+def _widest_fading(inside: np.ndarray) -> int:
+    """Pixels of a border that may be the fading outline of an object."""
+    return max(1, round(_FADING * max(inside[mask_slices(inside)].shape)))
+
+
+def _depth_near(mask: np.ndarray, reach: int) -> np.ndarray:
+    """The distance (H, W) of a mask's pixels from its outside, exact up to `reach`, larger from
+    there on; 0 outside.
+    """
+    depth = np.full(mask.shape, np.inf, np.float32)
+    for block in row_blocks(mask.shape, reach):
+        near = mask[block.wide]
+        if not near.all():
+            depth[block.rows] = ndimage.distance_transform_edt(near)[block.own]
+    return depth
 
 
 def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
@@ -417,15 +432,18 @@ def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
     int
         Pixels; 0 where the border is as bright as what lies within.
     """
-    box = mask_slices(depth > 0)
-    most = max(1, round(_FADING * max(depth[box].shape)))
-    light = reflectance.mean(axis=-1, dtype=np.float64)
-    within = light[(depth > most + 1) & (depth <= 2 * most + 2)]
+    most = _widest_fading(depth > 0)
+
+    def light(above: int, most: int) -> np.ndarray:
+        between = (depth > above) & (depth <= most)
+        return np.asarray(reflectance[between].mean(axis=-1, dtype=np.float64))
+
+    within = light(most + 1, 2 * most + 2)
     if not within.size:
         return 0
     enough = _AS_BRIGHT * float(np.median(within))
     for rings in range(most + 1):
-        if float(np.median(light[(depth > rings) & (depth <= rings + 1)])) >= enough:
+        if float(np.median(light(rings, rings + 1))) >= enough:
             return rings
     return 0
 
@@ -446,9 +464,19 @@ def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndar
     source : (N,) ndarray
         Of the nearest pixel inside to each.
     """
-    distances, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
-    near = np.flatnonzero(~mask & (distances <= distance))
-    return near, rows.reshape(-1)[near].astype(np.int64) * mask.shape[1] + columns.reshape(-1)[near]
+    width, found = mask.shape[1], [np.zeros((2, 0), np.int64)]
+    for block in row_blocks(mask.shape, distance):
+        inside, first = mask[block.wide], block.wide.start
+        if not inside.any():
+            continue
+        away, (rows, columns) = ndimage.distance_transform_edt(~inside, return_indices=True)
+        near = ~inside & (away <= distance)
+        near[: block.own.start] = near[block.own.stop :] = False
+        row, column = np.nonzero(near)
+        source = (rows[near].astype(np.int64) + first) * width + columns[near]
+        found.append(np.stack([(row + first) * width + column, source]))
+    near, source = np.concatenate(found, axis=1)
+    return near, source
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
@@ -464,33 +492,36 @@ def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
     -------
     (H, W) float64 ndarray
     """
-    depth = ndimage.distance_transform_cdt(np.pad(mask, 1), "chessboard")[
-        1:-1, 1:-1
-    ]  # 1 in the outermost ring
-    limited = np.where(mask, height, 0.0).astype(np.float64)
-    step = np.zeros(mask.shape)
+    depth = ndimage.distance_transform_cdt(np.pad(mask, 1), "chessboard")[1:-1, 1:-1]
+    depth = np.minimum(depth, rings + 2).astype(np.int16)  # 1 in the outermost ring
+    limited = np.where(mask, height, 0.0).astype(np.float64, copy=False)
+    step = np.zeros(mask.shape, np.float64)
     for ring in range(rings + 1, 0, -1):
-        current = depth == ring
-        base, weight = _neighbour_mean(limited, depth > ring)
-        updated = current & (weight > 0)
+        at = np.nonzero(depth == ring)
+        base, weight = _neighbour_mean(limited, depth > ring, at)
+        at, base = tuple(part[weight > 0] for part in at), base[weight > 0]
         if ring <= rings:
-            slack = 1.5 * _neighbour_mean(step, depth > ring)[0] + 0.5
-            limited = np.where(updated, np.clip(limited, base - slack, base + slack), limited)
-        step = np.where(updated, np.abs(limited - base), step)
-    outermost = (depth == 1) & (rings > 0)
-    return np.where(outermost, _neighbour_mean(limited, outermost, 5)[0], limited)
+            slack = 1.5 * _neighbour_mean(step, depth > ring, at)[0] + 0.5
+            limited[at] = np.clip(limited[at], base - slack, base + slack)
+        step[at] = np.abs(limited[at] - base)
+    if rings > 0:
+        outermost = depth == 1
+        at = np.nonzero(outermost)
+        limited[at] = _neighbour_mean(limited, outermost, at, 5)[0]
+    return limited
 
 
 def _neighbour_mean(
-    values: np.ndarray, valid: np.ndarray, size: int = 3
+    values: np.ndarray, valid: np.ndarray, at: tuple[np.ndarray, ...], size: int = 3
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of the valid pixels in each pixel's `size` x `size` neighbourhood, and their
-    number.
+    """Mean of the valid pixels in the `size` x `size` neighbourhood of pixels `at`, and their
+    number, each (n,).
     """
-    weight = ndimage.uniform_filter(valid.astype(np.float64), size, mode="constant") * size**2
-    total = ndimage.uniform_filter(np.where(valid, values, 0.0), size, mode="constant") * size**2
-    count = np.rint(weight)
-    return total / np.maximum(count, 1), count
+    total = np.where(valid, values, 0.0)
+    ndimage.uniform_filter(total, size, output=total, mode="constant")
+    weight = ndimage.uniform_filter(valid.astype(np.float32), size, mode="constant")
+    count = np.rint(weight[at].astype(np.float64) * size**2)
+    return total[at] * size**2 / np.maximum(count, 1), count
 
 
 def _check_inputs(
@@ -535,9 +566,13 @@ def _triangulated(
         )
     if not budget or 2 * np.count_nonzero(cells) <= budget:
         return 1, _full_grid(cells), False
-    cosine, stride = (normal * view).sum(axis=-1), 1
+    cosine, stride = np.empty(mask.shape, np.float32), 1
+    for block in row_blocks(mask.shape):
+        toward = view if view.ndim == 1 else view[block.rows]
+        cosine[block.rows] = (normal[block.rows] * toward).sum(axis=-1)
     while True:
-        thinned = height[::stride, ::stride] / stride, cells, cosine[::stride, ::stride]
+        thin = height if stride == 1 else height[::stride, ::stride] / stride
+        thinned = thin, cells, cosine[::stride, ::stride]
         if (found := adaptive_triangles(*thinned, budget)) is not None:
             return stride, found, True
         coarser = _cells_inside(mask, 2 * stride)

@@ -6,6 +6,8 @@ from functools import cached_property
 import numpy as np
 from PIL import Image, ImageFilter
 
+from ..imaging.bounding_box import mask_slices
+
 SIDE = 320  # pixels
 MARGIN = 0.06  # room around the object, of the panel's side
 
@@ -63,8 +65,8 @@ class Frame:
         -------
         Frame
         """
-        rows, columns = np.nonzero(mask)
-        box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
+        rows, columns = mask_slices(mask)
+        box = int(rows.start), int(rows.stop), int(columns.start), int(columns.stop)
         return cls(mask, box, SIDE * (1 - 2 * MARGIN) / max(box[1] - box[0], box[3] - box[2]))
 
     @cached_property

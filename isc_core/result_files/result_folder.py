@@ -13,7 +13,7 @@ completely or not at all (see `io.atomic`).
 import json
 import math
 import shutil
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,7 @@ from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
+from ..io.memory import LARGE, give_back_memory
 from ..io.printable_names import readable
 from ..photo.camera import Camera
 from ..photo.grabcut import encoded_mask
@@ -127,7 +128,7 @@ def save(
         channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
     if decomposition.visibility is not None:
         channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
-    if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
+    if broken := sorted(_broken(channels)):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     # The pool inside the folder: the preview is done, or has failed, before the folder is removed.
     with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(1) as pool:
@@ -140,9 +141,13 @@ def save(
         (partial / "maps").mkdir()
         for name, letters in SINGLE.items():
             values = getattr(decomposition, name)
-            write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
+            whole = name in COLOR_MAPS
+            planes = {letters: values} if whole else _planes(values, list(letters))
+            write_channels(partial / "maps" / f"{name}.exr", planes)
         monitor.report("building the mesh", 0.4)
         d = decomposition
+        if d.mask.size > LARGE:
+            give_back_memory()
         built = mesh_of(d, mesh)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
@@ -156,6 +161,15 @@ def save(
         monitor.report("drawing the preview", 0.7)
         preview.result()
         monitor.report("writing maps", 1.0)
+
+
+def _broken(channels: Mapping[str, np.ndarray]) -> Iterator[str]:
+    """The channels with values that are not finite."""
+    for name, values in channels.items():
+        planes = {name: values}
+        if values.ndim == 3:
+            planes = _planes(values, [f"{name}.{letter}" for letter in "RGB"])
+        yield from (plane for plane in planes if not np.isfinite(planes[plane]).all())
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:
@@ -346,7 +360,10 @@ def _planes(values: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
 def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict[str, np.ndarray]:
     channels: dict[str, np.ndarray] = {}
     for name, letters in layers.items():
-        channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
+        if letters == "RGB":
+            channels[name] = maps[name]
+        else:
+            channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
     return channels
 
 

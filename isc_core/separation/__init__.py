@@ -188,5 +188,6 @@ def _uncrop(layer: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...])
     import numpy as np
 
     full = np.zeros((*shape, *layer.shape[2:]), layer.dtype)
-    full[box] = layer
+    if layer.any():  # zeros that nobody writes take no memory
+        full[box] = layer
     return full

@@ -36,7 +36,7 @@ reflectance that fades in smoothly on a coloured object passes for a highlight.
 """
 
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
 
@@ -45,6 +45,7 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.channels import largest, smallest
+from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian, weighted_gaussian
 from ..imaging.upsampling import enlarged
 from ..progress import Monitor
@@ -75,6 +76,7 @@ _TINY = np.float32(1e-9)
 _MIN_PEAK = 1 / 512
 # Gaussian sigmas, in pixels, applied before the ratios by hue and by place are computed.
 _BY_HUE, _BY_PLACE = 0.7, 1.0
+_SMOOTH_REACH = 3  # pixels, at least, of `_BY_HUE`
 # Steps of log C and of the hue's shares that count as an edge; the share of the brightest value
 # below which C is noise.
 _CHROMA_STEP, _SHARE_STEP, _DARK = 0.5, 0.1, 0.03
@@ -174,11 +176,11 @@ class _ObjectMaps:
 
     @cached_property
     def peak(self) -> float:
-        return max(float(np.quantile(self.image[self.mask], 0.999)), float(_TINY))
+        return _peak(self.image, self.mask)
 
     @cached_property
     def base(self) -> float:
-        return max(float(self.low[self.mask].mean(dtype=float)), float(_TINY) * self.peak)
+        return _base(self.low, self.mask, self.peak)
 
     @cached_property
     def noise(self) -> float:
@@ -187,6 +189,10 @@ class _ObjectMaps:
     @cached_property
     def chroma(self) -> np.ndarray:
         return self.high - self.low
+
+    def rows(self, rows: slice) -> "_ObjectMaps":
+        maps = self.image, self.mask, self.usable, self.low, self.high, self.hue
+        return _ObjectMaps(*(one[rows] for one in maps))
 
     @property
     def diagonal(self) -> float:
@@ -273,22 +279,21 @@ def separate(
     monitor.report("testing highlight candidates", 0.3)
     candidates = _candidates(photo, ratios, options)
     monitor.report("removing highlights", 0.8)
-    if factor > 1:
-        photo = _object_maps(image, mask, usable)
-        candidates = _upsample_candidates(photo, ratios, candidates, factor)
-    specular = np.maximum(
-        candidates.by_hue * _apply_prior(candidates.gain_by_hue, prior),
-        candidates.by_place * _apply_prior(candidates.gain_by_place, prior),
-    )
-    if float(specular.max()) < _MIN_PEAK * photo.peak:
+    if factor == 1:
+        specular, low = _weighed(candidates, prior), photo.low
+    else:
+        specular, low = _of_full_size(image, mask, ratios, candidates, factor, prior)
+    peak = _peak(image, mask)
+    if float(specular.max()) < _MIN_PEAK * peak:
         specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
     unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
-    confidence = np.where(unclipped, _confidence(photo, split.specular[..., 0]), 0)
-    return Separation(
-        unit * split.diffuse, unit * split.specular, unit * split.residual, confidence
-    )
+    likely = _confidence(image, mask, low, _base(low, mask, peak), split.specular[..., 0])
+    for layer in (split.diffuse, split.specular, split.residual):
+        if layer.any():  # zeros that nobody has written take no memory
+            layer *= unit
+    return replace(split, confidence=np.where(unclipped, likely, 0))
 
 
 class Abstention(Enum):
@@ -445,12 +450,14 @@ def _diffuse_ratios(photo: _ObjectMaps, options: IscOptions) -> _DiffuseRatios:
     return _DiffuseRatios(grid, places, share, quantile(near, 0.5))
 
 
-def _places(grid: HueGrid, photo: _ObjectMaps, scale: float) -> Places:
+def _places(grid: HueGrid, photo: _ObjectMaps, scale: float, first: int = 0) -> Places:
     """Grid positions of the mask's pixels.
 
-    `scale`: size of the photo relative to the image for which the grid was built.
+    `scale`: size of the photo relative to the image for which the grid was built. `first`: its row
+    at which `photo` begins.
     """
     rows, columns = np.nonzero(photo.mask)
+    rows += first
     return grid.places(
         (rows + 0.5) / scale - 0.5, (columns + 0.5) / scale - 0.5, photo.hue[photo.mask]
     )
@@ -620,19 +627,50 @@ def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Obje
     return Paths(across, down, reach)
 
 
-def _upsample_candidates(
-    full: _ObjectMaps, ratios: _DiffuseRatios, candidates: _Candidates, factor: int
-) -> _Candidates:
-    """Candidates of the block-averaged photo, upsampled by `factor` to the full one."""
-    mask = full.mask
-    hue_share = _as_map(_places(ratios.grid, full, factor).read(ratios.share), mask)
-    gain_by_hue, gain_by_place, share = (
-        enlarged(layer, mask.shape, factor)
-        for layer in (candidates.gain_by_hue, candidates.gain_by_place, candidates.share)
+def _of_full_size(
+    image: np.ndarray,
+    mask: np.ndarray,
+    ratios: _DiffuseRatios,
+    candidates: _Candidates,
+    factor: int,
+    prior: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """s and the smoothed min I (H, W) of a photo, from the candidates of its block averages."""
+    specular, low = np.empty(mask.shape, np.float32), np.empty(mask.shape, np.float32)
+    for block in row_blocks(mask.shape, halo=_SMOOTH_REACH):
+        wide, first = block.wide, block.rows.start
+        maps = _object_maps(image[wide], mask[wide], mask[wide])
+        part = maps.rows(block.own)
+        places = _places(ratios.grid, part, factor, first)
+        hue_share = _as_map(places.read(ratios.share), part.mask)
+        gain_by_hue, gain_by_place, share = (
+            enlarged(layer, part.mask.shape, factor, (first, 0))
+            for layer in (candidates.gain_by_hue, candidates.gain_by_place, candidates.share)
+        )
+        by_hue = _specular(part.low, part.chroma, hue_share)
+        by_place = _specular(part.low, part.chroma, share)
+        here = None if prior is None else prior[block.rows]
+        specular[block.rows] = _weighed(
+            _Candidates(by_hue, gain_by_hue, by_place, gain_by_place, share), here
+        )
+        low[block.rows] = part.low
+    return specular, low
+
+
+def _weighed(candidates: _Candidates, prior: np.ndarray | None) -> np.ndarray:
+    """s, the larger of the two candidates as far as they are gains."""
+    return np.maximum(
+        candidates.by_hue * _apply_prior(candidates.gain_by_hue, prior),
+        candidates.by_place * _apply_prior(candidates.gain_by_place, prior),
     )
-    by_hue = _specular(full.low, full.chroma, hue_share)
-    by_place = _specular(full.low, full.chroma, share)
-    return _Candidates(by_hue, gain_by_hue, by_place, gain_by_place, share)
+
+
+def _peak(image: np.ndarray, mask: np.ndarray) -> float:
+    return max(float(np.quantile(image[mask], 0.999)), float(_TINY))
+
+
+def _base(low: np.ndarray, mask: np.ndarray, peak: float) -> float:
+    return max(float(low[mask].mean(dtype=float)), float(_TINY) * peak)
 
 
 def _apply_prior(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
@@ -643,11 +681,13 @@ def _apply_prior(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
     return accepted / np.maximum(accepted + rejected, _TINY)
 
 
-def _confidence(photo: _ObjectMaps, specular: np.ndarray) -> np.ndarray:
+def _confidence(
+    image: np.ndarray, mask: np.ndarray, low: np.ndarray, base: float, specular: np.ndarray
+) -> np.ndarray:
     """exp(-e / u) (H, W): the expected error e is a share of s and of what
     the smallest channel could hide.
 
     On a pale object colour is a weak cue: e is up to three times as large.
     """
-    error = (specular + 0.3 * photo.low) * (3 - 2 * saturation_gate(photo.image, photo.mask))
-    return np.where(photo.mask, np.exp(-error / photo.base), 0).astype(np.float32)
+    error = (specular + 0.3 * low) * (3 - 2 * saturation_gate(image, mask))
+    return np.where(mask, np.exp(-error / base), 0).astype(np.float32)

@@ -26,7 +26,13 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
-from ..networks.scene_network import SceneNetwork, ScenePrediction, predict_scene
+from ..imaging.bounding_box import mask_diagonal
+from ..networks.scene_network import (
+    LayerPrediction,
+    SceneNetwork,
+    ScenePrediction,
+    predict_scene,
+)
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .support.checks import check_arrays
@@ -113,12 +119,12 @@ def separate(
     return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))
 
 
-def sure_ratio(seen: ScenePrediction, options: NetworkOptions) -> np.ndarray:
+def sure_ratio(seen: ScenePrediction | LayerPrediction, options: NetworkOptions) -> np.ndarray:
     """Return how much of the predicted log ratio of a photo and its diffuse image is sure.
 
     Parameters
     ----------
-    seen : ScenePrediction
+    seen : ScenePrediction or LayerPrediction
     options : NetworkOptions
         `doubt` is used.
 
@@ -145,8 +151,7 @@ def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, options: NetworkOp
     -------
     bool
     """
-    rows, columns = np.nonzero(mask)
-    diagonal = float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1))
+    diagonal = mask_diagonal(mask)
     side = max(3, 2 * round(_SPECK * diagonal) + 1)
     broad = ndimage.grey_opening(ratio.mean(axis=2), side)[mask]
     return float(broad.max() - np.quantile(broad, _MOST_SHARE)) > options.stands_out

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.row_blocks import row_blocks
 from .precision import strength_of
 from .priors.priors import SilhouetteProfile
 
@@ -96,10 +97,17 @@ def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarr
     (H, W, 3) ndarray
         Camera frame; (0, 0, 1) outside the mask.
     """
-    u, down, right = silhouette_coordinates(mask)
-    lean = np.where(mask, np.clip(profile.at(u)[0], -_STEEPEST, _STEEPEST), 0)
-    normal = np.dstack([lean * right, -lean * down, np.sqrt(1 - lean**2)])
-    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+    distance, deepest = _depth(mask)
+    smooth = _smoothed(distance, deepest)
+    normal = np.empty((*mask.shape, 3))
+    for block in row_blocks(mask.shape, halo=1):
+        rows = block.rows
+        down, right = (part[block.own] for part in _downhill(smooth[block.wide]))
+        mean = profile.at(distance[rows] / deepest)[0]
+        lean = np.where(mask[rows], np.clip(mean, -_STEEPEST, _STEEPEST), 0)
+        part = np.dstack([lean * right, -lean * down, np.sqrt(1 - lean**2)])
+        normal[rows] = part / np.linalg.norm(part, axis=-1, keepdims=True)
+    return normal
 
 
 def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
@@ -115,8 +123,16 @@ def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarray]:
-    smooth = ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest))
-    down, right = np.gradient(smooth)
+    return _downhill(_smoothed(distance, deepest))
+
+
+def _smoothed(distance: np.ndarray, deepest: float) -> np.ndarray:
+    return np.asarray(ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest)))
+
+
+def _downhill(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The direction in which a map falls, down and right, each (H, W)."""
+    down, right = np.gradient(height)
     length = np.maximum(np.hypot(down, right), 1e-6)
     return -down / length, -right / length
 

@@ -20,7 +20,7 @@ from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.imaging.area_resize import averaged
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.inpainting.patch_fill import fill_patches
-from isc_core.inpainting.pull_push import fill
+from isc_core.inpainting.pull_push import fill, fill_at
 from isc_core.lobe_fitting import PixelData, RecoveredScene, fit_lobe
 from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, share_explained
 from isc_core.photo import tidy_mask
@@ -205,6 +205,12 @@ def test_thresholds(case: tuple[MadePhoto, int, str, int]) -> None:
     assert found.value <= best.value + close, "an optimiser exceeds the exact maximum"
     assert best.value >= fewer.value - close, "one more threshold is worse"
     assert np.array_equal(found.thresholds, again.thresholds), "not deterministic"
+
+
+@law(photos(3, 28), seconds=0.1)
+def test_filling_some_pixels_is_filling_all(made: MadePhoto) -> None:
+    image, known = made.light().astype(np.float32), made.inside()
+    np.testing.assert_array_equal(fill_at(image, known, ~known), fill(image, known)[~known])
 
 
 @law(photos(3, 28), seconds=0.1)

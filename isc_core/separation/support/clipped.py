@@ -18,7 +18,7 @@ refilled like a highlight.
 import numpy as np
 
 from ...imaging.channels import largest, mean_channel, smallest
-from ...inpainting.pull_push import fill
+from ...inpainting.pull_push import fill_at
 from ...scene.decomposition import Separation
 
 # A channel at this share of the pixel's largest, clipped one counts as clipped too: scaling and
@@ -49,9 +49,11 @@ def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) ->
     valid = mask & ~clipped
     if not clipped.any() or not valid.any():
         return split
-    image = (split.diffuse + split.specular + split.residual)[clipped]
+    image = split.diffuse[clipped] + split.specular[clipped] + split.residual[clipped]
     removed = mean_channel(split.specular)
-    around = fill(np.concatenate([split.diffuse, removed[..., None]], axis=2), valid)[clipped]
+    around = np.concatenate(
+        [fill_at(values, valid, clipped) for values in (split.diffuse, removed[..., None])], axis=1
+    )
     high = largest(image)
     full = image >= _FULL * high[:, None]
     light = np.maximum(around[:, 3], removed[clipped])

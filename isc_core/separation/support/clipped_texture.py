@@ -16,19 +16,28 @@ becomes the mean of the two, at most the image.
 Citation: Y. Wexler, E. Shechtman and M. Irani 2007, doi:10.1109/TPAMI.2007.60; choice by held-out
 values: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x.
 
+Objects whose box has more than a million pixels are filled hole by hole, each from its
+surroundings, half as wide as the hole.
+
 Limits: light that the separation has left around a hole flows into it. A hole without known pixels
 around it is filled smoothly.
 """
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy import ndimage
 
+from ...imaging.bounding_box import mask_slices
+from ...imaging.tiles import Place
 from ...inpainting.patch_fill import fill_patches
 from ...inpainting.pull_push import fill
 
 _RING = 4  # pixels held out around a hole, half a patch
 _BETTER = 0.8  # of the smooth fill's error on the ring, to be undercut by patches
 _DARK = 1e-3  # of the brightest value: the least in logarithms
+_LARGE = 1 << 20  # pixels: larger objects are not searched as a whole
+_CELL = 64  # pixels: holes that are nearer than about two cells are filled together
 _TOUCHING = np.ones((3, 3))
 
 
@@ -57,17 +66,49 @@ def continue_under_clipped(
     holes, known = clipped & mask, mask & ~clipped
     if not holes.any() or not known.any():
         return diffuse
-    rows, columns = np.nonzero(mask)
-    box = slice(rows.min(), rows.max() + 1), slice(columns.min(), columns.max() + 1)
-    shading = np.where(mask[..., None], log_shading, 0)[box].astype(np.float32)
-    there = _continued(
-        np.asarray(diffuse[box], np.float32), known[box], holes[box], shading, _DARK * image.max()
-    )
-    filled = diffuse.copy()
-    at = holes[box]
-    mean = 0.5 * (diffuse[box][at] + np.clip(there[at], 0, image[box][at]))
-    filled[box][at] = mean
+    filled, dark = diffuse.copy(), _DARK * image[mask].max()
+    for place, own in _windows(mask, holes, known):
+        shading = np.where(mask[place][..., None], log_shading[place], 0).astype(np.float32)
+        given = np.asarray(diffuse[place], np.float32)
+        there = _continued(given, known[place], holes[place], shading, dark)
+        mean = 0.5 * (diffuse[place][own] + np.clip(there[own], 0, image[place][own]))
+        filled[place][own] = mean
     return filled
+
+
+def _windows(
+    mask: np.ndarray, holes: np.ndarray, known: np.ndarray
+) -> Iterator[tuple[Place, np.ndarray]]:
+    """Parts of the object to fill holes from, each with those of its holes that belong to it: the
+    whole object, or the surroundings of holes that are near each other on a large one.
+    """
+    box = mask_slices(mask)
+    if holes[box].size <= _LARGE:
+        yield box, holes[box]
+        return
+    of_box = holes[box]
+    padded = np.pad(of_box, [(0, -n % _CELL) for n in of_box.shape])
+    rows, columns = (n // _CELL for n in padded.shape)
+    cells = padded.reshape(rows, _CELL, columns, _CELL).any(axis=(1, 3))
+    labels, _ = ndimage.label(ndimage.binary_dilation(cells, _TOUCHING), _TOUCHING)
+    for k, part in enumerate(ndimage.find_objects(labels), 1):
+        length = _CELL * max(1, max(one.stop - one.start for one in part) // 2)
+        while True:
+            near = tuple(
+                slice(max(_CELL * one.start - length, 0), min(_CELL * one.stop + length, size))
+                for one, size in zip(part, of_box.shape, strict=True)
+            )
+            place = _moved(near[0], box[0].start), _moved(near[1], box[1].start)
+            if known[place].any():
+                break
+            length *= 2
+        group = labels == k
+        own = group.repeat(_CELL, axis=0).repeat(_CELL, axis=1)[near] & of_box[near]
+        yield place, own
+
+
+def _moved(part: slice, by: int) -> slice:
+    return slice(part.start + by, part.stop + by)
 
 
 def _continued(

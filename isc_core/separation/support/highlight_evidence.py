@@ -32,6 +32,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
 from ...photo.highlight_marks import HighlightMarks, Place
 
@@ -92,15 +93,8 @@ def highlight_evidence(
     bright = float(np.quantile(mean_channel(image)[mask], 0.99))
     labels, count = ndimage.label(removed > max(_FAINT * bright, 1e-12))
     dark = _DARK * bright + 1e-12
-    chroma = largest(image) - smallest(image)
-    maps = np.stack(
-        [np.log(np.maximum(one, 0) + dark) for one in (chroma, mean_channel(diffuse))], axis=2
-    )
-    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
-    form = np.stack([mean_channel(log_ratio), ratio_scale, saturation], axis=2).astype(float)
-    rows, columns = np.nonzero(mask)
     # whole pixels; the ring beyond it is two wide
-    reach = max(2, int(_RING * np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
+    reach = max(2, int(_RING * mask_diagonal(mask)))
     numbers, found = list[int](), list[list[float]]()
     for k, box in enumerate(ndimage.find_objects(labels, count), 1):
         wide = tuple(slice(max(0, one.start - reach - 3), one.stop + reach + 3) for one in box)
@@ -108,8 +102,26 @@ def highlight_evidence(
         if inside.sum() < _LEAST:
             continue
         numbers.append(k)
-        found.append(_values(inside, removed[wide], mask[wide], maps[wide], form[wide], reach))
+        maps = _steps_of(image[wide], diffuse[wide], dark)
+        form = _form(diffuse[wide], log_ratio[wide], ratio_scale[wide], dark)
+        found.append(_values(inside, removed[wide], mask[wide], maps, form, reach))
     return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, 4))
+
+
+def _steps_of(image: np.ndarray, diffuse: np.ndarray, dark: float) -> np.ndarray:
+    """Logarithms of C and of D (h, w, 2)."""
+    chroma = largest(image) - smallest(image)
+    return np.stack(
+        [np.log(np.maximum(one, 0) + dark) for one in (chroma, mean_channel(diffuse))], axis=2
+    )
+
+
+def _form(
+    diffuse: np.ndarray, log_ratio: np.ndarray, ratio_scale: np.ndarray, dark: float
+) -> np.ndarray:
+    """y, b and the saturation of D (h, w, 3)."""
+    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
+    return np.stack([mean_channel(log_ratio), ratio_scale, saturation], axis=2).astype(float)
 
 
 def _values(
@@ -182,8 +194,7 @@ def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np
     if not places or not labels.any():
         return found
     distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
-    rows, columns = np.nonzero(mask)
-    reach = max(2.0, _NEAR * float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1)))
+    reach = max(2.0, _NEAR * mask_diagonal(mask))
     for x, y in places:
         at = (min(int(y), labels.shape[0] - 1), min(int(x), labels.shape[1] - 1))
         if distance[at] <= reach:

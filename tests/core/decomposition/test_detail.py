@@ -1,5 +1,6 @@
 """The stage of fine relief: what it may change, at every size."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,12 @@ import isc_core
 from isc_core.decomposition import detail
 from isc_core.decomposition.detail import fine_relief, shading_gain, slopes
 from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import Settings
 from isc_core.errors import Cancelled, InputError
 from isc_core.imaging.blocks import block_means
+from isc_core.imaging.tiles import Tile, tiles_of
+from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.known_inputs import KnownInputs
@@ -62,12 +66,18 @@ def test_a_level_that_is_not_asked_for_adds_nothing() -> None:
     assert not fine_relief(diffuse, mask, height, LIGHT, 100).any()
 
 
-def test_tiles_have_no_seams(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("tile", [80, 128, 336])
+def test_tiles_of_any_size_give_the_same_relief(tile: int) -> None:
     diffuse, mask, height = ball(400)
-    whole = fine_relief(diffuse, mask, height, LIGHT, 4096)
-    monkeypatch.setattr(detail, "_TILE", 128)
-    tiled = fine_relief(diffuse, mask, height, LIGHT, 4096)
-    assert np.abs(tiled - whole).max() < 1e-3 * np.abs(whole).max()
+    whole = fine_relief(diffuse, mask, height, LIGHT, 4096, tile=512)
+    assert np.array_equal(whole, fine_relief(diffuse, mask, height, LIGHT, 4096, tile=tile))
+    assert whole.any()
+
+
+def test_tiles_smaller_than_their_overlap_are_refused() -> None:
+    diffuse, mask, height = ball(97)
+    with pytest.raises(InputError, match=r"tiles of 72 pixels are smaller than their overlap"):
+        fine_relief(diffuse, mask, height, LIGHT, 4096, tile=72)
 
 
 def test_the_place_in_the_frame_does_not_matter() -> None:
@@ -106,6 +116,29 @@ def test_the_overall_shape_does_not_depend_on_the_size_of_the_maps() -> None:
     small, large = (solved(240, detail=0, max_size=size) for size in (96, 0))
     assert small.mask.shape[0] < large.mask.shape[0]
     assert np.array_equal(small.illumination, large.illumination)
+
+
+@pytest.mark.slow
+def test_less_memory_gives_the_same_result_until_it_is_too_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    diffuse, mask, _ = ball(500)
+    sides = []
+
+    def noted(mask: np.ndarray, side: int, *rest: int) -> Iterator[Tile]:
+        sides.append(side)
+        return tiles_of(mask, side, *rest)
+
+    monkeypatch.setattr(detail, "tiles_of", noted)
+    source = PhotoSource("", mask.shape[::-1], 8, "srgb", "file")
+    image, none = diffuse.astype(np.float32), np.zeros_like(mask)
+    photo, settings = Photo(image, mask, 1 / 3300, none, source), Settings(model="sirfs")
+    much, little = (decompose(photo, settings, memory=size) for size in (2**31, 380_000_000))
+    assert max(sides) == 768 and min(sides) < 400
+    for name in ("height", "normal", "reflectance"):
+        assert np.array_equal(getattr(much, name), getattr(little, name))
+    with pytest.raises(InputError, match=r"need about 0\.4 GB of memory, more than the 0\.2 GB"):
+        decompose(photo, settings, memory=200_000_000)
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from isc_core.networks.detail_network import (
     channels_of,
     predict_relief,
     raised,
+    raised_at,
 )
 from tests.core.networks.random_convolutions import random_convolutions
 
@@ -133,3 +134,10 @@ def test_the_shipped_network_finds_bumps_and_keeps_print() -> None:
 def _slopes(height: np.ndarray) -> np.ndarray:
     down, right = np.gradient(height)
     return np.stack([right, down], axis=2)
+
+
+def test_a_part_of_a_raised_map_is_that_of_the_whole() -> None:
+    values = np.random.default_rng(0).normal(size=(9, 12, 2)).astype(np.float32)
+    whole = raised(values)
+    for rows, columns in ((slice(0, 18), slice(0, 24)), (slice(4, 6), slice(10, 24))):
+        assert np.array_equal(raised_at(values, (rows, columns)), whole[rows, columns])

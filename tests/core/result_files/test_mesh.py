@@ -4,6 +4,7 @@ import io
 import json
 import struct
 from dataclasses import replace
+from functools import partial
 from math import log, pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -15,14 +16,17 @@ from PIL import Image
 from scipy import ndimage
 
 from isc_core.errors import InputError
+from isc_core.imaging.row_blocks import row_blocks
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
+from isc_core.result_files import mesh as mesh_module
 from isc_core.result_files.mesh import (
     MeshResult,
     base_color,
     build_mesh,
     dark_rings,
     limit_rim,
+    nearest_inside,
 )
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.scene.decomposition import Decomposition
@@ -506,3 +510,19 @@ def test_blender_shows_no_gloss_that_is_not_known(tmp_path: Path) -> None:
     material = next(o for o in bpy.data.objects if o.type == "MESH").data.materials[0]
     shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     assert shader.inputs["Specular IOR Level"].default_value == 0
+
+
+def test_the_nearest_pixels_inside_are_those_of_the_whole_map(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(2)
+    mask = ndimage.gaussian_filter(rng.normal(size=(90, 70)), 6) > 0.02
+    away, places = ndimage.distance_transform_edt(~mask, return_indices=True)
+    for pixels in (70, 1 << 18):  # one row at a time, and all of them
+        monkeypatch.setattr(mesh_module, "row_blocks", partial(row_blocks, pixels=pixels))
+        near, source = nearest_inside(mask, 5)
+        assert np.array_equal(near, np.flatnonzero(~mask & (away <= 5)))
+        assert np.array_equal(source, (places[0] * 70 + places[1]).ravel()[near])
+        depth, exact = mesh_module._depth_near(mask, 4), ndimage.distance_transform_edt(mask)
+        assert np.array_equal(depth[exact <= 4], exact[exact <= 4].astype(np.float32))
+        assert (depth[exact > 4] > 4).all()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from isc_core.inpainting.pull_push import fill
+from isc_core.separation.support import clipped_texture
 from isc_core.separation.support.clipped_texture import continue_under_clipped
 
 SIDE = 96
@@ -39,6 +40,23 @@ def test_stripes_go_on_under_a_clipped_highlight() -> None:
     photo, smooth, clipped = lit(diffuse, mask)
     found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
     assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_holes_of_a_large_object_are_filled_from_their_surroundings(
+    apart: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(clipped_texture, "_LARGE", 100)
+    monkeypatch.setattr(clipped_texture, "_CELL", 8)
+    diffuse, log_shading, mask = ball(0.4)
+    photo, smooth, clipped = lit(diffuse, mask)
+    if apart:
+        clipped[70, 30:33] = True
+        photo[70, 30:33] = 1
+    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
+    np.testing.assert_array_equal(found[~clipped], smooth[~clipped])
+    assert apart == bool((found[70, 30:33] != smooth[70, 30:33]).any())
 
 
 def test_plain_paint_is_not_worse_than_the_smooth_fill() -> None:
