@@ -111,6 +111,9 @@ class _Highlights(_Panel):
             self.layout.label(text="Needs the model Joint", icon="INFO")
         layout = self.layout.column()
         layout.enabled = settings.model == "joint"
+        choice = layout.column()
+        choice.use_property_split = True
+        choice.prop(settings, "highlight_odds")
         row = layout.row(align=True)
         row.operator("isc.mark_highlight", icon="ADD").reject = False
         row.operator("isc.mark_highlight", text="Not a Highlight", icon="REMOVE").reject = True

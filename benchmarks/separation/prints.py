@@ -1,14 +1,15 @@
 """What is not a highlight: light that methods take off painted bodies, matt and glossy.
 
   python -m benchmarks.separation.prints WORLD --panoramas DIR [--part choice|report] [--count N]
-  [--methods isc,network,joint,marked,chain] [--sheet JPG] [--json FILE]
+  [--methods isc,network,joint,marked,chain,joint@ODDS] [--sheet JPG] [--json FILE]
   python -m benchmarks.separation.prints WORLD --photos DIR --sheet JPG
 
 WORLD is a folder of `isc world build`; the photos are those of `print_set`. Constants are fitted on
 `Part.FIT` (`print_rule`), rules are chosen on `Part.CHOICE`, figures are reported on `Part.REPORT`.
 `isc` and `network` are separators, `joint` the layers of `isc decompose` before reflectance is
 continued, `chain` all of `isc decompose` (minutes). `marked` is `joint` with one click: at the
-strongest highlight of a glossy body, as a person sees it; none on a matt one.
+strongest highlight of a glossy body, as a person sees it; none on a matt one. `joint@1` is `joint`
+with other odds than the default.
 
 Matt: share of the light taken off, and its RMS over the photo's. Glossy: squared error of the
 specular light over that of none. 1 is what doing nothing reaches; intervals are of resampled
@@ -25,7 +26,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from isc_core.decomposition.joint import supported_layers
+from isc_core.decomposition.joint import JointOptions, supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
@@ -49,7 +50,7 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
     ----------
     scene : PrintScene
     method : str
-        "chain", "joint", "marked" or a separation method.
+        "chain", "joint", "marked", "joint@ODDS" or a separation method.
 
     Returns
     -------
@@ -60,10 +61,14 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         source = PhotoSource("", (mask.shape[1], mask.shape[0]), 8, "srgb", "file")
         whole = Photo(photo, mask, 1 / 255, scene.clipped, source)
         return decompose(whole, Settings(threads=1)).specular
-    if method in ("joint", "marked"):
+    name, _, odds = method.partition("@")
+    if name in ("joint", "marked"):
         colour = separate("isc", photo, mask, scene.clipped)
-        marks = strongest_highlight(scene) if method == "marked" else None
-        split, residual = supported_layers(photo, colour, mask, clipped=scene.clipped, marks=marks)
+        marks = strongest_highlight(scene) if name == "marked" else None
+        options = JointOptions(odds=float(odds)) if odds else None
+        split, residual = supported_layers(
+            photo, colour, mask, options=options, clipped=scene.clipped, marks=marks
+        )
         return split.specular if residual is None else photo - residual.diffuse
     return separate(method, photo, mask, scene.clipped).specular
 

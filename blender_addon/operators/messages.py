@@ -21,6 +21,7 @@ _FIELDS = {
     "--separator": "Separator",
     "--model": "Model",
     "--box": "Box",
+    "--highlight-odds": "Take Off",
     "--highlight": "Highlights",
     "--not-highlight": "Not Highlights",
     "--point": "Points",

@@ -40,6 +40,8 @@ class MethodSettings:
         Samples per pixel of Cycles in the scene that is built.
     texture_size : str
         Value of `--texture-size`.
+    highlight_odds : str
+        Value of `--highlight-odds`.
     highlights, not_highlights : str
         Pixels that are marked, such as "120,80 64,200".
     """
@@ -51,6 +53,7 @@ class MethodSettings:
     samples: int = 64
     camera: str = "auto"
     texture_size: str = "photo"
+    highlight_odds: str = "3"
     highlights: str = ""
     not_highlights: str = ""
 

@@ -123,6 +123,7 @@ def decompose_steps(
         transfer=photo.transfer,
         camera=method.camera,
         texture_size=method.texture_size,
+        highlight_odds=method.highlight_odds if method.model == "joint" else "3",
         highlights=highlights,
         not_highlights=not_highlights,
     )

@@ -57,6 +57,11 @@ MODELS = _numbered(
     ("sfs-tsai-shah", "Tsai-Shah", "Baseline: linear shape from shading"),
     ("sfs-ikeuchi-horn", "Ikeuchi-Horn", "Baseline: regularized shape from shading"),
 )
+HIGHLIGHT_ODDS = _numbered(
+    ("3", "Certain", "What is hardly anything but a highlight: some highlights stay, print stays"),
+    ("1", "Likely", "What is more likely a highlight than print: some print goes with it"),
+    ("0", "All", "All that looks like a highlight, print included"),
+)
 SEPARATORS = _numbered(
     ("isc", "ISC", "This project's method, the most accurate on most photos"),
     (
@@ -264,6 +269,12 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Method that removes the highlights",
         items=SEPARATORS,
         default="isc",
+    )
+    highlight_odds: EnumProperty(
+        name="Take Off",
+        description="Which highlights leave the base color, where they may be print as well",
+        items=HIGHLIGHT_ODDS,
+        default="3",
     )
     illumination: EnumProperty(
         name="Light",

@@ -68,6 +68,8 @@ class DecomposeJob:
         Value of `--camera`.
     texture_size : str
         Value of `--texture-size`.
+    highlight_odds : str
+        Value of `--highlight-odds`.
     highlights, not_highlights : tuple of (x, y)
         Values of `--highlight` and `--not-highlight`.
     """
@@ -83,6 +85,7 @@ class DecomposeJob:
     transfer: str = "auto"
     camera: str = "auto"
     texture_size: str = "photo"
+    highlight_odds: str = "3"
     highlights: tuple[tuple[int, int], ...] = ()
     not_highlights: tuple[tuple[int, int], ...] = ()
 
@@ -159,7 +162,7 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
     """
     words = ["decompose", _absolute(job.photo), "--arrays", "-o", _absolute(job.output)]
     names = ("model", "separator", "illumination", "max_size", "threads", "transfer", "camera")
-    for name in (*names, "texture_size"):
+    for name in (*names, "texture_size", "highlight_odds"):
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]

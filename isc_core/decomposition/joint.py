@@ -140,7 +140,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     task : DecompositionTask
         The photo and the settings.
     options : JointOptions, optional
-        Thresholds.
+        Thresholds; by default those of the settings.
 
     Returns
     -------
@@ -154,7 +154,8 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     Cancelled
         If the monitor cancels.
     """
-    options, monitor, working = options or JointOptions(), task.monitor, task.working
+    options = options or JointOptions(odds=task.settings.highlight_odds)
+    monitor, working = task.monitor, task.working
     split, layers = separated_first(task)
     task = replace(task, split=None)
     with task.clock.stage("separation"):

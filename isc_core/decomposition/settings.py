@@ -8,6 +8,7 @@ from .. import baselines
 from ..errors import InputError
 from ..io.focal_length import LONGEST_35MM, SHORTEST_35MM
 from ..separation import BEST, METHODS
+from ..separation.support.highlight_evidence import ODDS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
 SEPARATING_MODELS = ("mdr", "mbp", "joint")
@@ -200,6 +201,9 @@ class Settings:
         For `SIRFS_MODELS`: the prior of the shape.
     camera : CameraChoice or str
         The camera, or its focal length: millimetres, 35-mm equivalent by the diagonal.
+    highlight_odds : float
+        For the model joint: odds, to be exceeded, that light which colour or form would take off is
+        a highlight, and not print; 0 takes off all of it.
     """
 
     model: str = "joint"
@@ -217,6 +221,7 @@ class Settings:
     light_prior: str = LightPrior.PREDICTED
     shape_prior: str = ShapePrior.PREDICTED
     camera: str = CameraChoice.AUTO
+    highlight_odds: float = ODDS
 
     def __post_init__(self) -> None:
         for setting in _RENAMED:
@@ -300,6 +305,13 @@ class Settings:
             raise InputError(
                 f"--light-colour does not apply to {self.model}: "
                 f"use --model {' or '.join(SIRFS_MODELS)}"
+            )
+        if self.highlight_odds != ODDS and self.model != "joint":
+            raise InputError(f"--highlight-odds does not apply to {self.model}: use --model joint")
+        if not 0 <= self.highlight_odds < math.inf:
+            raise InputError(
+                f"--highlight-odds {self.highlight_odds:g}: give odds of 0 or more, such as 1 for "
+                "what is more likely a highlight than not"
             )
         if self.camera not in list(CameraChoice) and self.focal_length_35mm is None:
             raise InputError(

@@ -333,6 +333,7 @@ def test_the_job_reaches_the_command_line(
         transfer="linear",
         camera="28",
         texture_size="2048",
+        highlight_odds="1",
         highlights=((40, 20), (1, 2)),
         not_highlights=((3, 4),),
     )
@@ -353,6 +354,7 @@ def test_the_job_reaches_the_command_line(
         "--transfer": "linear",
         "--camera": "28",
         "--texture-size": "2048",
+        "--highlight-odds": "1",
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }

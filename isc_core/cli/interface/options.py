@@ -15,7 +15,7 @@ from ...photo import TRANSFERS
 from ...result_files.mesh_options import MeshOptions
 from ...separation import SUMMARIES
 from .parser import table
-from .values import count, current_name, whole
+from .values import count, current_name, not_negative, whole
 
 Group = argparse._ArgumentGroup
 
@@ -246,6 +246,15 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         metavar="NAME|MM",
         help="auto (the focal length of the photo's EXIF, orthographic without), orthographic, or "
         "a focal length in mm, 35-mm equivalent by the diagonal (default %(default)s)",
+    )
+    group.add_argument(
+        "--highlight-odds",
+        type=not_negative,
+        default=defaults.highlight_odds,
+        metavar="N",
+        help="for joint: odds that light is a highlight and not print, from which it is taken off; "
+        "1: what is more likely one than not, 0: all that colour and form find (default "
+        "%(default)s)",
     )
     group.add_argument(
         "--shading-only", action="store_true", help="shape from shading: the object has one colour"

@@ -170,7 +170,7 @@ def supported(
     ratio_scale : (H, W) ndarray
         b.
     odds : float
-        To be exceeded, above 0; larger ones keep less.
+        To be exceeded; larger ones keep less, 0 keeps every region that can be judged.
     marks : HighlightMarks, optional
         Decide without the odds; paint before highlights.
 
@@ -181,7 +181,7 @@ def supported(
     """
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
-    kept = np.isin(seen.labels, seen.numbers[score > np.log(odds)])
+    kept = np.isin(seen.labels, seen.numbers[np.exp(score) > odds])
     if marks:
         kept |= _marked(seen.labels, marks.highlights, mask)
         kept &= ~_marked(seen.labels, marks.paint, mask)

@@ -129,6 +129,30 @@ def test_what_is_marked_as_paint_stays_at_any_size_of_the_maps(size: int) -> Non
     assert "marked_paint" not in without.provenance.input
 
 
+def test_smaller_odds_take_more_off() -> None:
+    photo, _, mask = ball(stripe=0.12, gloss=0.2)
+    light = [
+        isc_core.decompose(
+            photo, mask, settings=Settings(detail=0, highlight_odds=odds)
+        ).specular.sum()
+        for odds in (1e9, 3.0, 0.0)
+    ]
+    assert light[0] == 0 <= light[1] <= light[2] and light[2] > 0
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (Settings(highlight_odds=-1), "odds of 0 or more"),
+        (Settings(highlight_odds=float("nan")), "odds of 0 or more"),
+        (Settings(model="sirfs", highlight_odds=1), "does not apply to sirfs"),
+    ],
+)
+def test_wrong_odds_are_refused(settings: Settings, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        settings.check()
+
+
 @pytest.mark.parametrize(
     ("marks", "settings", "words"),
     [
