@@ -49,12 +49,12 @@ from ..networks.scene_network import (
     predict_layers,
     predict_scene,
 )
-from ..photo.highlight_marks import HighlightMarks
+from ..photo.highlight_marks import ODDS, HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
 from ..separation.support.clipped_texture import continue_under_clipped
-from ..separation.support.highlight_evidence import ODDS, supported
+from ..separation.support.highlight_evidence import supported
 from ..separation.support.light_tint import limit_tint
 from .layers import separated_first, shaded
 from .lobe import fit_specular

@@ -7,8 +7,8 @@ from enum import StrEnum
 from .. import baselines
 from ..errors import InputError
 from ..io.focal_length import LONGEST_35MM, SHORTEST_35MM
+from ..photo.highlight_marks import ODDS
 from ..separation import BEST, METHODS
-from ..separation.support.highlight_evidence import ODDS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
 SEPARATING_MODELS = ("mdr", "mbp", "joint")

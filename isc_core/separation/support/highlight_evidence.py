@@ -34,7 +34,7 @@ from scipy import ndimage
 
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
-from ...photo.highlight_marks import HighlightMarks, Place
+from ...photo.highlight_marks import ODDS, HighlightMarks, Place
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added before logarithms
@@ -43,7 +43,6 @@ _NEAR = 0.02  # of the object's diagonal: from a mark to the region that it mean
 _LEAST = 6  # pixels of a region that can be judged
 _MOST_STEP = 5.0  # of each number that is weighed
 WEIGHTS = (-1.725, 0.948, 0.602, -0.337, 2.064)
-ODDS = 3.0
 
 
 @dataclass(frozen=True)
