@@ -22,7 +22,7 @@ from ..settings.preferences import create_run_folder, read_preferences, worker_e
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
 from .messages import busy_message
 from .modal import WorkerOperator
-from .photo_canvas import PhotoCanvas, shown_photo
+from .photo_canvas import PhotoCanvas, PhotoOperator
 from .request import find_by_full_name
 from .run_steps import mask_steps
 from .worker_run import (
@@ -210,7 +210,7 @@ class ISC_OT_new_mask(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ISC_OT_draw_box(bpy.types.Operator):
+class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
     """Draw a box around the object with the mouse, and cut the object out."""
 
     bl_idname = "isc.draw_box"
@@ -219,55 +219,15 @@ class ISC_OT_draw_box(bpy.types.Operator):
 
     _start: tuple[int, int] | None = None
     _end: tuple[int, int] = (0, 0)
-    _size: tuple[int, ...] = (0, 0)
-    _canvas: PhotoCanvas | None = None
 
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether there is a photo to draw on and no run is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
+    def advice(self) -> str:
+        """Return what to do with the mouse; see `PhotoOperator`.
 
         Returns
         -------
-        bool
-            Where False for want of a photo, the tooltip gives the reason.
+        str
         """
-        if shown_photo(context) is None:
-            cls.poll_message_set("Open a photo first")
-            return False
-        return active_run() is None
-
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Wait for the mouse.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-        event : bpy.types.Event
-            The event that started the operator; not used.
-
-        Returns
-        -------
-        set of str
-            {"RUNNING_MODAL"}.
-        """
-        del event
-        settings, photo = context.scene.isc, shown_photo(context)
-        if photo not in (settings.image, settings.mask):
-            settings.image = photo
-        context.window.cursor_modal_set("CROSSHAIR")
-        context.workspace.status_text_set(
-            "Draw a box around the object, Esc or right mouse button to cancel"
-        )
-        self._size = tuple(photo.size)
-        self._canvas = PhotoCanvas(context, photo, self._draw)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return "Draw a box around the object, Esc or right mouse button to cancel"
 
     def modal(self, context: Any, event: Any) -> set[str]:
         """Follow press, drag and release of the left mouse button.
@@ -304,16 +264,6 @@ class ISC_OT_draw_box(bpy.types.Operator):
             return {"PASS_THROUGH"}  # so that the view can still be moved
         return {"RUNNING_MODAL"}
 
-    def cancel(self, context: Any) -> None:
-        """Stop drawing: Blender ends the operator.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-        """
-        self._leave(context, set())
-
     def _finish(self, context: Any, canvas: PhotoCanvas) -> set[str]:
         first, second = (canvas.place(corner) for corner in (self._start or self._end, self._end))
         box = box_from_corners(first, second, self._size)
@@ -325,16 +275,8 @@ class ISC_OT_draw_box(bpy.types.Operator):
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
         return {"FINISHED"}
 
-    def _leave(self, context: Any, result: set[str]) -> set[str]:
-        if self._canvas is not None:
-            self._canvas.close()
-            self._canvas = None
-            if context.window is not None:  # another file is loaded
-                context.window.cursor_modal_restore()
-                context.workspace.status_text_set(None)
-        return result
-
-    def _draw(self) -> None:
+    def draw(self) -> None:
+        """Draw the box; see `PhotoOperator`."""
         if self._start is None:
             return
         (left, bottom), (right, top) = self._start, self._end

@@ -3,7 +3,7 @@
 Over the 3D view, the photo fills as much of the region as its shape allows, with a margin; the
 scene stays visible around it.
 
-`ClickOnPhoto` waits for a click and gives the pixel.
+`PhotoOperator` waits for the mouse on it, `ClickOnPhoto` for a click on a pixel.
 
 Limits: the photo over the 3D view cannot be zoomed: use an image editor for small objects.
 """
@@ -181,8 +181,8 @@ def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, 
     return (room[0] - width) / 2, (room[1] - height) / 2, width, height
 
 
-class ClickOnPhoto:
-    """An operator that waits for a click on the photo; a base beside `bpy.types.Operator`."""
+class PhotoOperator:
+    """An operator that waits for the mouse on the photo; a base beside `bpy.types.Operator`."""
 
     report: Any  # from bpy.types.Operator
     poll_message_set: Any
@@ -191,7 +191,7 @@ class ClickOnPhoto:
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Return whether there is a photo to click on and no run is active.
+        """Return whether there is a photo to point at and no run is active.
 
         Parameters
         ----------
@@ -230,18 +230,44 @@ class ClickOnPhoto:
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(self.advice())
         self._size = tuple(shown.size)
-        self._canvas = PhotoCanvas(context, shown)
+        self._canvas = PhotoCanvas(context, shown, self.draw)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def advice(self) -> str:
-        """Return what to click on, for the status bar; the operator's own.
+        """Return what to do with the mouse, for the status bar; the operator's own.
 
         Returns
         -------
         str
         """
         raise NotImplementedError
+
+    def draw(self) -> None:
+        """Draw over the photo, in pixels of the region; nothing here."""
+
+    def cancel(self, context: Any) -> None:
+        """Stop waiting: Blender ends the operator.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        """
+        self._leave(context, set())
+
+    def _leave(self, context: Any, result: set[str]) -> set[str]:
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
+        if context.window is not None:  # another file is loaded
+            context.window.cursor_modal_restore()
+            context.workspace.status_text_set(None)
+        return result
+
+
+class ClickOnPhoto(PhotoOperator):
+    """An operator that waits for a click on the photo."""
 
     def take(self, settings: Any, point: str) -> None:
         """Use the click; the operator's own.
@@ -285,25 +311,6 @@ class ClickOnPhoto:
             return {"CANCELLED"}
         self.take(context.scene.isc, f"{point[0]},{point[1]}")
         return {"FINISHED"}
-
-    def cancel(self, context: Any) -> None:
-        """Stop waiting: Blender ends the operator.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-        """
-        self._leave(context, set())
-
-    def _leave(self, context: Any, result: set[str]) -> set[str]:
-        if self._canvas is not None:
-            self._canvas.close()
-            self._canvas = None
-        if context.window is not None:  # another file is loaded
-            context.window.cursor_modal_restore()
-            context.workspace.status_text_set(None)
-        return result
 
 
 def add_point(settings: Any, name: str, point: str) -> None:

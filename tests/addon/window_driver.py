@@ -39,6 +39,7 @@ def main(acc: Any) -> Iterator[float]:
     yield from import_result(acc, measured)
     yield from asset(acc)
     yield from box(acc, measured)
+    yield from marked_highlight(acc)
     settings = bpy.context.scene.isc
     settings.separator, settings.max_size = "none", 2048  # nothing in the cache; time to press
     yield from cancel(acc, measured, "Esc", escape)
@@ -207,6 +208,23 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
     yield from ended(60)
     note(acc, measured, "box")
     acc.check(shown().title == "Cut Out", f"the box is cut out: {shown().message}")
+
+
+def marked_highlight(acc: Any) -> Iterator[float]:
+    """A click on the photo over the 3D view is a pixel of it."""
+    settings = bpy.context.scene.isc
+    left, top, _, height = acc.rect("VIEW_3D", "WINDOW")
+    with acc.context():
+        bpy.ops.isc.mark_highlight("INVOKE_DEFAULT")
+    yield 1.5
+    x, y = int((left + acc.rect("VIEW_3D", "UI")[0]) / 2), int(top + height / 2)
+    yield acc.xdo(f"mousemove {x} {y} sleep 1 click 1", 3)
+    middle = [size / 2 for size in settings.image.size]
+    found = [int(part) for part in (settings.highlights or "0,0").split(",")]
+    off = max(abs(a - b) / max(middle) for a, b in zip(found, middle, strict=True))
+    acc.check(off < 0.05, f"a click marks a highlight: {settings.highlights}")
+    settings.highlights = ""
+    yield 0.5
 
 
 def asset(acc: Any) -> Iterator[float]:
