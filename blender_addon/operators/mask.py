@@ -275,7 +275,7 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
         return {"FINISHED"}
 
-    def draw(self) -> None:
+    def draw_over(self) -> None:
         """Draw the box; see `PhotoOperator`."""
         if self._start is None:
             return

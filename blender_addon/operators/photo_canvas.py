@@ -230,7 +230,7 @@ class PhotoOperator:
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(self.advice())
         self._size = tuple(shown.size)
-        self._canvas = PhotoCanvas(context, shown, self.draw)
+        self._canvas = PhotoCanvas(context, shown, self.draw_over)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -243,7 +243,7 @@ class PhotoOperator:
         """
         raise NotImplementedError
 
-    def draw(self) -> None:
+    def draw_over(self) -> None:
         """Draw over the photo, in pixels of the region; nothing here."""
 
     def cancel(self, context: Any) -> None:
