@@ -49,9 +49,10 @@ from ..networks.scene_network import (
     predict_layers,
     predict_scene,
 )
-from ..photo.highlight_marks import ODDS, HighlightMarks
+from ..photo.highlight_marks import HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
+from ..separation import HIGHLIGHT_ODDS
 from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
 from ..separation.support.clipped_texture import continue_under_clipped
 from ..separation.support.highlight_evidence import supported
@@ -94,7 +95,7 @@ class JointOptions:
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
     network: NetworkOptions = field(default_factory=NetworkOptions)
-    odds: float = ODDS
+    odds: float = HIGHLIGHT_ODDS
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,7 @@ from enum import StrEnum
 from .. import baselines
 from ..errors import InputError
 from ..io.focal_length import LONGEST_35MM, SHORTEST_35MM
-from ..photo.highlight_marks import ODDS
-from ..separation import BEST, METHODS
+from ..separation import BEST, HIGHLIGHT_ODDS, METHODS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
 SEPARATING_MODELS = ("mdr", "mbp", "joint")
@@ -221,7 +220,7 @@ class Settings:
     light_prior: str = LightPrior.PREDICTED
     shape_prior: str = ShapePrior.PREDICTED
     camera: str = CameraChoice.AUTO
-    highlight_odds: float = ODDS
+    highlight_odds: float = HIGHLIGHT_ODDS
 
     def __post_init__(self) -> None:
         for setting in _RENAMED:
@@ -306,7 +305,7 @@ class Settings:
                 f"--light-colour does not apply to {self.model}: "
                 f"use --model {' or '.join(SIRFS_MODELS)}"
             )
-        if self.highlight_odds != ODDS and self.model != "joint":
+        if self.highlight_odds != HIGHLIGHT_ODDS and self.model != "joint":
             raise InputError(f"--highlight-odds does not apply to {self.model}: use --model joint")
         if not 0 <= self.highlight_odds < math.inf:
             raise InputError(

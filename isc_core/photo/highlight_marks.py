@@ -8,9 +8,6 @@ from ..errors import InputError
 
 Place = tuple[float, float]
 
-ODDS = 3.0
-"""That light is a highlight and no paint, to be exceeded where nothing is marked."""
-
 
 @dataclass(frozen=True)
 class HighlightMarks:
