@@ -35,7 +35,6 @@ from scipy import ndimage
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
 from ...photo.highlight_marks import HighlightMarks, Place
-from .. import HIGHLIGHT_ODDS
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added before logarithms
@@ -154,7 +153,7 @@ def supported(
     mask: np.ndarray,
     log_ratio: np.ndarray,
     ratio_scale: np.ndarray,
-    odds: float = HIGHLIGHT_ODDS,
+    odds: float,
     marks: HighlightMarks | None = None,
 ) -> np.ndarray:
     """Decide where removed light was a highlight.

@@ -9,7 +9,7 @@ from isc_core.decomposition.settings import Settings
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
 from isc_core.photo.highlight_marks import HighlightMarks
-from isc_core.separation import separate
+from isc_core.separation import HIGHLIGHT_ODDS, separate
 from isc_core.separation.support.highlight_evidence import highlight_evidence, supported
 
 RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
@@ -40,7 +40,7 @@ def form(photo: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def test_a_highlight_that_colour_and_form_show_is_kept() -> None:
     photo, diffuse, mask = ball(gloss=0.4)
-    kept = supported(photo, diffuse, mask, *form(photo, diffuse))
+    kept = supported(photo, diffuse, mask, *form(photo, diffuse), HIGHLIGHT_ODDS)
     removed = (photo - diffuse).sum(axis=2)
     assert removed[kept].sum() > 0.95 * removed.sum()
 
@@ -51,7 +51,7 @@ def test_white_paint_of_which_form_is_not_sure_is_given_back() -> None:
     removed = np.minimum(photo, without)
     ratio, scale = form(photo, removed)
     assert (photo > removed).any()
-    assert not supported(photo, removed, mask, 0.1 * ratio, scale).any()
+    assert not supported(photo, removed, mask, 0.1 * ratio, scale, HIGHLIGHT_ODDS).any()
 
 
 @pytest.mark.parametrize("stripe", [0.05, 0.12, 0.3])
@@ -97,7 +97,7 @@ def test_mirror_images_have_mirrored_answers() -> None:
 
 def test_where_nothing_was_removed_nothing_is_kept() -> None:
     photo, _, mask = ball(stripe=0.2)
-    assert not supported(photo, photo, mask, *form(photo, photo)).any()
+    assert not supported(photo, photo, mask, *form(photo, photo), HIGHLIGHT_ODDS).any()
 
 
 def test_a_mark_decides_where_the_odds_do_not() -> None:
