@@ -49,7 +49,8 @@ FAULTS: list[tuple[Any, str, str, Breaks]] = [
     (test_decomposition, "maps_and_mesh", "decompose", brighter),
     *((test_decomposition, name, "decompose", drifting) for name in SEPARATION),
     (test_tools, "edits", "apply_edit", darker_image),
-    (test_tools, "filling", "fill", lambda fill: lambda *args: 2 * fill(*args) + 1),
+    (test_tools, "filling_stays", "fill", lambda fill: lambda *args: 2 * fill(*args) + 1),
+    (test_tools, "filling_some", "fill_at", lambda fill_at: lambda *args: 2 * fill_at(*args) + 1),
     (test_tools, "metrics", "ssim", lambda ssim: lambda *args, **kwargs: 1.5),
 ]
 
