@@ -30,7 +30,9 @@ from blender_addon.datablocks.mesh import front_geometry
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.evaluation.metrics import psnr
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.result_files.solids.body import Back, make_body
+from isc_core.result_files.solids.back import Back
+from isc_core.result_files.solids.body import make_body
+from isc_core.result_files.solids.surface import placed, vertex_normals
 from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
 
@@ -91,7 +93,7 @@ def drawn(result: ResultArrays, kind: str) -> Drawn:
         Back(kind),
         0,
     )
-    vertices = np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1)
+    vertices = placed(body, None)
     normal = vertex_normals(vertices, body.faces)
     rows, columns = body.pixels.T
     normal[body.front] = result.normal[rows, columns][body.front]
@@ -119,29 +121,6 @@ def _former(result: ResultArrays, flat: bool) -> Drawn:
     near = np.rint(vertices[:, :2] * (1, -1) + result.origin[:2])[:, ::-1].astype(int)
     assert len(near) == count
     return _lit(result, vertices, np.concatenate(faces), normal, near)
-
-
-def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return unit normals of vertices, the mean of their faces' by area.
-
-    Parameters
-    ----------
-    vertices : (V, 3) ndarray
-        Places.
-    faces : (F, 3) ndarray of int
-        Counter-clockwise from outside.
-
-    Returns
-    -------
-    (V, 3) ndarray
-        Unit vectors, 0 without a face.
-    """
-    a, b, c = vertices[faces].transpose(1, 0, 2)
-    across = np.cross(b - a, c - a)
-    sums = np.stack(
-        [np.bincount(faces.ravel(), part.repeat(3), len(vertices)) for part in across.T], -1
-    )
-    return np.asarray(sums / np.maximum(np.linalg.norm(sums, axis=-1, keepdims=True), 1e-12))
 
 
 def _lit(

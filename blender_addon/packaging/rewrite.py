@@ -35,6 +35,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.result_files.diagnostics_text",
         "isc_core.result_files.exports.targets",
         "isc_core.result_files.reading_notes_text",
+        "isc_core.result_files.solids.back",
         "isc_core.result_files.solids.body",
         "isc_core.result_files.solids.surface",
         "isc_core.scene.diagnostics",

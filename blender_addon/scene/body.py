@@ -5,7 +5,8 @@ Rim and back have confidence 0.
 
 import numpy as np
 
-from isc_core.result_files.solids.body import Back, continued
+from isc_core.result_files.solids.back import Back
+from isc_core.result_files.solids.body import continued
 from isc_core.result_files.solids.surface import Solid, before_camera, make_solid
 from isc_core.shading.perspective import view_directions
 

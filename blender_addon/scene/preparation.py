@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.result_files.solids.body import Back
+from isc_core.result_files.solids.back import Back
 
 from ..datablocks.images import (
     COLOR,

@@ -31,8 +31,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.resampling import nearest_samples
-from ..imaging.row_blocks import row_blocks
-from ..imaging.upsampling import enlarged
+from ..imaging.upsampling import enlarge_inside
 from ..networks.scene_network import ScenePrediction
 from ..photo import Photo
 from ..scene.decomposition import Decomposition
@@ -192,14 +191,7 @@ def with_expected_error(d: Decomposition, seen: ScenePrediction, working: Photo)
         )
         small = small[rows, columns]
     maps = np.empty((*d.mask.shape, 2), np.float32)
-    for block in row_blocks(d.mask.shape):
-        inside, start = d.mask[block.rows], (block.rows.start, 0)
-        near = (
-            small[block.rows]
-            if mask.shape == d.mask.shape
-            else enlarged(small, inside.shape, 1 / factor, start)
-        )
-        maps[block.rows] = np.where(inside[..., None], near, 0)
+    enlarge_inside(small, d.mask, 1 / factor, maps)
     error, diagnostics = ExpectedError(maps[..., 0], maps[..., 1]), d.provenance.diagnostics
     means = (round(float(part[d.mask].mean(dtype=float)), 4) for part in np.moveaxis(maps, -1, 0))
     diagnostics = replace(diagnostics, expected_error=ExpectedErrorDiagnostics(*means))

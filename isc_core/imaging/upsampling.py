@@ -8,6 +8,8 @@ Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (19
 
 import numpy as np
 
+from .row_blocks import row_blocks
+
 
 def enlarged(
     layer: np.ndarray,
@@ -44,3 +46,23 @@ def enlarged(
         after = np.minimum(first + 1, layer.shape[axis] - 1)
         layer = (1 - beyond) * np.take(layer, first, axis) + beyond * np.take(layer, after, axis)
     return layer
+
+
+def enlarge_inside(layer: np.ndarray, inside: np.ndarray, factor: float, out: np.ndarray) -> None:
+    """Upsample a map where a mask says so, in blocks of rows.
+
+    Parameters
+    ----------
+    layer : (h, w, C) ndarray
+        The averages.
+    inside : (H, W) bool ndarray
+    factor : float
+        As of `enlarged`.
+    out : (H, W, C) ndarray
+        Written: the map inside, 0 elsewhere.
+    """
+    same = factor == 1 and layer.shape[:2] == inside.shape
+    for block in row_blocks(inside.shape):
+        rows, part = block.rows, inside[block.rows]
+        fine = layer[rows] if same else enlarged(layer, part.shape, factor, (rows.start, 0))
+        out[rows] = np.where(part[..., None], fine, 0)

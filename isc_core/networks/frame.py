@@ -11,8 +11,7 @@ from scipy import ndimage
 
 from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
-from ..imaging.row_blocks import row_blocks
-from ..imaging.upsampling import enlarged
+from ..imaging.upsampling import enlarge_inside
 
 
 @dataclass(frozen=True)
@@ -84,13 +83,5 @@ def at_full_size(maps: np.ndarray, frame: NetworkFrame, mask: np.ndarray) -> np.
     )
     values, inside = maps[tuple(nearest)][frame.place], mask[box]
     full = np.zeros((*mask.shape, maps.shape[2]), np.float32)
-    of_box = full[box]
-    for block in row_blocks(inside.shape):
-        part, start = inside[block.rows], (block.rows.start, 0)
-        fine = (
-            values[block.rows]
-            if frame.factor == 1
-            else enlarged(values, part.shape, 1 / frame.factor, start)
-        )
-        of_box[block.rows] = np.where(part[..., None], fine, 0)
+    enlarge_inside(values, inside, 1 / frame.factor, full[box])
     return full

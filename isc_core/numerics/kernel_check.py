@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Whether a library of kernels computes what Python does, before anything depends on it.
 
 A library may have been made for a system that nobody ran it on, or for another layout of NumPy's
@@ -53,7 +54,7 @@ def outcome(run: Callable[..., float]) -> tuple[float, bytes, bytes]:
 
 
 @jit(types="f4[2] i8[1:] f8[1] f4 i8 i8 i8 i8 b1 i8 -> f8")
-def mix(values, order, sums, factor, first, end, step, column, negate, weight):  # type: ignore[no-untyped-def]
+def mix(values, order, sums, factor, first, end, step, column, negate, weight):
     """Write sums of rows, between two columns, into both arrays.
 
     Parameters

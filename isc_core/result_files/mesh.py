@@ -63,7 +63,7 @@ from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
 from .glb import TexturedMesh, encode_glb
 from .mesh_options import MeshOptions
-from .solids.body import Back
+from .solids.back import Back
 from .solids.surface import heights_seen, make_solid, placed
 from .triangulation.adaptive_triangles import Triangulation, adaptive_triangles
 from .triangulation.vertex_normals import (
@@ -132,6 +132,12 @@ class MeshResult:
     def bumpy(self) -> bool:
         """Whether the normal map holds more than the normals of the vertices."""
         return self.mesh.tangents is not None or self.options.back is not Back.OPEN
+
+    @property
+    def base_color_size(self) -> tuple[int, int]:
+        """Width and height of the base colour: the finer one where there is one."""
+        height, width = (self.base_color if self.texture is None else self.texture).shape[:2]
+        return width, height
 
     @property
     def base_color_codes(self) -> np.ndarray:

@@ -31,7 +31,8 @@ from ..shading.radiance import DistantLights, radiance, sh_shading
 from .mesh import limit_rim
 from .mesh_options import MeshOptions
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
-from .solids.body import Back, Body, make_body
+from .solids.back import Back
+from .solids.body import Body, make_body
 from .solids.surface import heights_seen, placed
 from .turned_view import turned_view
 

@@ -42,6 +42,7 @@ def imported(code: str) -> set[str]:
         "isc_core.separation import BEST, IMPROVED, METHODS, PUBLISHED",
         "isc_core.photo import TRANSFERS",
         "isc_core.baselines import METHODS",
+        "isc_core.cli.interface.options import add_triangles",
         "isc_core.decomposition import Settings",
         "isc_core.decomposition.settings import MODELS, Settings",
         "isc_core.io.limits import USUAL, Limits",

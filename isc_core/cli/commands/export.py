@@ -20,7 +20,7 @@ from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.result_folder import MASK, load
-from ...result_files.solids.body import Back
+from ...result_files.solids.back import Back
 from ...scene.decomposition import Decomposition
 from ..interface.options import add_limits, add_triangles, limits_of
 from ..interface.parser import describe, hints

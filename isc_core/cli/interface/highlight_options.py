@@ -66,15 +66,8 @@ def with_marks(photo: Photo, options: argparse.Namespace) -> Photo:
     Returns
     -------
     Photo
-
-    Raises
-    ------
-    InputError
-        If a mark lies outside of the object.
     """
-    marks = marks_of(options)
-    marks.check(photo.mask)
-    return replace(photo, marks=marks)
+    return replace(photo, marks=marks_of(options))
 
 
 def mark_notes(photo: Photo, result: Decomposition) -> list[str]:

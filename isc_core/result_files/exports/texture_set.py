@@ -253,7 +253,7 @@ def _description(
         "target": target,
         "photo": d.provenance.input.get("name", ""),
         "size": list(d.mask.shape[::-1]),
-        "basecolor_size": list(built.base_color_codes.shape[1::-1]),
+        "basecolor_size": list(built.base_color_size),
         "files": {texture: f"{name}_{texture}.png" for texture in textures}
         | {"height_float": f"{name}_height.exr"},
         "colour_space": {"basecolor": "sRGB", "others": "linear"},

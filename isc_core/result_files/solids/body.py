@@ -29,11 +29,11 @@ outline stays a steep slope.
 """
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from ..triangulation.adaptive_triangles import Triangulation
+from .back import Back
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 from .smoothing import smoothed_within, surrounded
@@ -43,27 +43,6 @@ ROUND, FULLNESS = 1.0, 1.0
 _LEAST = 0.2
 _SMOOTH = 6  # passes over the depth of the rim
 _BEHIND = 0.02  # of the longer side
-
-
-class Back(StrEnum):
-    """What a body has on the side that the photo does not show.
-
-    Attributes
-    ----------
-    OPEN
-        Nothing.
-    FLAT
-        A plane, and a wall along the outline.
-    ROUNDED
-        A surface as round as the outline.
-    MIRRORED
-        The front again.
-    """
-
-    OPEN = "open"
-    FLAT = "flat"
-    ROUNDED = "rounded"
-    MIRRORED = "mirrored"
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ import numpy as np
 from ...photo.camera import Camera
 from ...shading.perspective import lifted_points, object_axis
 from ..triangulation.vertex_normals import interpolated_normals
-from .body import Back, Body, continued, make_body
+from .back import Back
+from .body import Body, continued, make_body
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class Solid:
         (V, 3) ndarray
             Unit vectors; those of rim and back are means of the faces', by area.
         """
-        normals = _face_normals(vertices, self.body.faces)
+        normals = vertex_normals(vertices, self.body.faces)
         normals[: len(self.smooth)] = self.smooth
         return normals
 
@@ -177,8 +178,20 @@ def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray)
     return np.where(length > 0, found / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
 
 
-def _face_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3): means of the faces' unit normals, by area."""
+def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Return unit normals of vertices, the mean of their faces' by area.
+
+    Parameters
+    ----------
+    vertices : (V, 3) ndarray
+    faces : (F, 3) ndarray of int
+        Counter-clockwise from outside.
+
+    Returns
+    -------
+    (V, 3) ndarray
+        0 without a face.
+    """
     a, b, c = vertices[faces].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)
     sums = np.stack(

@@ -15,7 +15,7 @@ from isc_core.photo.camera import Camera
 from isc_core.result_files.mesh import build_mesh
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.result_files.result_folder import save
-from isc_core.result_files.solids.body import Back
+from isc_core.result_files.solids.back import Back
 from tests.core.ball_scene import ball
 from tests.core.command_line import ball_photo, run_isc
 

@@ -6,7 +6,8 @@ import trimesh
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.result_files.solids.body import Back, Body, make_body
+from isc_core.result_files.solids.back import Back
+from isc_core.result_files.solids.body import Body, make_body
 from isc_core.result_files.solids.outline import outlined, smooth_cover
 
 CLOSED = (Back.FLAT, Back.ROUNDED, Back.MIRRORED)
