@@ -1,16 +1,16 @@
 """Fit the rule that tells relief from paint by the whole object.
 
-  python -m benchmarks.detail.relief_rule SET --rows FILE [--weights NPZ] [--count N] [--kind KIND]
+  python -m benchmarks.detail.relief_rule SET --rows FILE [--count N] [--kind KIND]
 
 SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief. What
-the whole object says is stored first, then, with each body's belief by the rule of the others, the
-relief that the network finds, judged at several factors. A row is stored for each body, so that an
-interrupted run continues; with `--kind`, rows alone are made.
+the whole object says, and the relief that its shading explains, judged at several shares, are
+stored in a row for each body, so that an interrupted run continues; with `--kind`, rows alone are
+made.
 
 Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
-free). The factor is that of a grid that explains most of the relief, mean over bodies and octaves,
-where what is invented on print is at most .05 of the relief's energy in every octave. The network
-is told the probabilities of bodies left out.
+free). The share of a body's relief that is added is a p, p its probability by the weights of the
+others. The factor a is that of a grid that explains most of the relief, mean over bodies and
+octaves, where what is invented on print is at most .05 of the relief's energy in every octave.
 
 Citation: see `isc_core.shading.relief_evidence`.
 
@@ -20,7 +20,6 @@ Limits: sixty bodies decide four numbers; others have to judge them.
 import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +32,6 @@ from isc_core.decomposition.pipeline import WORKING_SIZE
 from isc_core.decomposition.settings import MOST_DETAIL, Settings
 from isc_core.decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
 from isc_core.errors import InputError
-from isc_core.networks.detail_network import DetailNetwork
 from isc_core.photo import read_photo
 from isc_core.shading.relief_evidence import ReliefRule
 
@@ -42,14 +40,15 @@ from .measure import judge
 from .rendering import SetKind
 from .sets import PHOTO, read_truth
 
-FACTORS = (0.0, 1.5, 3.0)  # the figures are nearly quadratic in the factor
+SHARES = (0.0, 0.7, 1.4)  # the figures are nearly quadratic in the share
+_MOST = 2.0
 _RIDGE = 1.0
 _INVENTED = 0.05
 _STEPS = 50
 
 
-def evidence_row(body: Path) -> dict[str, Any]:
-    """Return what a whole body says of its relief.
+def judged_body(body: Path) -> dict[str, Any]:
+    """Return what a whole body says of its relief, and judge what is found of it.
 
     Parameters
     ----------
@@ -59,42 +58,19 @@ def evidence_row(body: Path) -> dict[str, Any]:
     Returns
     -------
     dict of str to Any
-        "evidence": two numbers, or None.
-    """
-    _, pyramid = _solved(body)
-    evidence = pyramid.evidence()
-    return {"evidence": None if evidence is None else list(asdict(evidence).values())}
-
-
-def at_factors(
-    body: Path, beliefs: Mapping[str, float], network: DetailNetwork | None
-) -> dict[str, Any]:
-    """Judge the relief that the network finds on a body, at several factors.
-
-    Parameters
-    ----------
-    body : Path
-        Its folder.
-    beliefs : mapping of str to float
-        What the network is told, by the names of bodies.
-    network : DetailNetwork or None
-        None: the shipped one.
-
-    Returns
-    -------
-    dict of str to Any
-        "explained", "error" and "energy" at each of `FACTORS`.
+        "evidence": two numbers, or None; "explained", "error" and "energy" at each of `SHARES`.
     """
     found, pyramid = _solved(body)
-    relief = pyramid.relief(MOST_DETAIL, beliefs.get(body.name, 0.0), network=network)
+    evidence, relief = pyramid.evidence(), pyramid.relief(MOST_DETAIL)
     truth, judged = read_truth(body), []
-    for factor in FACTORS:
-        normal = shaded(found.height + factor * relief, found.light, pyramid.mask)[0]
+    for share in SHARES:
+        normal = shaded(found.height + share * relief, found.light, pyramid.mask)[0]
         judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
-    return {
+    figures = {
         name: [np.asarray(getattr(one, name)).tolist() for one in judged]
         for name in ("explained", "error", "energy")
     }
+    return {"evidence": None if evidence is None else list(asdict(evidence).values()), **figures}
 
 
 def _solved(body: Path) -> tuple[SceneEstimate, Pyramid]:
@@ -152,14 +128,16 @@ def left_out(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
 
 
 def best_factor(
-    rows: Sequence[Mapping[str, Any]], is_relief: np.ndarray
+    rows: Sequence[Mapping[str, Any]], probability: np.ndarray, is_relief: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Choose the factor of what the network finds.
+    """Choose the factor of the probability.
 
     Parameters
     ----------
     rows : sequence of mapping
-        Of `at_factors`.
+        Of `judged_body`.
+    probability : (n,) ndarray
+        Of relief.
     is_relief : (n,) ndarray of bool
 
     Returns
@@ -172,18 +150,24 @@ def best_factor(
     )
     scale = energy[is_relief, 0].mean(axis=0)
     best = (0.0, np.zeros(explained.shape[2]), np.zeros(explained.shape[2]))
-    for factor in np.arange(0, FACTORS[-1] + 0.01, 0.1):
-        known = _at(explained[is_relief], factor).mean(axis=0)
-        false = _at(error[~is_relief], factor).mean(axis=0) / scale
+    for factor in np.arange(0, _MOST, 0.05):
+        shares = factor * probability
+        known = _at(explained[is_relief], shares[is_relief]).mean(axis=0)
+        false = _at(error[~is_relief], shares[~is_relief]).mean(axis=0) / scale
         if false.max() <= _INVENTED and known.mean() > best[1].mean():
             best = (float(factor), known, false)
     return best
 
 
-def _at(values: np.ndarray, factor: float) -> np.ndarray:
-    """Figures (n, octaves) at a factor by parabolas through (n, factors, octaves)."""
-    parabolas = [np.polynomial.polynomial.polyfit(FACTORS, one, 2) for one in values]
-    return np.array([np.polynomial.polynomial.polyval(factor, one) for one in parabolas])
+def _at(values: np.ndarray, shares: np.ndarray) -> np.ndarray:
+    """Figures (n, octaves) at each body's share by parabolas through (n, SHARES, octaves)."""
+    polynomial = np.polynomial.polynomial
+    return np.array(
+        [
+            polynomial.polyval(share, polynomial.polyfit(SHARES, one, 2))
+            for share, one in zip(shares, values, strict=True)
+        ]
+    )
 
 
 def main() -> None:
@@ -194,36 +178,27 @@ def main() -> None:
     add = parser.add_argument
     add("folder", type=Path, metavar="SET", help="the choice set of benchmarks.detail.sets")
     add("--rows", type=Path, required=True, metavar="FILE", help="JSON lines to append to")
-    add("--weights", type=Path, metavar="NPZ", help="of the network (default: the shipped ones)")
     add("--kind", type=SetKind, choices=list(SetKind), help="measure one kind of bodies alone")
     add("--count", type=int, help="bodies of each kind")
     given = parser.parse_args()
-    kinds = list(SetKind)
+    kinds = list(SetKind) if given.kind is None else [given.kind]
+    rows = []
     try:
-        network = None if given.weights is None else DetailNetwork.read(given.weights)
-        rows = partial(body_rows, given.folder, given.rows)
-        told = [
-            row
-            for row in rows(kinds, given.count, "evidence", evidence_row)
-            if row["evidence"] is not None
-        ]
-        names = [row["body"] for row in told]
-        is_relief = np.array([name.startswith(SetKind.RELIEF) for name in names])
-        features = np.array([row["evidence"] for row in told])
-        probability = left_out(features, is_relief)
-        beliefs = dict(zip(names, (2 * probability - 1).tolist(), strict=True))
-        measure = partial(at_factors, beliefs=beliefs, network=network)
-        key = "shipped" if given.weights is None else str(given.weights.resolve())
-        judged = {}
-        for row in rows(kinds if given.kind is None else [given.kind], given.count, key, measure):
+        for row in body_rows(given.folder, given.rows, kinds, given.count, "rule", judged_body):
             print(row["body"], np.round(row["explained"], 2).tolist(), flush=True)
-            judged[row["body"]] = row
+            rows.append(row)
     except InputError as error:
         parser.error(str(error))
-    if given.kind is not None:
-        return
+    if given.kind is None:
+        _print_rule([row for row in rows if row["evidence"] is not None])
+
+
+def _print_rule(rows: Sequence[Mapping[str, Any]]) -> None:
+    is_relief = np.array([row["body"].startswith(SetKind.RELIEF) for row in rows])
+    features = np.array([row["evidence"] for row in rows])
+    probability = left_out(features, is_relief)
     weights = logistic_weights(features, is_relief)
-    factor, explained, invented = best_factor([judged[name] for name in names], is_relief)
+    factor, explained, invented = best_factor(rows, probability, is_relief)
     print(f"{np.mean((probability > 0.5) == is_relief):.0%} of bodies told, each left out")
     print("explained", np.round(explained, 3), "invented", np.round(invented, 4))
     offset, correlation, along = (round(float(weight), 2) for weight in weights)

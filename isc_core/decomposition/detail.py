@@ -1,24 +1,25 @@
-"""Relief finer than SIRFS is solved at, from coarse to fine, at the photo's own resolution.
+"""Relief finer than the solve resolves, level by level of the photo.
 
 Problem: SIRFS is solved with the object 256 pixels long. Finer relief stays in the reflectance.
 
-Equation: levels of the photo, each half as large as the one before, from the finest that is asked
-for down to about the solver's size. With the height Z of SIRFS, the light's log shading S, and the
-detail network's band b_k of level k (`networks.detail_network`),
+Equation: the levels are the photo, then half its size, and so on until the object is at most
+`_SOLVED` pixels long. With S the log shading of SIRFS' light on the smooth slopes s and I the log
+of the photo's mean channel, the fine changes on a level are
 
-    R_k = 2 U R_(k+1) + b_k(I_k, grad Z_k, dS / d grad Z_k, v)
-    height = Z + a R_0
+    d = I - S(s) - U L,
 
-each in the pixels of its level. What the whole object says of relief (`relief_evidence`) is v, from
--1 to 1, and a a constant. The light and the overall shape do not change: each band is without
-what the next coarser level holds.
+L being the low frequencies of I - S on the coarsest level (periods above `_PERIOD` of the object's
+length), and U linear interpolation. From the coarsest level on, the relief R of a level is that
+which explains d (`shading.relief_from_shading`), found from 2 U R of the level before. The height
+is that of the solve plus a(p) R of the finest level, p the probability that the object's fine
+changes are relief (`shading.relief_evidence`). On the coarsest level R loses its low frequencies
+too, so that no level moves the overall shape; the light stays as it is.
 
-Citation: P. J. Burt, E. H. Adelson, "The Laplacian pyramid as a compact image code", IEEE Trans.
-Communications 31(4), 1983, doi:10.1109/TCOM.1983.1095851; linear shape from shading: A. Pentland
-1990, doi:10.1007/BF00054993.
+Citation: see `shading.relief_from_shading`; pyramid: P. J. Burt, E. H. Adelson, IEEE Trans. Comm.
+31, 1983, doi:10.1109/TCOM.1983.1095851.
 
-Tiles: the network sees one tile at a time with all that its values depend on around it, and sums
-exactly: relief is the same, bit for bit, for tiles of any size.
+Tiles: a value depends on pixels near it alone, so relief is the same, bit for bit, for tiles of any
+size.
 
 Limits: relief is where the light from SIRFS says; where that light is from the wrong side, dents
 become bumps.
@@ -33,27 +34,30 @@ import numpy as np
 
 from ..imaging.blocks import block_means
 from ..imaging.bounding_box import mask_slices
+from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
+from ..imaging.smoothing import masked_gaussian
 from ..imaging.tiles import Place, tiles_of
-from ..networks.detail_network import (
-    MULTIPLE,
-    REACH,
-    TILE,
-    DetailNetwork,
-    predict_relief,
-    raised_at,
-)
 from ..progress import Monitor
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
-from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
+from ..shading.relief_from_shading import (
+    REACH,
+    log_shading,
+    relief_from_shading,
+    shading_gain,
+    slopes,
+)
 from ..sirfs.recover import Window
 from .task import DecompositionTask, SceneEstimate
 
+MULTIPLE = 8  # sides of the frame on the coarsest level, and of tiles
+TILE = 384  # pixels of a tile's side: its maps stay in the cache
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
-_STEP = 0.02  # of slopes, for the derivative of shading
-SMALLEST_TILE = 160  # twice the network's reach: smaller tiles take several times as long
+_PERIOD = 0.037  # of the object's length: 9.5 pixels of the solve
+_SIGMA = 0.2829  # of a Gaussian over the period of which three passes keep half
+_DARK = 0.01  # of the object's mean light
 
 
 @dataclass(frozen=True)
@@ -91,27 +95,29 @@ class Level:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """What is known of the smooth surface on a level, interpolated where it is asked for.
+    """What is known of a level before its relief, interpolated where it is asked for.
 
     Attributes
     ----------
-    maps : (h, w, 4) ndarray
-        Slopes and derivatives of log shading by them: of the level, or of the next coarser one.
+    maps : (h, w, 3) float32 ndarray
+        Slopes dz/dx and dz/dy of the smooth surface, and low frequencies of log light less log
+        shading: of the level, or of the next coarser one.
     coarser : bool
     """
 
     maps: np.ndarray
     coarser: bool
 
-    def at(self, place: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return slopes and derivatives (n, m, 2) at some rows and columns, of even numbers."""
-        part = raised_at(self.maps, place) if self.coarser else self.maps[place]
-        return part[..., :2], part[..., 2:]
+    def at(self, place: Place) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+        """Return slopes (n, m) and low frequencies (n, m) at rows and columns of even numbers."""
+        part = doubled_at(self.maps, place) if self.coarser else self.maps[place]
+        right, down, low = (np.ascontiguousarray(part[..., k]) for k in range(3))
+        return (right, down), low
 
     def finer(self, shape: tuple[int, ...]) -> "_Smooth":
         """Return the same for the next finer level; `shape` is that of this one."""
-        whole = np.concatenate(self.at((slice(0, shape[0]), slice(0, shape[1]))), axis=2)
-        return _Smooth(whole.astype(np.float32), True)
+        place = (slice(0, shape[0]), slice(0, shape[1]))
+        return _Smooth(doubled_at(self.maps, place) if self.coarser else self.maps, True)
 
 
 def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneEstimate:
@@ -144,8 +150,6 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
             estimate.light,
             task.settings.detail,
             task.monitor.part(0.96, 0.98),
-            task.options.detail_network,
-            tile=task.tile,
         )
     return replace(estimate, height=estimate.height + relief)
 
@@ -157,7 +161,6 @@ def fine_relief(
     light: np.ndarray,
     finest: int,
     monitor: Monitor | None = None,
-    network: DetailNetwork | None = None,
     rule: ReliefRule | None = None,
     *,
     tile: int = TILE,
@@ -176,13 +179,11 @@ def fine_relief(
     finest : int
         Length of the object, pixels, at the finest level that is looked at.
     monitor : Monitor, optional
-    network : DetailNetwork, optional
-        By default the shipped one.
     rule : ReliefRule, optional
         By default the shipped one.
     tile : int
-        Side of the tiles that the network sees, pixels, a multiple of 8: memory alone depends on
-        it.
+        Side of the tiles that are worked on, pixels, a multiple of 8: memory and time alone depend
+        on it.
 
     Returns
     -------
@@ -198,9 +199,11 @@ def fine_relief(
     """
     rule = rule or RULE
     pyramid = Pyramid.of(diffuse, mask, height, light)
-    evidence = pyramid.evidence()
-    relief = pyramid.relief(finest, rule.belief(evidence), monitor, network, tile)
-    relief *= np.float32(rule.factor)
+    share = rule.share(pyramid.evidence())
+    if share == 0:
+        return np.zeros(mask.shape, np.float32)
+    relief = pyramid.relief(finest, monitor, tile)
+    relief *= np.float32(share)
     return relief
 
 
@@ -216,15 +219,17 @@ class Pyramid:
         The part of the photo that is looked at.
     levels : list of Level
         The finest first.
-    slope, gain : (h, w, 2) ndarray
-        Slopes of the smooth surface and derivatives of log shading by them, at the coarsest level.
+    slope : tuple of (h, w) float32 ndarray
+        Slopes of the smooth surface at the coarsest level.
+    light : (9,) ndarray
+        Log-shading SH coefficients of the mean channel, reference convention.
     """
 
     mask: np.ndarray
     frame: "_Frame"
     levels: list[Level]
-    slope: np.ndarray
-    gain: np.ndarray
+    slope: tuple[np.ndarray, np.ndarray]
+    light: np.ndarray
 
     @classmethod
     def of(
@@ -248,33 +253,25 @@ class Pyramid:
         levels = [Level(image, inside)]
         for _ in range(frame.halvings):
             levels.append(levels[-1].halved())
-        slope = slopes(frame.coarsest(height))
-        return cls(mask, frame, levels, slope, shading_gain(slope, light))
+        slope = slopes(frame.coarsest(height).astype(np.float32))
+        return cls(mask, frame, levels, slope, light.mean(axis=1))
 
     def evidence(self) -> Evidence | None:
         """Return what the whole object says of relief; None where it is too small."""
         telling, found = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest()), []
         for level, _, smooth in telling:
-            _, gain = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
+            slope, _ = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
+            gain = shading_gain(slope, self.light)
             found.append(evidence_of(level.image / level.mean, level.mask, gain))
         return mean_evidence(found)
 
-    def relief(
-        self,
-        finest: int,
-        belief: float,
-        monitor: Monitor | None = None,
-        network: DetailNetwork | None = None,
-        tile: int = TILE,
-    ) -> np.ndarray:
-        """Find the relief, R_0 of the module.
+    def relief(self, finest: int, monitor: Monitor | None = None, tile: int = TILE) -> np.ndarray:
+        """Find the relief, R of the module.
 
         Parameters
         ----------
-        finest, monitor, network, tile
+        finest, monitor, tile
             As for `fine_relief`.
-        belief : float
-            What the object's fine changes are: -1 paint, 0 unknown, 1 relief.
 
         Returns
         -------
@@ -289,15 +286,16 @@ class Pyramid:
             If the monitor cancels.
         """
         monitor = monitor or Monitor()
-        coarsest, done = self.levels[-1].mask.shape, 0.0
-        relief: np.ndarray = np.zeros(tuple(n // 2 for n in coarsest), np.float32)
+        coarsest, done = self.levels[-1], 0.0
+        relief: np.ndarray = np.zeros(tuple(n // 2 for n in coarsest.mask.shape), np.float32)
         for level, length, smooth in self._from_coarsest():
             relief = _enlarged(relief)
             share = 0.75 * level.mask.size / self.levels[0].mask.size
             if length <= finest:
-                _add_band(
-                    relief, level, smooth, belief, network, tile, monitor.part(done, done + share)
-                )
+                part = monitor.part(done, done + share)
+                relief = _refined(relief, level, smooth, self.light, tile, part)
+            if level is coarsest:
+                relief -= _low_frequencies(relief, level.mask, length) * level.mask
             done += share
         whole = self.frame.window.put(relief, self.mask.shape)
         whole[~self.mask] = 0
@@ -305,12 +303,18 @@ class Pyramid:
 
     def _from_coarsest(self) -> Iterator[tuple[Level, float, _Smooth]]:
         """Each level with the object's length and the smooth surface, the coarsest first."""
-        smooth = _Smooth(np.concatenate([self.slope, self.gain], axis=2), False)
+        smooth = self._coarsest()
         for k in range(len(self.levels) - 1, -1, -1):
             level = self.levels[k]
             yield level, self.frame.length / 2**k, smooth
             if k:
                 smooth = smooth.finer(level.mask.shape)
+
+    def _coarsest(self) -> _Smooth:
+        level = self.levels[-1]
+        left = _log_light(level.image, level.mask, level.mean) - log_shading(self.slope, self.light)
+        low = _low_frequencies(left, level.mask, self.frame.length / 2**self.frame.halvings)
+        return _Smooth(np.stack([*self.slope, low], axis=2), False)
 
 
 @dataclass(frozen=True)
@@ -345,84 +349,51 @@ class _Frame:
         return coarse
 
 
+def _log_light(image: np.ndarray, mask: np.ndarray, mean: np.float32) -> np.ndarray:
+    """Log of the mean channel (H, W) over the object's mean light; 0 outside of the mask."""
+    light = (image[..., 0] + image[..., 1] + image[..., 2]) / (3 * mean) + np.float32(_DARK)
+    return np.where(mask, np.log(light), np.float32(0))
+
+
+def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:
+    """Low frequencies (H, W) of a level's map inside the mask, continued a little beyond it."""
+    sigma, rest = _SIGMA * _PERIOD * length, values
+    for _ in range(3):
+        rest = rest - masked_gaussian(rest, mask, sigma)
+    low = np.where(mask, values - rest, 0)
+    return np.where(mask, low, masked_gaussian(low, mask, 1.0))
+
+
 def _enlarged(relief: np.ndarray) -> np.ndarray:
     """A relief on the next finer level, in its pixels."""
     rows, columns = (2 * n for n in relief.shape)
     fine = np.empty((rows, columns), np.float32)
     for block in row_blocks((rows // 2, 2 * columns)):
         here = slice(2 * block.rows.start, 2 * block.rows.stop)
-        fine[here] = 2 * raised_at(relief, (here, slice(0, columns)))
+        fine[here] = 2 * doubled_at(relief, (here, slice(0, columns)))
     return fine
 
 
-def _add_band(
+def _refined(
     relief: np.ndarray,
     level: Level,
     smooth: _Smooth,
-    belief: float,
-    network: DetailNetwork | None,
+    light: np.ndarray,
     side: int,
     monitor: Monitor,
-) -> None:
-    """Add the band of a level to `relief` (h, w), tile by tile; tiles overlap by what the network
-    looks at.
+) -> np.ndarray:
+    """The relief (h, w) that a level shows, from an estimate, tile by tile.
+
+    Tiles overlap by what a value depends on.
     """
+    found = np.zeros_like(relief)
     tiles = list(tiles_of(level.mask, side, REACH, MULTIPLE))
     for k, tile in enumerate(tiles):
         monitor.report("fine relief", k / len(tiles))
-        slope, gain = smooth.at(tile.outer)
-        found = predict_relief(
-            level.image[tile.outer] / level.mean,
-            level.mask[tile.outer],
-            slope,
-            gain,
-            belief,
-            network,
-        )
-        relief[tile.inner] += found[tile.own]
-
-
-def slopes(height: np.ndarray) -> np.ndarray:
-    """Return dz/dx and dz/dy, x right and y down.
-
-    Parameters
-    ----------
-    height : (H, W) ndarray
-
-    Returns
-    -------
-    (H, W, 2) ndarray
-    """
-    down, right = np.gradient(height)
-    return np.stack([right, down], axis=2)
-
-
-def shading_gain(slope: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Return the derivatives of log shading, averaged over channels, by the slopes.
-
-    Parameters
-    ----------
-    slope : (H, W, 2) ndarray
-        dz/dx, dz/dy, x right and y down.
-    light : (9, 3) ndarray
-        Log-shading SH coefficients, reference convention.
-
-    Returns
-    -------
-    (H, W, 2) ndarray
-    """
-    coefficients = light_from_reference(light).mean(axis=1)
-
-    def log_shading(right: np.ndarray, down: np.ndarray) -> np.ndarray:
-        normal = np.stack([-down, -right, np.ones_like(right)], axis=-1)
-        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-        return np.einsum("hwk,k->hw", real_sh(normal_from_reference(normal)), coefficients)
-
-    p, q = slope[..., 0], slope[..., 1]
-    return np.stack(
-        [
-            (log_shading(p + _STEP, q) - log_shading(p - _STEP, q)) / (2 * _STEP),
-            (log_shading(p, q + _STEP) - log_shading(p, q - _STEP)) / (2 * _STEP),
-        ],
-        axis=2,
-    )
+        mask = level.mask[tile.outer]
+        slope, low = smooth.at(tile.outer)
+        change = _log_light(level.image[tile.outer], mask, level.mean) - low
+        change -= log_shading(slope, light)
+        refined = relief_from_shading(change, mask, slope, light, relief[tile.outer])
+        found[tile.inner] = np.where(mask, refined, 0)[tile.own]  # tiles end with the object
+    return found

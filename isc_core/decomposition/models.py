@@ -21,7 +21,6 @@ from functools import partial
 from types import TracebackType
 
 from ..io.memory import LARGE, give_back_memory
-from ..networks.detail_network import DetailNetwork
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..sirfs.kernel_cache import load_kernels
@@ -98,8 +97,6 @@ class _Ahead:
         self._kernels: Future[None] | None = None
         if settings.engine != "numpy" and task.prior_set is None and not is_grey(task.maps):
             self._kernels = self._pool.submit(load_kernels, settings.illumination)
-        if settings.detail and task.options.detail_network is None:
-            self._pool.submit(DetailNetwork.shipped)  # read once; it is asked after the solve
 
     def added(self, task: DecompositionTask) -> DecompositionTask:
         """Return the task with the layers that were separated ahead; waits for all the work.

@@ -16,8 +16,7 @@ from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
 from ..imaging.row_blocks import row_blocks
-from ..io.memory import LARGE, enough_memory, free_memory, give_back_memory, require_memory
-from ..networks.detail_network import MULTIPLE, REACH, TILE
+from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -26,7 +25,6 @@ from ..shading.perspective import view_directions
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import share_in_blocks
-from .detail import SMALLEST_TILE
 from .expected_error import with_expected_error
 from .layers import shaded
 from .models import DecompositionTask, SceneEstimate, Settings, solve
@@ -47,8 +45,6 @@ __all__ = [
 
 # Memory at its peak: of the libraries, and for a pixel of the working photo and of the maps.
 _LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 260
-# While fine relief is found: for a pixel of the maps, and of a tile with what is around it.
-_RELIEF_BYTES, _TILE_BYTES = 110, 170
 _REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
@@ -80,8 +76,7 @@ def decompose(
     name : str, optional
         Name of the photo in the result.
     memory : int, optional
-        Bytes that the work may need at most; by default what is free. Fine relief is found in
-        smaller tiles where that suffices. The result does not depend on it.
+        Bytes that the work may need at most; by default what is free.
     monitor : Monitor, optional
         Receives progress; can cancel.
 
@@ -118,12 +113,9 @@ def decompose(
                 "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
                 "or use a larger photo"
             )
-    tile = _tile_within(memory, working.mask.size, maps.mask.size)
     with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
         estimate = solve(
-            DecompositionTask(
-                working, maps, settings, constraints, prior_set, monitor, clock, tile=tile
-            )
+            DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
         )
     monitor.report("maps", 0.98)
     provenance = Provenance(
@@ -152,24 +144,12 @@ def _working(photo: Photo, maps: Photo) -> Photo:
     return maps if working.scale == maps.scale else working
 
 
-def _tile_within(allowed: int | None, working_size: int, maps_size: int) -> int:
-    """The side of the largest tiles for which memory suffices, or of the smallest ones."""
-    allowed = free_memory() if allowed is None else allowed
-    if allowed is None:
-        return TILE
-    fixed = _LEAST_BYTES + _WORKING_BYTES * working_size + _RELIEF_BYTES * maps_size
-    looked_at = int(np.sqrt(max(allowed - fixed, 0) / _TILE_BYTES))
-    return int(np.clip((looked_at - 2 * REACH) // MULTIPLE * MULTIPLE, SMALLEST_TILE, TILE))
-
-
 def _within_memory(
     name: str, working_size: int, shape: tuple[int, ...], allowed: int | None
 ) -> AbstractContextManager[None]:
     """Refuse a photo that needs more memory than allowed; errors of the block say how much."""
     work = f"{name}: {shape[1]} x {shape[0]} pixels to decompose"
-    maps_size, looked_at = shape[0] * shape[1], SMALLEST_TILE + 2 * REACH
-    most = max(_MAPS_BYTES * maps_size, _RELIEF_BYTES * maps_size + _TILE_BYTES * looked_at**2)
-    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + most
+    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * shape[0] * shape[1]
     require_memory(work, needed, allowed, _REMEDY)
     return enough_memory(work, needed, _REMEDY)
 

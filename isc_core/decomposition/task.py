@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..networks.detail_network import TILE, DetailNetwork
 from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
@@ -81,8 +80,6 @@ class SolveOptions:
         even where it is not used.
     scene_network : SceneNetwork or None
         What looks at the photo; None for the shipped network.
-    detail_network : DetailNetwork or None
-        What tells fine relief from paint; None for the shipped network.
     prediction_weights : PredictionWeights or None
         How far predicted normals, shading and light coefficients are trusted; None: as usual in
         the illumination.
@@ -98,7 +95,6 @@ class SolveOptions:
     fit_lobe: bool = True
     check_assumptions: bool = True
     scene_network: SceneNetwork | None = None
-    detail_network: DetailNetwork | None = None
     prediction_weights: PredictionWeights | None = None
     light_colour_weight: LightColourWeight = BALANCED_LIGHT
 
@@ -133,8 +129,6 @@ class DecompositionTask:
         Predicted log shading at the working scale.
     light_coefficients : LightCoefficientsEstimate or None
         Predicted coefficients of the light.
-    tile : int
-        Side of the tiles that fine relief is found in, pixels; results do not depend on it.
     silhouette : (h, w) ndarray of bool or None
         Outline of the object in `working`; None where it is the working photo's mask.
     options : SolveOptions
@@ -153,7 +147,6 @@ class DecompositionTask:
     normal_estimate: NormalEstimate | None = None
     shading_estimate: ShadingEstimate | None = None
     light_coefficients: LightCoefficientsEstimate | None = None
-    tile: int = TILE
     silhouette: np.ndarray | None = None
     options: SolveOptions = field(default_factory=SolveOptions)
 

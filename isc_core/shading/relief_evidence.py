@@ -90,8 +90,8 @@ class ReliefRule:
         odds = self.offset + self.correlation * evidence.correlation + self.along * evidence.along
         return float(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
 
-    def belief(self, evidence: Evidence | None) -> float:
-        """Return how likely the object's fine changes are relief.
+    def share(self, evidence: Evidence | None) -> float:
+        """Return by how much found relief is multiplied.
 
         Parameters
         ----------
@@ -100,15 +100,17 @@ class ReliefRule:
         Returns
         -------
         float
-            -1 paint, 1 relief; without evidence -1, so that nothing is made up.
+            0 without evidence, so that nothing is made up.
         """
-        return -1.0 if evidence is None else 2 * self.probability(evidence) - 1
+        return 0.0 if evidence is None else self.factor * self.probability(evidence)
 
 
 RULE = ReliefRule(-1.44, 2.65, 1.92, 1.3)
 
 
-def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Evidence | None:
+def evidence_of(
+    image: np.ndarray, mask: np.ndarray, gain: tuple[np.ndarray, np.ndarray]
+) -> Evidence | None:
     """Weigh one level of a photo.
 
     Parameters
@@ -116,7 +118,7 @@ def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Eviden
     image : (H, W, 3) ndarray
         Linear diffuse light over the object's mean; sides are multiples of 8.
     mask : (H, W) bool ndarray
-    gain : (H, W, 2) ndarray
+    gain : tuple of (H, W) ndarray
         Derivatives of log shading by the slopes dz/dx and dz/dy, x right and y down.
 
     Returns
@@ -129,11 +131,11 @@ def evidence_of(image: np.ndarray, mask: np.ndarray, gain: np.ndarray) -> Eviden
     whole = block_means(mask.astype(np.float64), _BLOCK) == 1
     if whole.sum() < _FEWEST:
         return None
-    size = np.hypot(gain[..., 0], gain[..., 1])
+    size = np.hypot(*gain)
     energy, mean = block_means(change**2, _BLOCK)[whole], block_means(size, _BLOCK)[whole]
     down, right = np.gradient(change)
-    along = right * gain[..., 0] + down * gain[..., 1]
-    across = right * gain[..., 1] - down * gain[..., 0]
+    along = right * gain[0] + down * gain[1]
+    across = right * gain[1] - down * gain[0]
     ratios = [
         float(block_means(part**2 / np.maximum(size, 1e-6), _BLOCK)[whole].sum())
         for part in (along, across)

@@ -106,9 +106,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--memory",
         type=memory_size,
         metavar="SIZE",
-        help="most memory that the work may need, such as 2GB: fine relief is found in smaller "
-        "tiles, and a photo that needs more even so is refused with the amount (default: what is "
-        "free)",
+        help="most memory that the work may need, such as 2GB: a photo that needs more is refused "
+        "with the amount (default: what is free)",
     )
 
 

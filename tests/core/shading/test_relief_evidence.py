@@ -14,11 +14,11 @@ SIDE = 128
 MASK = np.ones((SIDE, SIDE), bool)
 
 
-def _gain() -> np.ndarray:
+def _gain() -> tuple[np.ndarray, np.ndarray]:
     """Shading that changes with the slope, more on the right, in directions that vary."""
     y, x = np.mgrid[:SIDE, :SIDE] / SIDE
     size = 0.1 + 0.9 * x
-    return np.stack([size * np.cos(y), size * np.sin(y)], axis=2)
+    return size * np.cos(y), size * np.sin(y)
 
 
 def _texture(seed: int) -> np.ndarray:
@@ -28,19 +28,19 @@ def _texture(seed: int) -> np.ndarray:
 def test_relief_and_paint_of_the_same_texture_are_told_apart() -> None:
     gain = _gain()
     down, right = np.gradient(_texture(0))
-    relief = np.exp(gain[..., 0] * right + gain[..., 1] * down)
+    relief = np.exp(gain[0] * right + gain[1] * down)
     paint = np.exp(_texture(0))
     found = [evidence_of(np.tile(one[..., None], 3), MASK, gain) for one in (relief, paint)]
     assert found[0] is not None and found[1] is not None
     assert found[0].correlation > 0.5 > abs(found[1].correlation)
     assert found[0].along > 0.3 > abs(found[1].along)
-    assert RULE.belief(found[0]) > 0.5 > RULE.belief(found[1])
+    assert RULE.probability(found[0]) > 0.75 > RULE.probability(found[1])
 
 
 def test_turning_the_photo_by_a_quarter_changes_nothing() -> None:
     gain, image = _gain(), np.tile(np.exp(_texture(1))[..., None], 3)
-    turned = np.rot90(gain)  # counterclockwise: right becomes up
-    turned = np.stack([turned[..., 1], -turned[..., 0]], axis=2)
+    right, down = (np.rot90(one) for one in gain)  # counterclockwise: right becomes up
+    turned = (down, -right)
     before = evidence_of(image, MASK, gain)
     after = evidence_of(np.rot90(image), MASK, turned)
     assert before is not None and after is not None
@@ -55,7 +55,7 @@ def test_small_and_even_objects_say_nothing() -> None:
     assert evidence_of(image, small, _gain()) is None
     assert evidence_of(np.ones_like(image), MASK, _gain()) is None
     assert mean_evidence([None, None]) is None
-    assert RULE.belief(None) == -1
+    assert RULE.share(None) == 0
 
 
 def test_levels_are_averaged() -> None:
@@ -64,7 +64,7 @@ def test_levels_are_averaged() -> None:
     assert mean is not None and mean.correlation == pytest.approx(0.3) and mean.along == 0
 
 
-def test_the_belief_grows_with_the_evidence_within_its_bounds() -> None:
-    beliefs = [RULE.belief(Evidence(c, c)) for c in (-5, -0.5, 0.0, 0.5, 5)]
-    assert beliefs == sorted(beliefs) and beliefs[0] > -1.001 and beliefs[-1] < 1.001
-    assert beliefs[0] < -0.9 and beliefs[-1] > 0.9
+def test_the_share_grows_with_the_evidence_within_its_bounds() -> None:
+    shares = [RULE.share(Evidence(c, c)) for c in (-5, -0.5, 0.0, 0.5, 5)]
+    assert shares == sorted(shares) and shares[0] >= 0 and shares[-1] <= RULE.factor
+    assert shares[0] < 0.05 * RULE.factor and shares[-1] > 0.95 * RULE.factor
