@@ -8,7 +8,7 @@ stored in a row for each body, so that an interrupted run continues; with `--kin
 made.
 
 Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
-free). The share of a body's relief that is added is a p, p its probability by the weights of the
+free). The share of a body's relief that is added is a b(p), p its probability by the weights of the
 others. The factor a is that of a grid that explains most of the relief, mean over bodies and
 octaves, where what is invented on print is at most .05 of the relief's energy in every octave.
 
@@ -33,7 +33,7 @@ from isc_core.decomposition.settings import MOST_DETAIL, Settings
 from isc_core.decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
 from isc_core.errors import InputError
 from isc_core.photo import read_photo
-from isc_core.shading.relief_evidence import ReliefRule
+from isc_core.shading.relief_evidence import ReliefRule, belief
 
 from .body_rows import body_rows
 from .measure import judge
@@ -149,9 +149,10 @@ def best_factor(
         np.array([row[name] for row in rows]) for name in ("explained", "error", "energy")
     )
     scale = energy[is_relief, 0].mean(axis=0)
+    believed = np.array([belief(p) for p in probability])
     best = (0.0, np.zeros(explained.shape[2]), np.zeros(explained.shape[2]))
     for factor in np.arange(0, _MOST, 0.05):
-        shares = factor * probability
+        shares = factor * believed
         known = _at(explained[is_relief], shares[is_relief]).mean(axis=0)
         false = _at(error[~is_relief], shares[~is_relief]).mean(axis=0) / scale
         if false.max() <= _INVENTED and known.mean() > best[1].mean():

@@ -11,8 +11,8 @@ of the photo's mean channel, the fine changes on a level are
 L being the low frequencies of I - S on the coarsest level (periods above `_PERIOD` of the object's
 length), and U linear interpolation. From the coarsest level on, the relief R of a level is that
 which explains d (`shading.relief_from_shading`), found from 2 U R of the level before. The height
-is that of the solve plus a(p) R of the finest level, p the probability that the object's fine
-changes are relief (`shading.relief_evidence`). On the coarsest level R loses its low frequencies
+is that of the solve plus a R of the finest level; a, which is 0 for paint, is what the whole object
+says (`shading.relief_evidence`). On the coarsest level R loses its low frequencies
 too, so that no level moves the overall shape; the light stays as it is.
 
 Citation: see `shading.relief_from_shading`; pyramid: P. J. Burt, E. H. Adelson, IEEE Trans. Comm.
@@ -55,7 +55,7 @@ TILE = 384  # pixels of a tile's side: its maps stay in the cache
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
-_PERIOD = 0.037  # of the object's length: 9.5 pixels of the solve
+_PERIOD = 0.026  # of the object's length: 6.7 pixels of the solve
 _SIGMA = 0.2829  # of a Gaussian over the period of which three passes keep half
 _DARK = 0.01  # of the object's mean light
 

@@ -21,7 +21,7 @@ from ..imaging.blocks import block_means
 from .layers import conv_block, convolved, depth_to_space, is_chain, space_to_depth
 from .loader import Network
 
-BLOCK = 4  # pixels of a block's side, in networks of whole photos
+BLOCK = 4  # pixels of a block's side
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,6 @@ class EncoderDecoder(Network):
     ----------
     inputs, outputs : int
         Channels of a pixel.
-    block : int
-        Pixels of a block's side.
-    bound : float or None
-        Of the values of layers: a map's values then depend on their surroundings alone, see
-        `layers.convolved`.
     weights : tuple of (9, inputs, outputs) float32 ndarray
         Two for each level down, two for each level up from the coarsest, the output.
     biases : tuple of (outputs,) float32 ndarray
@@ -44,8 +39,6 @@ class EncoderDecoder(Network):
 
     inputs: ClassVar[int]
     outputs: ClassVar[int]
-    block: ClassVar[int]
-    bound: ClassVar[float | None] = None
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -63,7 +56,7 @@ class EncoderDecoder(Network):
             return False
         if any(w.ndim != 3 for w in self.weights):
             return False
-        shapes, inputs = list[tuple[int, ...]](), self.block**2 * self.inputs
+        shapes, inputs = list[tuple[int, ...]](), BLOCK**2 * self.inputs
         for width in self.widths:
             shapes += [(9, inputs, width), (9, width, width)]
             inputs = width
@@ -73,7 +66,7 @@ class EncoderDecoder(Network):
             width = up.shape[-1]
             shapes += [(9, skip + inputs, width), (9, width, width)]
             inputs = width
-        shapes.append((9, inputs, self.block**2 * self.outputs))
+        shapes.append((9, inputs, BLOCK**2 * self.outputs))
         return is_chain(self.weights, self.biases, shapes)
 
     @property
@@ -92,7 +85,7 @@ class EncoderDecoder(Network):
         Parameters
         ----------
         channels : (H, W, inputs) ndarray
-            Sides are multiples of `block` * 2^(depth - 1).
+            Sides are multiples of `BLOCK` * 2^(depth - 1).
 
         Returns
         -------
@@ -100,28 +93,14 @@ class EncoderDecoder(Network):
         levels : list of ndarray
             The encoder's maps, the finest first.
         """
-        return self.walked_blocks(space_to_depth(channels, self.block))
-
-    def walked_blocks(self, layer: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Go down and up again, from channels in blocks; they are not kept.
-
-        Parameters
-        ----------
-        layer : (H / block, W / block, block^2 inputs) ndarray
-            Of `space_to_depth`.
-
-        Returns
-        -------
-        maps, levels
-            As of `walked`.
-        """
+        layer = space_to_depth(channels, BLOCK)
         steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
         for level in range(self.depth):
-            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps, self.bound)
+            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps)
             levels.append(layer)
         for skip in levels[-2::-1]:
-            layer = conv_block(_beside(skip, layer), steps, self.bound)
-        return depth_to_space(convolved(layer, *next(steps), self.bound), self.block), levels
+            layer = conv_block(_beside(skip, layer), steps)
+        return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
 
 
 def _beside(skip: np.ndarray, coarse: np.ndarray) -> np.ndarray:
@@ -150,7 +129,6 @@ class PhotoNetwork(EncoderDecoder):
 
     coarse: ClassVar[int]
     answers: ClassVar[int]
-    block = BLOCK
 
     dense: tuple[np.ndarray, ...]
     offsets: tuple[np.ndarray, ...]

@@ -136,7 +136,7 @@ def depth_to_space(layer: np.ndarray, block: int) -> np.ndarray:
     )
 
 
-def conv_block(layer: np.ndarray, steps: Steps, bound: float | None = None) -> np.ndarray:
+def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
     """Apply the next two convolutions of `steps`, each followed by max(0, .).
 
     Parameters
@@ -144,22 +144,18 @@ def conv_block(layer: np.ndarray, steps: Steps, bound: float | None = None) -> n
     layer : (H, W, C) ndarray
     steps : Steps
         Weights and biases of the remaining convolutions; advanced by two.
-    bound : float, optional
-        As for `convolved`.
 
     Returns
     -------
     (H, W, D) float32 ndarray
     """
     for _ in range(2):
-        layer = convolved(layer, *next(steps), bound)
+        layer = convolved(layer, *next(steps))
         np.maximum(layer, 0, out=layer)
     return layer
 
 
-def convolved(
-    layer: np.ndarray, weight: np.ndarray, bias: np.ndarray, bound: float | None = None
-) -> np.ndarray:
+def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """Convolve with a 3 x 3 kernel and zero padding, as matrix products of neighbourhoods.
 
     Both factors are rounded to whole multiples of a power of two, small enough for doubles to hold
@@ -171,10 +167,6 @@ def convolved(
     layer : (H, W, C) ndarray
     weight : (9, C, D) ndarray
     bias : (D,) ndarray
-    bound : float, optional
-        A power of two that values of the layer are clipped to. They are then rounded in steps that
-        depend on it and the weights alone, so that a value of the result does not depend on what is
-        elsewhere in the layer; by default the steps are 2^-20 of the largest value.
 
     Returns
     -------
@@ -183,14 +175,12 @@ def convolved(
     rows, columns, channels = layer.shape
     kernel_step = _step_of(weight)
     kernel = np.rint(weight.astype(np.float64) / kernel_step).reshape(-1, weight.shape[2])
-    layer_step = _step_of(layer) if bound is None else bound / 2 ** _bits_beside(kernel)
+    layer_step = _step_of(layer)
     out = np.empty((rows, columns, weight.shape[2]), np.float32)
     height = max(1, _BLOCK_BYTES // (72 * channels * columns))
     for top in range(0, rows, height):
         count = min(height, rows - top)
         near = layer[max(top - 1, 0) : top + count + 1]
-        if bound is not None:
-            near = np.clip(near, -bound, bound)
         above, below = int(top == 0), int(top + count == rows)
         block = np.pad(np.rint(near / layer_step), ((above, below), (1, 1), (0, 0)))
         neighbourhoods = np.stack(
@@ -201,12 +191,6 @@ def convolved(
             count, columns, -1
         )
     return out
-
-
-def _bits_beside(kernel: np.ndarray) -> int:
-    """Bits of values whose products with whole numbers sum to less than 2^53; float32 has 24."""
-    largest = float(np.abs(kernel).sum(axis=0).max())
-    return min(24, 53 - int(np.ceil(np.log2(max(largest, 1.0)))))
 
 
 def _step_of(values: np.ndarray) -> float:

@@ -15,9 +15,12 @@ The probability of relief is logistic in c and r,
 
     p = 1 / (1 + exp(-(w_0 + w_c c + w_r r)))
 
-The detail network, which sees patches alone, is told 2 p - 1, and what it finds is multiplied by
-one factor for all objects. The four numbers are fitted to the choice set of rendered bodies by
-`benchmarks.detail.relief_rule`.
+Relief is multiplied by
+
+    a b(p),   b(p) = log (p / (1 - p)) / log 4, at least 0 and at most 1,
+
+so that nothing is added where paint is as likely, and all of it from odds of four. The four numbers
+are fitted to the choice set of rendered bodies by `benchmarks.detail.relief_rule`.
 
 Citation: the direction of the light shows in the spectrum of relief: A. Pentland, "Finding the
 illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et al., "Classifying
@@ -41,6 +44,8 @@ _SMOOTH = 2.0  # standard deviation of the average, pixels
 _DARK = 0.01  # of the object's mean light
 _LEAST_GAIN = 0.05
 _FEWEST = 30  # blocks
+_CERTAIN = 4.0  # odds
+_TINY = 1e-12
 
 
 @dataclass(frozen=True)
@@ -68,7 +73,7 @@ class ReliefRule:
     offset, correlation, along : float
         Weights of the logistic regression.
     factor : float
-        Of what the network finds.
+        Of what shading explains; SIRFS' light is rather too even.
     """
 
     offset: float
@@ -102,10 +107,26 @@ class ReliefRule:
         float
             0 without evidence, so that nothing is made up.
         """
-        return 0.0 if evidence is None else self.factor * self.probability(evidence)
+        return 0.0 if evidence is None else self.factor * belief(self.probability(evidence))
 
 
 RULE = ReliefRule(-1.44, 2.65, 1.92, 1.3)
+
+
+def belief(probability: float) -> float:
+    """Return which part of a relief is believed, b of the module.
+
+    Parameters
+    ----------
+    probability : float
+        Of relief, in [0, 1].
+
+    Returns
+    -------
+    float
+    """
+    odds = probability / max(1 - probability, _TINY)
+    return float(np.clip(np.log(max(odds, _TINY)) / np.log(_CERTAIN), 0, 1))
 
 
 def evidence_of(

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
-from benchmarks.detail.relief_rule import FACTORS, best_factor, left_out, logistic_weights
+from benchmarks.detail.relief_rule import SHARES, best_factor, left_out, logistic_weights
 
 
 def test_weights_of_a_known_boundary() -> None:
@@ -24,15 +24,15 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
 
 
 def test_the_factor_stops_where_too_much_is_invented() -> None:
-    factors = np.array(FACTORS)
-    gained = (1 - (1 - factors / 3) ** 2)[:, None]
+    shares, probability = np.array(SHARES), np.array([0.8, 2 / 3])
+    gained = (1 - (1 - shares) ** 2)[:, None]
     rows = [
         {"explained": gained, "error": 0 * gained, "energy": np.ones_like(gained)},
-        {"explained": gained, "error": 0.011 * factors[:, None] ** 2, "energy": 0 * gained},
+        {"explained": gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained},
     ]
     is_relief = np.array([True, False])
-    factor, explained, invented = best_factor(rows, is_relief)
-    assert np.isclose(factor, 2.1) and 0.9 < explained[0] < 0.92 and invented[0] <= 0.05
+    factor, explained, invented = best_factor(rows, probability, is_relief)
+    assert np.isclose(factor, 1.0) and 0.95 < explained[0] < 0.97 and invented[0] <= 0.0501
     rows[1]["error"] = 0 * gained
-    factor, explained, invented = best_factor(rows, is_relief)
-    assert np.isclose(factor, 3) and explained[0] > 0.999 and invented[0] == 0
+    factor, explained, invented = best_factor(rows, probability, is_relief)
+    assert np.isclose(factor, 1.25) and explained[0] > 0.999 and invented[0] == 0

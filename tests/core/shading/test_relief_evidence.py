@@ -6,6 +6,7 @@ import pytest
 from isc_core.shading.relief_evidence import (
     RULE,
     Evidence,
+    belief,
     evidence_of,
     mean_evidence,
 )
@@ -64,7 +65,7 @@ def test_levels_are_averaged() -> None:
     assert mean is not None and mean.correlation == pytest.approx(0.3) and mean.along == 0
 
 
-def test_the_share_grows_with_the_evidence_within_its_bounds() -> None:
-    shares = [RULE.share(Evidence(c, c)) for c in (-5, -0.5, 0.0, 0.5, 5)]
-    assert shares == sorted(shares) and shares[0] >= 0 and shares[-1] <= RULE.factor
-    assert shares[0] < 0.05 * RULE.factor and shares[-1] > 0.95 * RULE.factor
+def test_the_share_grows_with_the_evidence_and_is_nothing_below_even_odds() -> None:
+    shares = [RULE.share(Evidence(c, c)) for c in (-5, 0.0, 0.3, 0.5, 0.8, 5)]
+    assert shares == sorted(shares) and shares[0] == shares[1] == 0 and shares[-1] == RULE.factor
+    assert [belief(p) for p in (0.0, 0.5, 2 / 3, 0.8, 1.0)] == pytest.approx([0, 0, 0.5, 1, 1])
