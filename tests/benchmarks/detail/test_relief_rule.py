@@ -25,14 +25,14 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
 
 def test_the_factor_stops_where_too_much_is_invented() -> None:
     shares, probability = np.array(SHARES), np.array([0.8, 2 / 3])
-    gained = (1 - (1 - shares) ** 2)[:, None]
+    gained = (1 - (1 - shares / 1.5) ** 2)[:, None]
     rows = [
         {"explained": gained, "error": 0 * gained, "energy": np.ones_like(gained)},
         {"explained": gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained},
     ]
     is_relief = np.array([True, False])
     factor, explained, invented = best_factor(rows, probability, is_relief)
-    assert np.isclose(factor, 1.0) and 0.95 < explained[0] < 0.97 and invented[0] <= 0.0501
+    assert np.isclose(factor, 1.0) and 0.88 < explained[0] < 0.90 and invented[0] <= 0.0501
     rows[1]["error"] = 0 * gained
     factor, explained, invented = best_factor(rows, probability, is_relief)
-    assert np.isclose(factor, 1.25) and explained[0] > 0.999 and invented[0] == 0
+    assert np.isclose(factor, 1.5) and explained[0] > 0.999 and invented[0] == 0
