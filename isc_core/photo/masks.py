@@ -13,6 +13,7 @@ from .found_mask import FoundMask, MaskFinder
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
+_HARD = 0.02  # of the largest value: closer to it, or to 0, masks of lossy files are, too
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
@@ -125,6 +126,24 @@ def find_mask(
     return tidy_mask(bright), "black border"
 
 
+def soft_cover(values: np.ndarray) -> np.ndarray | None:
+    """Return how much of each pixel the object covers, where a mask tells more than yes or no.
+
+    Parameters
+    ----------
+    values : (H, W) ndarray
+        Of a mask or an alpha channel; the largest is an object's pixel.
+
+    Returns
+    -------
+    (H, W) float32 ndarray or None
+        0 to 1; None where all values are as good as 0 or 1.
+    """
+    cover = np.clip(finite_or_zero(values) / max(float(values.max()), 1e-12), 0, 1)
+    cover = cover.astype(np.float32, copy=False)
+    return cover if ((cover > _HARD) & (cover < 1 - _HARD)).any() else None
+
+
 def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:
     """Return light as a `MaskFinder` takes it.
 
@@ -174,9 +193,27 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
         )
     if raster.transparency is not None:
         return raster.transparency >= 0.5
-    values = finite_or_zero(largest(raster.values))
+    values = mask_values(raster)
     # Half of the largest value, not of the format's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)
+
+
+def mask_values(raster: Raster) -> np.ndarray:
+    """Return what of an image is its mask.
+
+    Parameters
+    ----------
+    raster : Raster
+        Of a mask.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Its alpha channel, where that is not opaque; else the largest channel.
+    """
+    if raster.transparency is not None:
+        return np.asarray(raster.transparency)
+    return finite_or_zero(largest(raster.values))
 
 
 def finite_or_zero(values: np.ndarray) -> np.ndarray:
