@@ -126,22 +126,32 @@ def find_mask(
     return tidy_mask(bright), "black border"
 
 
-def soft_cover(values: np.ndarray) -> np.ndarray | None:
-    """Return how much of each pixel the object covers, where a mask tells more than yes or no.
+def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
+    """Return how much of each pixel the object covers, where an image tells more than yes or no.
 
     Parameters
     ----------
-    values : (H, W) ndarray
-        Of a mask or an alpha channel; the largest is an object's pixel.
+    raster : Raster
+        A mask, or a photo with an alpha channel.
+    mask : (H, W) bool ndarray
+        What it shows as the object.
 
     Returns
     -------
     (H, W) float32 ndarray or None
-        0 to 1; None where all values are as good as 0 or 1.
+        0 to 1: the alpha channel; of an image without, shares of the value that most of the object
+        has. None where all are as good as 0 or 1, or where the background is not 0.
     """
-    cover = np.clip(finite_or_zero(values) / max(float(values.max()), 1e-12), 0, 1)
-    cover = cover.astype(np.float32, copy=False)
-    return cover if ((cover > _HARD) & (cover < 1 - _HARD)).any() else None
+    if raster.transparency is not None:
+        values = np.asarray(raster.transparency, np.float32)
+    else:
+        values = finite_or_zero(largest(raster.values)).astype(np.float32)
+        values /= max(float(np.median(values[mask])), 1e-12)
+    cover = np.clip(values, 0, 1)
+    partly = (cover > _HARD) & (cover < 1 - _HARD)
+    beyond = cover[~mask]
+    plain = not beyond.size or float(np.median(beyond)) <= _HARD
+    return cover if plain and partly.any() else None
 
 
 def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:
@@ -193,27 +203,9 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
         )
     if raster.transparency is not None:
         return raster.transparency >= 0.5
-    values = mask_values(raster)
+    values = finite_or_zero(largest(raster.values))
     # Half of the largest value, not of the format's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)
-
-
-def mask_values(raster: Raster) -> np.ndarray:
-    """Return what of an image is its mask.
-
-    Parameters
-    ----------
-    raster : Raster
-        Of a mask.
-
-    Returns
-    -------
-    (H, W) ndarray
-        Its alpha channel, where that is not opaque; else the largest channel.
-    """
-    if raster.transparency is not None:
-        return np.asarray(raster.transparency)
-    return finite_or_zero(largest(raster.values))
 
 
 def finite_or_zero(values: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import without_background
 from .found_mask import FoundMask, MaskFinder
-from .masks import check_mask, find_mask, mask_of, mask_values, soft_cover
+from .masks import check_mask, find_mask, mask_of, soft_cover
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
 from .soft_rim import soft_rim
@@ -154,7 +154,7 @@ def _photo(
     _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
     cover = None if found is None else found.cover
     if mask_from in ("alpha", "file"):
-        cover = soft_cover(mask_values(raster if mask_raster is None else mask_raster))
+        cover = soft_cover(raster if mask_raster is None else mask_raster, mask)
     # An alpha channel comes with the object's own colours.
     mixed = found is not None or (mask_from == "file" and _is_soft(cover, mask))
     height, width = mask.shape
