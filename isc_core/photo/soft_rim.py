@@ -7,7 +7,9 @@ Rule: across a smooth outline at most w pixels are partly covered (.1 to .9): 3 
 6, or 2.5 % of the object's length, by a mask, which `masking.refinement` may have feathered along
 the colours of the photo. A rim is soft where at least .6 of the pixels of a window of 2 w + 1 are
 partly covered, so that strands count as well as mist. Such pixels are at least as many as the
-object is long, else nothing is soft.
+object is long, else nothing is soft. In each place, at least a sixth of the partly covered pixels
+are covered by more than half: hair grows from the object, and what lies beyond a step, such as a
+shadow in the alpha channel, is none of it.
 
 Citation: none; the rule is our own. On soft masks in general: J. Wang and M. F. Cohen, "Image and
 video matting: a survey", Foundations and Trends in Computer Graphics and Vision 3 (2007),
@@ -24,6 +26,7 @@ from ..imaging.bounding_box import mask_slices
 
 _PARTLY = (0.1, 0.9)
 _DENSE = 0.6  # share of partly covered pixels in a window
+_ABOVE = 1 / 6  # share of those that are covered by more than half
 _EDGE = 3  # w of an alpha channel, pixels
 _FEATHER, _FEATHER_SHARE = 6, 0.025  # w of masks: pixels, and of the object's longer side
 
@@ -53,4 +56,10 @@ def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | Non
     dense = partly & (density >= _DENSE)
     if dense.sum() < longest:
         return None
-    return np.asarray(ndimage.maximum_filter(dense, window + 2))
+    zone = ndimage.maximum_filter(dense, window + 2)
+    labels, count = ndimage.label(zone)
+    found, above = (
+        np.bincount(labels[kind], minlength=count + 1) for kind in (partly, partly & (share > 0.5))
+    )
+    zone &= (above >= _ABOVE * found)[labels]
+    return np.asarray(zone) if zone.any() else None

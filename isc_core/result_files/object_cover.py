@@ -5,10 +5,9 @@ was found in the photo, of a soft mask and of an alpha channel is known more fin
 the cover of each of the photo's pixels.
 
 Equation: the cover of a pixel of the maps is the mean over its area. Beyond two pixels from the
-object it is 0, unless the way there leads over pixels that the object covers in part: the photo may
-show other things.
-
-Where the rim is soft (`photo.soft_rim`), the cover is the opacity of the surface.
+object it is 0, for the photo may show other things, unless the rim is soft (`photo.soft_rim`) and
+the way there leads over pixels that the object covers in part. There the cover is the opacity of
+the surface.
 
 Citation: the cover as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
 doi:10.1145/800031.808606.
@@ -128,7 +127,9 @@ def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | No
     way = near | ((share > _SOME) & (share < 0.5))
     share[~ndimage.binary_propagation(d.mask, mask=way)] = 0
     own = d.provenance.input.get("mask_from") == "alpha"
-    return ObjectCover(share, soft_rim(share, d.mask, own), codes, scale)
+    soft = soft_rim(share, d.mask, own)
+    share[~near if soft is None else ~(near | soft)] = 0
+    return ObjectCover(share, soft, codes, scale)
 
 
 def _resized(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> np.ndarray:

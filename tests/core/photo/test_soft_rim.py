@@ -63,3 +63,23 @@ def test_strands_are_soft() -> None:
 def test_a_tuft_alone_is_none() -> None:
     cover = np.where(wedge(0.02), np.clip(0.5 - distance() / 20, 0, 1), distance() < 0)
     assert soft_rim(cover, cover >= 0.5, own=True) is None
+
+
+@pytest.mark.parametrize("opacity", [0.3, 0.45, 0.6])
+@pytest.mark.parametrize("blur", [6, 12])
+def test_a_shadow_in_the_alpha_channel_is_no_hair(opacity: float, blur: float) -> None:
+    solid = np.clip(0.5 - distance(), 0, 1)
+    shadow = np.roll(ndimage.gaussian_filter(solid, blur), (8, 6), (0, 1)) * opacity
+    cover = solid + (1 - solid) * shadow
+    assert soft_rim(cover, cover >= 0.5, own=True) is None
+
+
+def test_hair_beside_a_shadow_is_found_alone() -> None:
+    hair = wedge(0.25)
+    solid = np.where(hair, np.clip(0.5 - distance() / 20, 0, 1), np.clip(0.5 - distance(), 0, 1))
+    shadow = 0.3 * np.roll(ndimage.gaussian_filter(solid, 3), (0, -16), (0, 1)) * ~hair
+    cover = solid + (1 - solid) * np.where(wedge(0.6), 0, shadow)
+    found = soft_rim(cover, solid >= 0.5, own=True)
+    assert found is not None
+    assert found[hair & (np.abs(distance()) < 6)].mean() > 0.9
+    assert not found[~wedge(0.5)].any()
