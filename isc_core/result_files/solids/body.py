@@ -26,7 +26,7 @@ artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of 
 Igarashi, S. Matsuoka and H. Tanaka, "Teddy", SIGGRAPH 1999, doi:10.1145/311535.311602.
 
 Limits: the back is invented. Parts that hide others are joined to them: a step in depth inside the
-outline stays a steep slope.
+outline stays a slope. Cuts along it were tried, see the research log ("Depth edges").
 """
 
 from dataclasses import dataclass
