@@ -266,3 +266,22 @@ def test_arrays_have_the_cover(fur: Path) -> None:
     arrays = dict(np.load(fur / "arrays.npz"))
     assert arrays["alpha"].shape == arrays["cover"].shape == arrays["soft"].shape
     assert arrays["alpha"].dtype == np.uint8 and arrays["soft"].dtype == bool
+
+
+def test_from_a_photo_with_hair_to_a_mesh_that_fades(tmp_path: Path) -> None:
+    """The soft alpha channel of a photo goes through the result into the mesh and the arrays."""
+    d = ball()
+    row, column = np.indices(d.mask.shape)
+    away = np.hypot(row - 44, column - 66) - 0.99 * 40
+    alpha = np.clip(0.5 - away / np.where(column > 66, 14, 1), 0, 1)
+    color = np.where(d.mask[..., None], d.image / d.image.max(), 0.3)
+    codes = np.rint(255 * np.dstack([color, alpha])).astype(np.uint8)
+    Image.fromarray(codes).save(tmp_path / "hair.png")
+    given = [tmp_path / "hair.png", "--model", "naive", "--arrays", "-o", tmp_path / "hair"]
+    assert main(["decompose", *map(str, given)]) == 0
+    arrays = dict(np.load(tmp_path / "hair" / "arrays.npz"))
+    partly = (alpha > 0.1) & (alpha < 0.9) & (column > 70)
+    assert np.abs(arrays["alpha"] / 255 - alpha)[partly].max() < 0.01
+    path = tmp_path / "hair.glb"
+    assert exported(tmp_path / "hair", "--format", "glb", "--back", "rounded", "-o", path) == 0
+    assert [one.get("alphaMode") for one in material_of(path)[0]] == [None, "BLEND"]
