@@ -32,6 +32,7 @@ from isc_core.evaluation.metrics import psnr
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.body import make_body
+from isc_core.result_files.solids.rim import Rim
 from isc_core.result_files.solids.surface import placed, vertex_normals
 from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
@@ -89,7 +90,7 @@ def drawn(result: ResultArrays, kind: str) -> Drawn:
         result.height,
         result.normal[..., 2],
         result.mask,
-        result.mask.astype(np.float64),
+        Rim(result.mask),
         Back(kind),
         0,
     )

@@ -32,6 +32,7 @@ TEXTURE_NAMES = {
     "edited_base_color": "basecolor_edited",
     "normal_map": "normal",
     "specular_variation": "specular",
+    "alpha": "alpha",
 }
 MAPS = {
     **dict.fromkeys(("diffuse", "specular", "residual", "reflectance", "shading", "lobe"), COLOR),

@@ -33,7 +33,7 @@ _COLORS = (
     "base_color",
     "normal_map",
 )
-_VALUES = ("height", "mask", "confidence", "specular_variation")
+_VALUES = ("height", "mask", "confidence", "specular_variation", "cover", "soft")
 _NUMBERS = (
     "reflectance_scale",
     "metres_per_pixel",
@@ -54,19 +54,20 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("origin", "sun_direction", "sun_strength", "sun_ambient"), (3,)),
     "faces": ("F", 3),
     "texture": ("rows", "columns", 3),
+    "alpha": ("h_alpha", "w_alpha"),
     "environment_map": ("h", "w", 3),
     "photo_size": (2,),
     "principal_point": (2,),
     "eye": (3,),
 }
 _DTYPES = {
-    "mask": np.dtype(bool),
-    "texture": np.dtype(np.uint8),
+    **dict.fromkeys(("mask", "soft"), np.dtype(bool)),
+    **dict.fromkeys(("texture", "alpha"), np.dtype(np.uint8)),
     **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
 }
 _CAMERA = ("focal_length", "principal_point", "eye")
 _OPTIONAL, _MAY_BE_NAN = (
-    {"specular_variation", "texture", *_CAMERA},
+    {"specular_variation", "texture", "cover", "soft", "alpha", *_CAMERA},
     {"roughness", "specular_level"},
 )
 # Names that earlier versions wrote.
@@ -137,6 +138,12 @@ class ResultArrays:
         Spatial factor of the specular level.
     texture : (rows, columns, 3) ndarray of uint8 or None
         `base_color` as sRGB codes at the photo's resolution, over the same frame.
+    cover : (H, W) ndarray or None
+        Share of each pixel that the object covers, where more is known than the mask says.
+    soft : (H, W) ndarray of bool or None
+        Where the rim is soft; None for nowhere.
+    alpha : (rows, columns) ndarray of uint8 or None
+        Opacity, of an object with a soft rim; without a texture of the size of the maps.
     focal_length : float or None
         Of the photo's camera in pixels of the maps; None for an orthographic view.
     principal_point : (2,) ndarray or None
@@ -184,6 +191,9 @@ class ResultArrays:
     crop_scale: float
     specular_variation: np.ndarray | None = None
     texture: np.ndarray | None = None
+    cover: np.ndarray | None = None
+    soft: np.ndarray | None = None
+    alpha: np.ndarray | None = None
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None

@@ -3,7 +3,7 @@
 Everything is taken from the scene, edits included: base colour, roughness, specular level and
 normal map from the Principled BSDF, height and occlusion from the recovered height map.
 
-    basecolor   coded as sRGB (EXR: linear); alpha is the object
+    basecolor   coded as sRGB (EXR: linear); alpha is the object, or fades with its soft rim
     normal      (n + 1) / 2 on the mesh; green upward (OpenGL) or downward (DirectX)
     specular    .5 is plastic, f0 = .08 * specular = .04
     height      0 the lowest point of the object, 1 the highest
@@ -118,6 +118,9 @@ class _Planes:
             for size, of in zip(colors.shape, mask.shape, strict=False)
         )
         cover = mask[np.ix_(rows.astype(int), columns.astype(int))]
+        if (soft := linked_image(self.surface.inputs["Alpha"])) is not None:
+            alpha = _resized(linear_colors(soft)[::-1, :, 0], cover.shape)
+            cover = np.where(alpha < 1, alpha, cover)
         return np.dstack([np.clip(colors, 0, 1), cover])
 
     @property

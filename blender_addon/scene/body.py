@@ -7,6 +7,7 @@ import numpy as np
 
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.body import continued
+from isc_core.result_files.solids.rim import Rim
 from isc_core.result_files.solids.surface import Solid, before_camera, make_solid
 from isc_core.shading.perspective import view_directions
 
@@ -65,7 +66,9 @@ def _solid(result: ResultArrays, back: str, triangles: int) -> Solid:
     view = np.array([0.0, 0.0, 1.0])
     if camera is not None:
         view = view_directions(camera, (height, width))
-    return make_solid(_heights(result), result.normal, result.mask, view, Back(back), triangles)
+    rim = Rim(result.mask if result.cover is None else result.cover, result.soft)
+    heights, normal, mask = _heights(result), result.normal, result.mask
+    return make_solid(heights, normal, mask, rim, view, Back(back), triangles)
 
 
 def _heights(result: ResultArrays) -> np.ndarray:

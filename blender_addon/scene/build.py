@@ -223,6 +223,7 @@ def _place(
         specular=images["specular"],
         variation=images.get("specular_variation"),
         normal=images.get("normal_map"),
+        alpha=images.get("alpha"),
         plain=prepared.plain,
     )
     material = ensure_material(key, maps, prepared.specular)
@@ -376,10 +377,13 @@ def _ensure_camera_and_light(
 
 
 def _remove_unused(key: str, maps: MaterialMaps) -> None:
-    """Remove the normal map of an earlier mesh that had fewer triangles than this one."""
-    old = find_tagged(bpy.data.images, key, "normal_map")
-    if maps.normal is None and old is not None and old.users == 0:
-        bpy.data.images.remove(old)
+    """Remove the textures of an earlier mesh that this one lacks: it had fewer triangles, or a
+    soft rim.
+    """
+    for role, image in (("normal_map", maps.normal), ("alpha", maps.alpha)):
+        old = find_tagged(bpy.data.images, key, role)
+        if image is None and old is not None and old.users == 0:
+            bpy.data.images.remove(old)
 
 
 def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) -> None:

@@ -48,6 +48,8 @@ class MaterialMaps:
         Spatial factor of the specular level.
     normal : bpy.types.Image or None
         Tangent-space normal map.
+    alpha : bpy.types.Image or None
+        Opacity; None for an opaque object.
     plain : ImageFile or None
         The base colour without its compensation for the specular share, if known.
     """
@@ -56,6 +58,7 @@ class MaterialMaps:
     specular: bpy.types.Image | None
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
+    alpha: bpy.types.Image | None = None
     plain: ImageFile | None = None
 
 
@@ -238,6 +241,9 @@ def _add_surface(
             (normal.outputs["Color"], normal_map.inputs["Color"]),
             (normal_map.outputs["Normal"], bsdf.inputs["Normal"]),
         )
+    if maps.alpha is not None:
+        alpha = _add_texture(tree, maps.alpha, "Alpha", (-900, -560), textures)
+        connect(tree, (alpha.outputs["Color"], bsdf.inputs["Alpha"]))
     return group
 
 

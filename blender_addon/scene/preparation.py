@@ -166,6 +166,9 @@ def prepare(
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
         files["normal_map"] = texture_file(normal_map, DATA)
+    # The mesh of the result ends at its pixels, where the rim is soft, too.
+    if result.alpha is not None and options.back and not options.displacement:
+        files["alpha"] = texture_file(result.alpha / 255, DATA)
     if options.displacement:
         files["displacement"] = map_file(displacement_map(result, options.size_metres), DATA)
     if with_photo:

@@ -150,9 +150,8 @@ def _decompose(
     )
     source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": expected}
     result = replace(result, provenance=replace(result.provenance, input=source))
-    cover = None if photo.found is None else photo.found.cover
     writing = monitor.part(0.8, 1.0)
-    save(result, job.folder, arrays=plan.arrays, cover=cover, monitor=writing)
+    save(result, job.folder, arrays=plan.arrays, cover=photo.cover, monitor=writing)
 
 
 def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:

@@ -227,4 +227,4 @@ def photos_of_each(
 
 def _alone(photo: Photo, found: FoundMask) -> Photo:
     original = replace(photo.original, mask_from="each", sureness=None)
-    return replace(photo, mask=found.mask, original=original, found=found)
+    return replace(photo, mask=found.mask, original=original, found=found, cover=found.cover)

@@ -13,6 +13,7 @@ from .found_mask import FoundMask, MaskFinder
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
+_HARD = 0.02  # of the largest value: closer to it, or to 0, masks of lossy files are, too
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
@@ -123,6 +124,34 @@ def find_mask(
             f"{name}: the image is almost black: there is nothing to recover; use another photo"
         )
     return tidy_mask(bright), "black border"
+
+
+def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
+    """Return how much of each pixel the object covers, where an image tells more than yes or no.
+
+    Parameters
+    ----------
+    raster : Raster
+        A mask, or a photo with an alpha channel.
+    mask : (H, W) bool ndarray
+        What it shows as the object.
+
+    Returns
+    -------
+    (H, W) float32 ndarray or None
+        0 to 1: the alpha channel; of an image without, shares of the value that most of the object
+        has. None where all are as good as 0 or 1, or where the background is not 0.
+    """
+    if raster.transparency is not None:
+        values = np.asarray(raster.transparency, np.float32)
+    else:
+        values = finite_or_zero(largest(raster.values)).astype(np.float32)
+        values /= max(float(np.median(values[mask])), 1e-12)
+    cover = np.clip(values, 0, 1)
+    partly = (cover > _HARD) & (cover < 1 - _HARD)
+    beyond = cover[~mask]
+    plain = not beyond.size or float(np.median(beyond)) <= _HARD
+    return cover if plain and partly.any() else None
 
 
 def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:

@@ -81,6 +81,8 @@ class Photo:
         The pinhole camera of `image`; None where it is unknown, for an orthographic view.
     found : FoundMask or None
         The mask at the file's size, where it was found by its looks.
+    cover : (H', W') float32 ndarray or None
+        Share of each of the file's pixels that the object covers; None where `mask` says all.
     marks : HighlightMarks
         What a person says of its highlights.
     """
@@ -94,6 +96,7 @@ class Photo:
     exposed: bool = True
     camera: Camera | None = None
     found: FoundMask | None = None
+    cover: np.ndarray | None = None
     marks: HighlightMarks = field(default_factory=HighlightMarks)
 
     @property

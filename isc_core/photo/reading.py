@@ -22,9 +22,10 @@ from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import without_background
 from .found_mask import FoundMask, MaskFinder
-from .masks import check_mask, find_mask, mask_of
+from .masks import check_mask, find_mask, mask_of, soft_cover
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
+from .soft_rim import soft_rim
 from .transfer import PROFILE, resolve_transfer, to_linear
 
 FLOAT_STEP = 2.0**-14
@@ -151,12 +152,17 @@ def _photo(
     mask = seen.mask if isinstance(seen, FoundMask) else seen
     check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
     _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
+    cover = None if found is None else found.cover
+    if mask_from in ("alpha", "file"):
+        cover = soft_cover(raster if mask_raster is None else mask_raster, mask)
+    # An alpha channel comes with the object's own colours.
+    mixed = found is not None or (mask_from == "file" and _is_soft(cover, mask))
     height, width = mask.shape
     lens = raster.focal_length
     cropped = lens is not None and lens.cropped
     light = as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name))
     return Photo(
-        image=light if found is None else without_background(light, found.cover),
+        image=without_background(light, cover) if mixed and cover is not None else light,
         mask=mask,
         code_value=_code_value(raster, used, linear, mask),
         clipped=_clipped(raster),
@@ -172,9 +178,14 @@ def _photo(
             None if found is None or mask_from == "hints" else found.sureness,
         ),
         found=found,
+        cover=cover,
         exposed=raster.peak is not None,
         camera=None if lens is None or cropped else Camera.of_frame(lens.pixels, (width, height)),
     )
+
+
+def _is_soft(cover: np.ndarray | None, mask: np.ndarray) -> bool:
+    return cover is not None and soft_rim(cover, mask, own=False) is not None
 
 
 def _clipped(raster: Raster) -> np.ndarray:

@@ -33,6 +33,11 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     specular_variation (H, W)    factor of that level, where it varies; else absent
     texture (h, w, 3) uint8      `base_color` in sRGB codes at the photo's resolution, the frame is
                                  that of the maps; absent if not asked for, or no finer than they
+    cover (H, W)                 share of each pixel that the object covers, where more is known
+                                 than the mask says; else absent
+    soft (H, W) bool             where the rim is soft, see `object_cover`; absent where nowhere
+    alpha (h, w) uint8           opacity in codes, of the size of `texture`, or of the maps; absent
+                                 likewise
     photo_size (2,) int32        width and height of the original photo
     crop_scale ()                map pixels per photo pixel
 
@@ -52,6 +57,7 @@ from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
 from .mesh import MeshResult, build_mesh
 from .mesh_options import MeshOptions
+from .object_cover import ObjectCover
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
@@ -62,6 +68,7 @@ def write_arrays(
     path: Path,
     built: MeshResult | None = None,
     texture: np.ndarray | None = None,
+    cover: ObjectCover | None = None,
 ) -> None:
     """Write the file; equal results give equal bytes.
 
@@ -73,6 +80,7 @@ def write_arrays(
         The mesh of `d`; built here by default.
     texture : (h, w, 3) uint8 ndarray, optional
         Of `exports.full_texture`.
+    cover : ObjectCover, optional
 
     Raises
     ------
@@ -84,17 +92,23 @@ def write_arrays(
     arrays = arrays_of(d, built or mesh_of(d))
     if texture is not None:
         arrays["texture"] = texture
+    if cover is not None:
+        arrays |= _cover(cover, None if texture is None else texture.shape[:2])
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 
 
-def mesh_of(d: Decomposition, options: MeshOptions | None = None) -> MeshResult:
+def mesh_of(
+    d: Decomposition, options: MeshOptions | None = None, cover: ObjectCover | None = None
+) -> MeshResult:
     """Build the mesh of a result.
 
     Parameters
     ----------
     d : Decomposition
     options : MeshOptions, optional
+    cover : ObjectCover, optional
+        Whose outline it follows.
 
     Returns
     -------
@@ -106,7 +120,8 @@ def mesh_of(d: Decomposition, options: MeshOptions | None = None) -> MeshResult:
         If the mask is too small for a mesh.
     """
     gloss = bounded_specular(d)
-    return build_mesh(d.height, d.normal, d.mask, d.reflectance, options, gloss, d.camera)
+    maps = d.height, d.normal, d.mask, d.reflectance
+    return build_mesh(*maps, options, gloss, d.camera, cover)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
@@ -129,6 +144,13 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     )
     values |= {"photo_size": np.array(size), "crop_scale": np.array(scale)}
     return {name: _typed(name, array) for name, array in values.items()}
+
+
+def _cover(cover: ObjectCover, shape: tuple[int, ...] | None) -> dict[str, np.ndarray]:
+    alpha = cover.alpha(None if shape is None else (shape[0], shape[1]))
+    if cover.soft is None or alpha is None:
+        return {"cover": cover.share}
+    return {"cover": cover.share, "soft": cover.soft, "alpha": alpha}
 
 
 def _typed(name: str, values: np.ndarray) -> np.ndarray:

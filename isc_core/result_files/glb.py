@@ -53,10 +53,27 @@ class TexturedMesh:
     tangents: np.ndarray | None = None
 
 
+@dataclass(frozen=True)
+class Veil:
+    """A part of a mesh with a material of its own.
+
+    Attributes
+    ----------
+    faces : (F,) bool ndarray
+        Which triangles; neither none nor all.
+    material : mapping
+        A glTF material.
+    """
+
+    faces: np.ndarray
+    material: Mapping[str, Any]
+
+
 def encode_glb(
     mesh: TexturedMesh,
     material: Mapping[str, Any],
     pictures: Sequence[bytes],
+    veil: Veil | None = None,
 ) -> bytes:
     """Encode a mesh; equal arguments give equal bytes.
 
@@ -67,6 +84,8 @@ def encode_glb(
         A glTF material. Texture n is picture n.
     pictures : sequence of bytes
         PNG files, at least one.
+    veil : Veil, optional
+        A second primitive over the same vertices.
 
     Returns
     -------
@@ -81,11 +100,13 @@ def encode_glb(
     }
     if mesh.tangents is not None:  # the fourth number is the sign of the bitangent
         arrays["TANGENT"] = np.pad(mesh.tangents, [(0, 0), (0, 1)], constant_values=1).astype("<f4")
-    indices = mesh.faces.astype("<u4").reshape(-1)
-    blocks = [indices.tobytes(), *(values.tobytes() for values in arrays.values()), *pictures]
-    targets = [_INDICES, *[_VERTICES] * len(arrays), *[None] * len(pictures)]
+    parts = [mesh.faces] if veil is None else [mesh.faces[~veil.faces], mesh.faces[veil.faces]]
+    indices = [part.astype("<u4").reshape(-1) for part in parts]
+    stored = [*indices, *arrays.values()]
+    blocks = [*(values.tobytes() for values in stored), *pictures]
+    targets = [*[_INDICES] * len(parts), *[_VERTICES] * len(arrays), *[None] * len(pictures)]
     views, buffer = _joined(blocks, targets)
-    first_picture = 1 + len(arrays)
+    first_array, first_picture = len(parts), len(stored)
     tree: dict[str, Any] = {
         "asset": {"version": f"{_VERSION}.0", "generator": "ISC"},
         "extensionsUsed": list(material.get("extensions", {})),
@@ -97,20 +118,21 @@ def encode_glb(
                 "name": "object",
                 "primitives": [
                     {
-                        "attributes": {name: 1 + n for n, name in enumerate(arrays)},
-                        "indices": 0,
-                        "material": 0,
+                        "attributes": {name: first_array + n for n, name in enumerate(arrays)},
+                        "indices": part,
+                        "material": part,
                         "mode": _TRIANGLES,
                     }
+                    for part in range(len(parts))
                 ],
             }
         ],
-        "materials": [material],
+        "materials": [material] if veil is None else [material, veil.material],
         "textures": [{"source": n} for n in range(len(pictures))],
         "images": [
             {"bufferView": first_picture + n, "mimeType": "image/png"} for n in range(len(pictures))
         ],
-        "accessors": [_accessor(n, values) for n, values in enumerate((indices, *arrays.values()))],
+        "accessors": [_accessor(n, values) for n, values in enumerate(stored)],
         "bufferViews": views,
         "buffers": [{"byteLength": len(buffer)}],
     }

@@ -37,7 +37,8 @@ Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
 Back: an open mesh is one sheet with steps of one cell along the silhouette; `solids` closes it,
-with a smooth outline.
+with a smooth outline. Where the object's cover of the pixels is known, the outline of all meshes
+follows that, and where the rim is soft, the material has an opacity (see `object_cover`).
 
 Limits: reflectances above 1/k are
 clipped (at most 0.5 % of the pixels). Programs that compute tangents by themselves interpolate them
@@ -61,9 +62,11 @@ from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
-from .glb import TexturedMesh, encode_glb
+from .glb import TexturedMesh, Veil, encode_glb
 from .mesh_options import MeshOptions
+from .object_cover import ObjectCover
 from .solids.back import Back
+from .solids.rim import Rim
 from .solids.surface import heights_seen, make_solid, placed
 from .triangulation.adaptive_triangles import Triangulation, adaptive_triangles
 from .triangulation.vertex_normals import (
@@ -112,6 +115,8 @@ class MeshResult:
         The camera's place in metres.
     texture : (h, w, 3) uint8 ndarray or None
         Finer base colour in sRGB codes, over the same frame.
+    cover : ObjectCover or None
+        That the outline follows; None for the steps of the pixels.
     """
 
     mesh: TexturedMesh
@@ -127,11 +132,29 @@ class MeshResult:
     camera: Camera | None = None
     eye: np.ndarray | None = None
     texture: np.ndarray | None = None
+    cover: ObjectCover | None = None
 
     @property
     def bumpy(self) -> bool:
         """Whether the normal map holds more than the normals of the vertices."""
-        return self.mesh.tangents is not None or self.options.back is not Back.OPEN
+        smooth = self.options.back is not Back.OPEN or self.cover is not None
+        return smooth or self.mesh.tangents is not None
+
+    @property
+    def alpha(self) -> np.ndarray | None:
+        """The opacity at the size of the base colour, (h, w) uint8; None for an opaque object."""
+        width, height = self.base_color_size
+        return None if self.cover is None else self.cover.alpha((height, width))
+
+    @property
+    def soft_faces(self) -> np.ndarray | None:
+        """The triangles (F,) whose opacity is not 1; None where all or none are."""
+        if self.cover is None or self.cover.soft is None:
+            return None
+        row, column = self.vertex_pixel.T
+        thin = Rim(self.cover.share, self.cover.soft).sheet[row, column]
+        faces = thin[self.mesh.faces].any(1)
+        return faces if faces.any() and not faces.all() else None
 
     @property
     def base_color_size(self) -> tuple[int, int]:
@@ -188,12 +211,18 @@ class MeshResult:
             "doubleSided": self.options.back is Back.OPEN,
             "extensions": {_SPECULAR: extension},
         }
-        textures = [self.base_color_png(), self.normal_png()]
-        return encode_glb(self.mesh, material, textures + pictures)
+        textures, soft = [self.base_color_png(), self.normal_png()], self.soft_faces
+        veil = None
+        if soft is not None:
+            # Viewers draw transparent triangles in any order: the rest stays opaque.
+            fading = {"name": "soft rim", "doubleSided": True, "alphaMode": "BLEND"}
+            veil = Veil(soft, material | fading)
+        return encode_glb(self.mesh, material, textures + pictures, veil)
 
     def base_color_png(self) -> bytes:
-        """Return the base colour as the bytes of a PNG, 8-bit sRGB."""
-        return encoded_png(self.base_color_codes)
+        """Return the base colour as the bytes of a PNG, 8-bit sRGB, with the opacity if any."""
+        codes, alpha = self.base_color_codes, self.alpha
+        return encoded_png(codes if alpha is None else np.dstack([codes, alpha]))
 
     def normal_png(self) -> bytes:
         """Return the tangent-space normal map as the bytes of a PNG, green upward."""
@@ -244,6 +273,7 @@ def build_mesh(
     options: MeshOptions | None = None,
     gloss: SpecularFit | None = None,
     camera: Camera | None = None,
+    cover: ObjectCover | None = None,
 ) -> MeshResult:
     """Build the mesh of the pixels inside the mask.
 
@@ -261,6 +291,9 @@ def build_mesh(
         Gloss of the surface; where unknown, the default roughness and no gloss.
     camera : Camera, optional
         Of the maps; orthographic by default.
+    cover : ObjectCover, optional
+        An outline to follow; by default the mesh ends in the steps of the mask's pixels, or, with
+        a back, halfway between them.
 
     Returns
     -------
@@ -273,8 +306,12 @@ def build_mesh(
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
-    make = _open_sheet if options.back is Back.OPEN else _closed
-    shape = make(limit_rim(height, mask, options.rim), normal, mask, options, camera)
+    limited = limit_rim(height, mask, options.rim)
+    if options.back is Back.OPEN and cover is None:
+        shape = _open_sheet(limited, normal, mask, options, camera)
+    else:
+        rim = Rim(mask) if cover is None else Rim(cover.share, cover.soft)
+        shape = _outlined(limited, normal, mask, rim, options, camera)
     pixels = shape.places
     middle = (pixels.min(0) + pixels.max(0)) / 2
     size = options.metres_per_pixel or options.longest_side / max(mask[mask_slices(mask)].shape)
@@ -302,6 +339,7 @@ def build_mesh(
         gloss,
         camera,
         None if camera is None else -middle * size,
+        cover=cover,
     )
 
 
@@ -349,17 +387,18 @@ def _open_sheet(
     return _Shape(places, smooth, grid.faces, uv, tangents, vertex_pixel, detail, stride)
 
 
-def _closed(
+def _outlined(
     height: np.ndarray,
     normal: np.ndarray,
     mask: np.ndarray,
+    rim: Rim,
     options: MeshOptions,
     camera: Camera | None,
 ) -> _Shape:
     """Without tangents: they would change their sign where the texture folds (see `solids`)."""
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    seen, either_side = heights_seen(height, mask, camera), options.triangles // 2
-    solid = make_solid(seen, normal, mask, view, options.back, either_side)
+    seen, sides = heights_seen(height, mask, camera), 1 if options.back is Back.OPEN else 2
+    solid = make_solid(seen, normal, mask, rim, view, options.back, options.triangles // sides)
     places = placed(solid.body, camera)
     body, normals = solid.body, solid.normals(places)
     return _Shape(places, normals, body.faces, solid.uv(), None, body.pixels, solid.detail)

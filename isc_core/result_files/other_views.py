@@ -33,6 +33,7 @@ from .mesh_options import MeshOptions
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 from .solids.back import Back
 from .solids.body import Body, make_body
+from .solids.rim import Rim
 from .solids.surface import heights_seen, placed
 from .turned_view import turned_view
 
@@ -107,7 +108,7 @@ def _coarse_body(
         )
     limited = limit_rim(height, inside, MeshOptions().rim)
     seen = heights_seen(limited, inside, camera)
-    body = make_body(seen, np.ones(inside.shape), inside, share, Back.ROUNDED, 0)
+    body = make_body(seen, np.ones(inside.shape), inside, Rim(share), Back.ROUNDED, 0)
     return body, placed(body, camera) * _STEP
 
 

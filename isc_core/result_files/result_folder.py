@@ -3,9 +3,9 @@
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
 `mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
 that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
-mask was found in the photo. With a fitted lobe, `maps.exr` has one more layer, `lobe`: the specular
-image that the fit predicts; where errors can be expected, `expected_error` has them. A refined
-result has one more layer, `visibility`, and its light as `environment.exr`. A separation's
+mask was found in the photo or is soft. With a fitted lobe, `maps.exr` has one more layer, `lobe`:
+the specular image that the fit predicts; where errors can be expected, `expected_error` has them. A
+refined result has one more layer, `visibility`, and its light as `environment.exr`. A separation's
 folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
 completely or not at all (see `io.atomic`).
 """
@@ -40,6 +40,7 @@ from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
 from .mesh import MeshResult
 from .mesh_options import MeshOptions
+from .object_cover import object_cover
 
 SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
 LAYERS = {
@@ -108,7 +109,7 @@ def save(
     png : bool
         Write the layers as PNG files too, see `layer_pngs`.
     cover : (H, W) ndarray, optional
-        A mask that was found, at the photo's size, to write as `mask.png`.
+        How much of each of the photo's pixels the object covers, to write as `mask.png`.
     monitor : Monitor, optional
 
     Raises
@@ -152,7 +153,7 @@ def save(
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
-            write_arrays(d, partial / ARRAYS, built, texture)
+            write_arrays(d, partial / ARRAYS, built, texture, object_cover(d, cover))
         if png:
             write_layer_pngs(d, partial)
         if cover is not None:

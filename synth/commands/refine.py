@@ -65,7 +65,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Cancelled
         If the user cancels.
     """
-    from isc_core.result_files.result_folder import load, require_writable_result, save
+    from isc_core.result_files.object_cover import read_cover
+    from isc_core.result_files.result_folder import MASK, load, require_writable_result, save
 
     from ..refine.refine import RefineOptions, refine
     from ..scene.variant import load_mitsuba
@@ -78,7 +79,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.photo is not None:
         _require_same(options.photo, start)
     done = refine(start, RefineOptions(seed=options.seed), monitor.part(0, 0.9))
-    save(done.result, options.output, monitor=monitor.part(0.9, 1.0))
+    cover = read_cover(options.result / MASK)
+    save(done.result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))
     outcome = (
         f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
         if done.kept

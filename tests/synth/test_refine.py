@@ -157,12 +157,15 @@ def test_the_start_stays_where_there_is_nothing_to_gain() -> None:
 
 @pytest.mark.slow
 def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
-    save(shadowed_dome(), tmp_path / "start")
+    start = shadowed_dome()
+    save(start, tmp_path / "start", cover=start.mask * 0.7)
     for name in ("first", "second"):
         command([str(tmp_path / "start"), "-o", str(tmp_path / name)])
     for file in ("maps.exr", "environment.exr", "decomposition.json"):
         first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "second"))
         assert first == second
+    kept = [(tmp_path / name / "mask.png").read_bytes() for name in ("start", "first")]
+    assert kept[0] == kept[1], "the soft mask goes along"
 
 
 def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:

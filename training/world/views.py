@@ -96,13 +96,37 @@ def trace_view(name: str, source: str, mesh: Mesh, rng: np.random.Generator) -> 
         if rng.random() > _ORTHOGRAPHIC:
             distance = _NEAREST / rng.uniform(0.02, 1)
         placed = in_picture(mesh.rotated(random_side(rng)), distance)
-        tracer = Tracer(placed)
-        origins, rays = camera_rays(SIDE, distance)
-        hits = tracer.hits(origins, rays)
-        if hits.valid.mean() >= _LEAST_COVER:
-            break
-    else:
-        raise InputError(f"{name}: no side shows enough of its surface")
+        if (view := view_of(name, source, placed, distance, rng)) is not None:
+            return view
+    raise InputError(f"{name}: no side shows enough of its surface")
+
+
+def view_of(
+    name: str, source: str, placed: Mesh, distance: float, rng: np.random.Generator
+) -> View | None:
+    """Trace a body from the front.
+
+    Parameters
+    ----------
+    name, source : str
+        Stored with the view.
+    placed : Mesh
+        Of `in_picture`.
+    distance : float
+        Of the camera; infinite for an orthographic one.
+    rng : numpy.random.Generator
+        Draws the directions.
+
+    Returns
+    -------
+    View or None
+        None where too little is seen.
+    """
+    tracer = Tracer(placed)
+    origins, rays = camera_rays(SIDE, distance)
+    hits = tracer.hits(origins, rays)
+    if hits.valid.mean() < _LEAST_COVER:
+        return None
     position, normal = hits.position[hits.valid], hits.normal[hits.valid]
     directions = spread_directions(rng)
     return View(

@@ -9,7 +9,8 @@ from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
 from ...result_files.arrays_file import ARRAYS, mesh_of, write_arrays
 from ...result_files.mesh_options import MeshOptions
-from ...result_files.result_folder import load
+from ...result_files.object_cover import object_cover, read_cover
+from ...result_files.result_folder import MASK, load
 from ..interface.options import add_triangles
 from ..interface.parser import describe, hints
 
@@ -53,9 +54,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     monitor.report("reading", 0.0)
     result, path = load(options.result), options.result / ARRAYS
+    cover = object_cover(result, read_cover(options.result / MASK))
     require_writable_file(path)
     monitor.report("writing arrays", 0.3)
     with new_file(path) as partial:
-        write_arrays(result, partial, mesh_of(result, MeshOptions(triangles=options.triangles)))
+        built = mesh_of(result, MeshOptions(triangles=options.triangles))
+        write_arrays(result, partial, built, cover=cover)
         monitor.report("writing arrays", 1.0)
     return hints(options, f"wrote {path}")

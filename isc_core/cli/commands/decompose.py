@@ -232,7 +232,6 @@ def _decompose_photo(
     if options.texture_size is not None and options.texture_size != MAPS_SIZE:
         writing.report("refining the texture", 0.0)
         texture = full_texture(photo, result, options.texture_size)
-    cover = None if photo.found is None else photo.found.cover
     save(
         result,
         output,
@@ -240,7 +239,7 @@ def _decompose_photo(
         arrays=options.arrays,
         texture=texture,
         png=options.png,
-        cover=cover,
+        cover=photo.cover,
         monitor=writing,
     )
     preview = output / "preview.png"

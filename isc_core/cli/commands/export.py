@@ -14,11 +14,11 @@ from ...progress import Monitor
 from ...result_files.arrays_file import mesh_of
 from ...result_files.exports.full_texture import full_texture
 from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_mesh_file
-from ...result_files.exports.soft_alpha import object_cover
 from ...result_files.exports.targets import TARGETS
 from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
 from ...result_files.mesh_options import MeshOptions
+from ...result_files.object_cover import object_cover, read_cover
 from ...result_files.result_folder import MASK, load
 from ...result_files.solids.back import Back
 from ...scene.decomposition import Decomposition
@@ -138,7 +138,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
     fine = None if options.photo is None else _fine_texture(d, options)
-    built = mesh_of(d, MeshOptions(triangles=options.triangles, back=Back(options.back)))
+    cover = object_cover(d, read_cover(options.result / MASK))
+    how = MeshOptions(triangles=options.triangles, back=Back(options.back))
+    # Textures are those of the plane of the photo, whose mesh has a vertex at its pixels.
+    built = mesh_of(d, how, None if options.format is None else cover)
     built = replace(built, texture=fine)
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
@@ -147,12 +150,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.format is not None:
         files = write_mesh_file(built, output, options.format)
         return hints(options, f"wrote {', '.join(map(str, files))}")
-    cover = object_cover(d, options.result / MASK)
     writing = monitor.part(0.4, 1.0)
     write_texture_set(
         d,
         built,
-        cover,
+        d.mask.astype(np.float32) if cover is None else cover.share,
         options.textures,
         output,
         name=name,

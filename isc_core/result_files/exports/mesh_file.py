@@ -2,7 +2,8 @@
 
 A `.glb` and a `.usdz` hold everything. Beside an `.obj` (with its `.mtl`) and a `.usd`, `.usda` or
 `.usdc` are the textures NAME_basecolor.png, NAME_mesh_normal.png (where the mesh has fewer vertices
-than pixels) and NAME_specular.png (where the level varies), NAME being that of the file.
+than pixels), NAME_specular.png (where the level varies) and NAME_alpha.png (where the rim is soft),
+NAME being that of the file.
 """
 
 from collections.abc import Callable, Mapping

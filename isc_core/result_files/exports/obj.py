@@ -75,5 +75,6 @@ def _material(built: MeshResult, name: str, textures: MeshTextures) -> str:
         *([f"norm {textures.normal}"] if textures.normal else []),
         *([f"map_Bump -bm 1 {textures.normal}"] if textures.normal else []),
         *([f"map_Ks {textures.specular}"] if textures.specular else []),
+        *([f"map_d {textures.alpha}"] if textures.alpha else []),
     ]
     return "\n".join(["# ISC", *lines, ""])

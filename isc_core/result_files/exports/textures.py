@@ -49,14 +49,15 @@ class MeshTextures:
         Name and content of each file.
     base_color : str
         Name.
-    normal, specular : str or None
-        Names; None where a value is enough.
+    normal, specular, alpha : str or None
+        Names; None where a value is enough. The opacity is in the base colour's alpha channel, too.
     """
 
     files: dict[str, bytes]
     base_color: str
     normal: str | None
     specular: str | None
+    alpha: str | None
 
     @staticmethod
     def of(built: MeshResult, name: str) -> "MeshTextures":
@@ -73,7 +74,8 @@ class MeshTextures:
         MeshTextures
         """
         base_color = f"{name}_basecolor.png"
-        files, normal, specular = {base_color: built.base_color_png()}, None, None
+        files = {base_color: built.base_color_png()}
+        normal = specular = alpha = None
         if built.bumpy:
             normal = f"{name}_mesh_normal.png"
             files[normal] = built.normal_png()
@@ -81,4 +83,7 @@ class MeshTextures:
             specular = f"{name}_specular.png"
             level = PLASTIC * built.specular * built.gloss.variation
             files[specular] = encoded_png(share_codes(level))
-        return MeshTextures(files, base_color, normal, specular)
+        if built.alpha is not None:
+            alpha = f"{name}_alpha.png"
+            files[alpha] = encoded_png(built.alpha)
+        return MeshTextures(files, base_color, normal, specular, alpha)

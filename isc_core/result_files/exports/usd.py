@@ -157,12 +157,15 @@ def _bind_material(
         reader.CreateInput("scale", kinds.Float4).Set(Gf.Vec4f(scale, scale, scale, 1))
         reader.CreateInput("bias", kinds.Float4).Set(Gf.Vec4f(bias, bias, bias, 0))
         reader.CreateInput("st", kinds.Float2).ConnectToSource(place.ConnectableAPI(), "result")
-        reader.CreateOutput("rgb", kinds.Float3)
-        surface.CreateInput(name, kind).ConnectToSource(reader.ConnectableAPI(), "rgb")
+        part = "r" if kind == kinds.Float else "rgb"
+        reader.CreateOutput(part, kinds.Float if part == "r" else kinds.Float3)
+        surface.CreateInput(name, kind).ConnectToSource(reader.ConnectableAPI(), part)
 
     texture("diffuseColor", textures.base_color, "sRGB", kinds.Color3f, 1, 0)
     if textures.normal:
         texture("normal", textures.normal, "raw", kinds.Normal3f, 2, -1)
+    if textures.alpha:
+        texture("opacity", textures.alpha, "raw", kinds.Float, 1, 0)
     if textures.specular:
         surface.CreateInput("useSpecularWorkflow", kinds.Int).Set(1)
         texture("specularColor", textures.specular, "raw", kinds.Color3f, F0 / PLASTIC, 0)

@@ -18,14 +18,15 @@ The back at a pixel is
 and at least `_LEAST` sqrt(u) behind the front, so that the two meet in the outline alone. Both are
 graphs over the same triangles: they do not cross each other, and before a pinhole camera, along
 whose rays the back lies, neither. The texture of a rounded back is folded in at the outline (see
-`texture_places`), that of the others is the texture of the pixel in front.
+`texture_places`), that of the others is the texture of the pixel in front. Where the rim is soft,
+the body ends at its core, and the sheet goes on alone (see `rim`).
 
 Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
 artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
 Igarashi, S. Matsuoka and H. Tanaka, "Teddy", SIGGRAPH 1999, doi:10.1145/311535.311602.
 
 Limits: the back is invented. Parts that hide others are joined to them: a step in depth inside the
-outline stays a steep slope.
+outline stays a slope. Cuts along it were tried, see the research log ("Depth edges").
 """
 
 from dataclasses import dataclass
@@ -36,6 +37,7 @@ from ..triangulation.adaptive_triangles import Triangulation
 from .back import Back
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
+from .rim import Rim
 from .smoothing import smoothed_within, surrounded
 from .texture_places import folded_places
 
@@ -43,6 +45,7 @@ ROUND, FULLNESS = 1.0, 1.0
 _LEAST = 0.2
 _SMOOTH = 6  # passes over the depth of the rim
 _BEHIND = 0.02  # of the longer side
+_STEP = 1e3  # pixels of height between core and sheet, for small triangles there
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def make_body(
     height: np.ndarray,
     cosine: np.ndarray,
     mask: np.ndarray,
-    cover: np.ndarray,
+    rim: Rim,
     back: Back,
     triangles: int,
 ) -> Body:
@@ -94,8 +97,7 @@ def make_body(
         Of the angle between normal and view.
     mask : (H, W) bool ndarray
         Where heights are known.
-    cover : (H, W) ndarray
-        Share of each pixel that the object covers.
+    rim : Rim
     back : Back
     triangles : int
         The most of the visible side, where its outline allows; 0 for two at each pixel.
@@ -103,40 +105,42 @@ def make_body(
     Returns
     -------
     Body
-        Closed but for `Back.OPEN`.
+        Closed but for `Back.OPEN` and the sheets of a soft rim.
 
     Raises
     ------
     InputError
         If no block of 2 x 2 pixels lies inside.
     """
-    smooth = smooth_cover(cover)
+    smooth, thin = smooth_cover(rim.outline), rim.sheet
     inside = smooth > 0.5
+    core = inside & ~thin
     known = continued(np.where(mask, height, 0.0), mask, inside)
-    sheet = outlined(smooth, known, cosine, triangles)
+    sheet = outlined(smooth, known + _STEP * thin, cosine, triangles)
     # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
-    around = _grown(inside) & ~inside
-    round_height = np.sqrt(np.maximum(membrane(inside, around, np.zeros_like(known), 4.0), 0))
-    rim = np.where(inside, known - ROUND * round_height, 0.0)
-    rim = np.where(inside, smoothed_within(rim, surrounded(inside), _SMOOTH), 0.0)
+    around = _grown(core) & ~core
+    round_height = np.sqrt(np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0))
+    last = np.where(inside, known - ROUND * round_height, 0.0)
+    last = np.where(inside, smoothed_within(last, surrounded(inside), _SMOOTH), 0.0)
     rows, columns = sheet.pixels.T
     heights = known[rows, columns]
-    heights[sheet.inner :] = rim[rows, columns][sheet.inner :]
+    heights[sheet.inner :] = last[rows, columns][sheet.inner :]
     front = np.arange(len(heights)) < sheet.inner
     if back is Back.OPEN:
         visible = sheet.pixel_triangles
         return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, visible, sheet.places)
+    closed = _of_core(sheet, thin)
     if back is Back.FLAT:
-        return _walled(sheet, heights, front, mask)
-    edge = _grown(around) & inside
-    middle = membrane(inside & ~edge, edge, rim, 0.0)
-    middle = np.where(edge, rim, middle)
+        return _used(_walled(sheet, closed, heights, front, mask))
+    edge = _grown(around) & core
+    middle = membrane(core & ~edge, edge, last, 0.0)
+    middle = np.where(edge, last, middle)
     depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
     behind = np.minimum(middle - depth, known - _LEAST * round_height)
-    body = _joined(sheet, heights, behind, front)
+    body = _used(_joined(sheet, closed, heights, behind, front))
     if back is Back.MIRRORED:
         return body
-    hidden = ~body.front
+    hidden = ~body.front & core[body.pixels[:, 0], body.pixels[:, 1]]
     outline = (np.arange(len(hidden)) < len(front))[hidden]
     body.texture[hidden] = folded_places(
         np.square(round_height), body.places[hidden], body.pixels[hidden], outline
@@ -180,11 +184,29 @@ def _grown(plane: np.ndarray) -> np.ndarray:
     return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
 
 
-def _joined(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.ndarray) -> Body:
-    """The sheet and, with the points of the outline in common, the back."""
+def _of_core(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
+    """Which triangles (F,) of the sheet have a back: those between pixels of the core.
+
+    One whose corners are all in common with the single sheet has none, either: the two would be
+    the same triangle.
+    """
+    alone = thin[sheet.pixels[:, 0], sheet.pixels[:, 1]][sheet.faces].any(1)
+    if not alone.any():
+        return ~alone
+    common = np.arange(len(sheet.pixels)) >= sheet.inner
+    common[sheet.faces[alone]] = True
+    return ~alone & ~common[sheet.faces].all(1)
+
+
+def _joined(
+    sheet: Outlined, closed: np.ndarray, heights: np.ndarray, behind: np.ndarray, front: np.ndarray
+) -> Body:
+    """The sheet and, with the points of the core's outline in common, the back."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
-    other = np.where(sheet.faces < inner, sheet.faces + n, sheet.faces)[:, ::-1]
+    own = np.arange(n) < inner
+    own[sheet.faces[~closed]] = False
+    other = np.where(own[sheet.faces], sheet.faces + n, sheet.faces)[closed, ::-1]
     return Body(
         np.concatenate([sheet.places, sheet.places[:inner]]),
         np.concatenate([heights, behind[rows, columns]]),
@@ -196,11 +218,25 @@ def _joined(sheet: Outlined, heights: np.ndarray, behind: np.ndarray, front: np.
     )
 
 
-def _walled(sheet: Outlined, heights: np.ndarray, front: np.ndarray, mask: np.ndarray) -> Body:
+def _used(body: Body) -> Body:
+    """The body without vertices that no triangle has."""
+    kept, faces = np.unique(body.faces, return_inverse=True)
+    if len(kept) == len(body.places):
+        return body
+    vertices = (body.places, body.heights, body.pixels, body.front, body.texture)
+    places, heights, pixels, front, texture = (values[kept] for values in vertices)
+    faces = faces.reshape(-1, 3).astype(np.int64)
+    return Body(places, heights, pixels, faces, front, body.visible, texture)
+
+
+def _walled(
+    sheet: Outlined, closed: np.ndarray, heights: np.ndarray, front: np.ndarray, mask: np.ndarray
+) -> Body:
     """The sheet, a plane behind it, and two triangles of wall at each edge of the outline."""
     n = len(heights)
     size = (np.ptp(np.argwhere(mask), axis=0) + 1).max()
-    edges = sheet.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    shut = sheet.faces[closed]
+    edges = shut[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     rim = edges[~np.isin(edges @ (n, 1), edges[:, ::-1] @ (n, 1))]
     wall = np.concatenate(
         [
@@ -212,7 +248,7 @@ def _walled(sheet: Outlined, heights: np.ndarray, front: np.ndarray, mask: np.nd
         np.concatenate([sheet.places, sheet.places]),
         np.concatenate([heights, np.full(n, heights.min() - _BEHIND * size)]),
         np.concatenate([sheet.pixels, sheet.pixels]),
-        np.concatenate([sheet.faces, sheet.faces[:, ::-1] + n, wall]),
+        np.concatenate([sheet.faces, shut[:, ::-1] + n, wall]),
         np.concatenate([front, np.zeros(n, bool)]),
         sheet.pixel_triangles,
         np.concatenate([sheet.places, sheet.places]),

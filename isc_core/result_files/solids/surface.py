@@ -16,6 +16,7 @@ from ...shading.perspective import lifted_points, object_axis
 from ..triangulation.vertex_normals import interpolated_normals
 from .back import Back
 from .body import Body, continued, make_body
+from .rim import Rim
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,7 @@ def make_solid(
     height: np.ndarray,
     normal: np.ndarray,
     mask: np.ndarray,
+    rim: Rim,
     view: np.ndarray,
     back: Back,
     triangles: int,
@@ -81,6 +83,7 @@ def make_solid(
     normal : (H, W, 3) ndarray
         Unit vectors, camera frame.
     mask : (H, W) bool ndarray
+    rim : Rim
     view : (3,) or (H, W, 3) ndarray
         Unit vectors toward the viewer.
     back : Back
@@ -96,7 +99,7 @@ def make_solid(
     InputError
         If no block of 2 x 2 pixels lies inside.
     """
-    body = make_body(height, (normal * view).sum(-1), mask, mask, back, triangles)
+    body = make_body(height, (normal * view).sum(-1), mask, rim, back, triangles)
     smooth, detail = interpolated_normals(
         body.visible, _continued_normals(normal, mask, body.pixels), view
     )

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -187,3 +188,100 @@ def test_a_disk_that_takes_no_more_leaves_nothing(
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1 and "cannot write" in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+def soft_result(folder: Path, width: float) -> Path:
+    """A ball from a photo with an alpha channel, whose rim is so many pixels wide on the right."""
+    d = ball()
+    given = {**d.provenance.input, "mask_from": "alpha"}
+    d = replace(d, provenance=replace(d.provenance, input=given))
+    row, column = np.indices(d.mask.shape)
+    away = np.hypot(row - 44, column - 66) - 0.99 * 40
+    cover = np.clip(0.5 - away / np.where(column > 66, width, 1), 0, 1)
+    save(d, folder, cover=cover)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def fur(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return soft_result(tmp_path_factory.mktemp("results") / "fur", 14)
+
+
+@pytest.fixture(scope="module")
+def smooth(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return soft_result(tmp_path_factory.mktemp("results") / "smooth", 1)
+
+
+def material_of(path: Path) -> tuple[list[dict[str, Any]], int]:
+    """The materials of a GLB file, and the channels of its base colour."""
+    data = path.read_bytes()
+    length = int.from_bytes(data[12:16], "little")
+    tree = json.loads(data[20 : 20 + length])
+    mesh = trimesh.load(path, force="mesh")
+    mode = next(iter(trimesh.load(path).geometry.values())).visual.material.baseColorTexture.mode
+    assert len(mesh.faces) > 1000
+    return tree["materials"], len(mode)
+
+
+@pytest.mark.parametrize("back", ["open", "rounded"])
+def test_a_soft_rim_fades_and_the_rest_stays_opaque(fur: Path, tmp_path: Path, back: str) -> None:
+    given = ["--format", "glb", "--triangles", 4000, "--back", back]
+    assert exported(fur, *given, "-o", tmp_path / "a.glb") == 0
+    (core, rim), channels = material_of(tmp_path / "a.glb")
+    assert "alphaMode" not in core and rim["alphaMode"] == "BLEND" and rim["doubleSided"]
+    assert core["pbrMetallicRoughness"] == rim["pbrMetallicRoughness"] and channels == 4
+    mesh = trimesh.load(tmp_path / "a.glb", force="mesh")
+    pixel = 0.1 / 79
+    assert mesh.extents[0] == pytest.approx(pixel * (2 * 0.99 * 40 + 0.46 * 14), abs=1.2 * pixel)
+
+
+@pytest.mark.parametrize("back", ["open", "rounded"])
+def test_an_outline_between_the_pixels_stays_opaque(
+    smooth: Path, tmp_path: Path, back: str
+) -> None:
+    given = ["--format", "glb", "--back", back]
+    assert exported(smooth, *given, "-o", tmp_path / "a.glb") == 0
+    (material,), channels = material_of(tmp_path / "a.glb")
+    assert "alphaMode" not in material and channels == 3
+    mesh = trimesh.load(tmp_path / "a.glb", force="mesh")
+    pixel = 0.1 / 79
+    away = np.hypot(*(mesh.vertices - mesh.bounds.mean(0)).T[:2]) / pixel
+    rim = np.sort(away)[-100:]
+    assert np.sqrt(np.square(rim - 0.99 * 40).mean()) < 0.15
+
+
+def test_a_soft_rim_in_other_formats(fur: Path, tmp_path: Path) -> None:
+    pytest.importorskip("pxr", reason="needs the extra `usd`")
+    for kind, file in (("obj", "a.obj"), ("usd", "b.usda")):
+        assert exported(fur, "--format", kind, "-o", tmp_path / file) == 0
+    assert "map_d a_alpha.png" in (tmp_path / "a.mtl").read_text()
+    assert "inputs:opacity.connect" in (tmp_path / "b.usda").read_text()
+    with Image.open(tmp_path / "b_alpha.png") as image:
+        alpha = np.asarray(image)
+    assert alpha.ndim == 2 and (alpha[:, :60] == 255).all() and (alpha == 0).any()
+
+
+def test_arrays_have_the_cover(fur: Path) -> None:
+    assert main(["arrays", str(fur)]) == 0
+    arrays = dict(np.load(fur / "arrays.npz"))
+    assert arrays["alpha"].shape == arrays["cover"].shape == arrays["soft"].shape
+    assert arrays["alpha"].dtype == np.uint8 and arrays["soft"].dtype == bool
+
+
+def test_from_a_photo_with_hair_to_a_mesh_that_fades(tmp_path: Path) -> None:
+    """The soft alpha channel of a photo goes through the result into the mesh and the arrays."""
+    d = ball()
+    row, column = np.indices(d.mask.shape)
+    away = np.hypot(row - 44, column - 66) - 0.99 * 40
+    alpha = np.clip(0.5 - away / np.where(column > 66, 14, 1), 0, 1)
+    color = np.where(d.mask[..., None], d.image / d.image.max(), 0.3)
+    codes = np.rint(255 * np.dstack([color, alpha])).astype(np.uint8)
+    Image.fromarray(codes).save(tmp_path / "hair.png")
+    given = [tmp_path / "hair.png", "--model", "naive", "--arrays", "-o", tmp_path / "hair"]
+    assert main(["decompose", *map(str, given)]) == 0
+    arrays = dict(np.load(tmp_path / "hair" / "arrays.npz"))
+    partly = (alpha > 0.1) & (alpha < 0.9) & (column > 70)
+    assert np.abs(arrays["alpha"] / 255 - alpha)[partly].max() < 0.01
+    path = tmp_path / "hair.glb"
+    assert exported(tmp_path / "hair", "--format", "glb", "--back", "rounded", "-o", path) == 0
+    assert [one.get("alphaMode") for one in material_of(path)[0]] == [None, "BLEND"]

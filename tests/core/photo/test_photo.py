@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
+from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
@@ -514,6 +515,55 @@ def test_masks_of_other_kinds(tmp_path: Path) -> None:
     ]
     for file in files:
         assert (read_photo(photo, file).mask == inside).all(), file.name
+
+
+def test_the_cover_of_a_soft_mask_or_alpha_channel_is_kept(tmp_path: Path) -> None:
+    inside = object_mask()
+    ramp = np.clip(ndimage.distance_transform_edt(inside) / 4, 0, 1)
+    photo = write(tmp_path / "a.png", png(codes() + 7, 8, 2))
+    grey = saved(tmp_path / "m.png", Image.fromarray(np.rint(200 * ramp).astype(np.uint8)))
+    clear = np.dstack([codes() + 7, np.rint(255 * ramp).astype(np.uint8)])
+    for read in (read_photo(photo, grey), read_photo(saved(tmp_path / "b.png", _image(clear)))):
+        assert read.cover is not None
+        assert np.abs(read.cover - ramp).max() < 0.004
+        sure = np.abs(ramp - 0.5) > 0.01
+        assert ((read.cover >= 0.5) == read.mask)[sure].all()
+
+
+def test_a_hard_mask_or_one_that_is_nowhere_black_has_no_cover(tmp_path: Path) -> None:
+    photo, inside = write(tmp_path / "a.png", png(codes() + 7, 8, 2)), object_mask()
+    for name, values in (
+        ("hard", np.where(inside, 255, 0)),
+        ("noisy", np.where(inside, 253, 2)),
+        ("grey", np.where(inside, 230, 80)),
+    ):
+        mask = saved(tmp_path / f"{name}.png", _image(values.astype(np.uint8)))
+        assert read_photo(photo, mask).cover is None, name
+
+
+def test_the_background_is_taken_out_of_a_soft_mask_alone(tmp_path: Path) -> None:
+    """A grey disc before blue; the mask is an outline, or fades over its outer third."""
+    row, column = np.indices((120, 120)) - 60
+    away = np.hypot(row, column) - 40
+    for width, changed in ((1.0, False), (30.0, True)):
+        cover = np.clip(0.5 - away / width, 0, 1)
+        mixed = cover[..., None] * np.array([150.0, 150, 150]) + (1 - cover[..., None]) * [
+            0,
+            0,
+            200,
+        ]
+        photo = saved(tmp_path / "a.png", _image(np.rint(mixed).astype(np.uint8)))
+        mask = saved(tmp_path / "m.png", _image(np.rint(255 * cover).astype(np.uint8)))
+        (saw, plain) = (read_photo(photo, m).image for m in (mask, saved_hard(tmp_path, cover)))
+        assert (saw != plain).any() == changed
+
+
+def saved_hard(folder: Path, cover: np.ndarray) -> Path:
+    return saved(folder / "h.png", _image(np.where(cover >= 0.5, 255, 0).astype(np.uint8)))
+
+
+def _image(values: np.ndarray) -> Image.Image:
+    return Image.fromarray(values)
 
 
 def test_alpha_comes_before_the_black_border(tmp_path: Path) -> None:

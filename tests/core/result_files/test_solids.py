@@ -9,6 +9,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.body import Body, make_body
 from isc_core.result_files.solids.outline import outlined, smooth_cover
+from isc_core.result_files.solids.rim import Rim
 
 CLOSED = (Back.FLAT, Back.ROUNDED, Back.MIRRORED)
 
@@ -28,7 +29,7 @@ def hemisphere(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("triangles", [0, 2000])
 def test_a_hemisphere_becomes_a_ball(back: Back, triangles: int) -> None:
     height, mask = hemisphere(40, 100)
-    mesh = solid(make_body(height, height / 40, mask, mask.astype(float), back, triangles))
+    mesh = solid(make_body(height, height / 40, mask, Rim(mask), back, triangles))
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 40**3, rel=0.08)
     assert mesh.bounds[0, 2] == pytest.approx(-40, abs=4)
@@ -41,7 +42,7 @@ def test_any_mask_becomes_a_closed_body(back: Back, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = ndimage.gaussian_filter(rng.normal(size=(60, 70)), 2) > 0
     height = 200 * ndimage.gaussian_filter(rng.normal(size=mask.shape), 2)
-    body = make_body(height, np.ones(mask.shape), mask, mask.astype(float), back, 500)
+    body = make_body(height, np.ones(mask.shape), mask, Rim(mask), back, 500)
     mesh = solid(body)
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume > 0 and mesh.area_faces.min() > 0
@@ -52,7 +53,7 @@ def test_front_and_back_meet_in_the_outline_alone() -> None:
     rng = np.random.default_rng(0)
     _, mask = hemisphere(25, 64)
     height = 60 * ndimage.gaussian_filter(rng.normal(size=mask.shape), 3)
-    body = make_body(height, np.ones(mask.shape), mask, mask.astype(float), Back.MIRRORED, 0)
+    body = make_body(height, np.ones(mask.shape), mask, Rim(mask), Back.MIRRORED, 0)
     inner = int(body.front.sum())
     behind = body.heights[-inner:]
     np.testing.assert_array_equal(body.places[:inner], body.places[-inner:])
@@ -77,7 +78,7 @@ def texture_scales(body: Body) -> tuple[np.ndarray, np.ndarray]:
 def test_the_texture_of_a_rounded_back_is_not_stretched() -> None:
     """The pixels in front of the sides would be stretched thirtyfold there."""
     height, mask = hemisphere(80, 180)
-    body = make_body(height, height / 80, mask, mask.astype(float), Back.ROUNDED, 0)
+    body = make_body(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
     scales, area = texture_scales(body)
     good = (scales[:, 0] < 1.5) & (scales[:, 1] > 0.3)
     assert area[good].sum() > 0.85 * area.sum()
@@ -89,7 +90,7 @@ def test_the_texture_of_a_rounded_back_is_not_stretched() -> None:
 def test_texture_comes_from_inside(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = ndimage.gaussian_filter(rng.normal(size=(90, 80)), 4) > 0
-    body = make_body(np.ones(mask.shape), np.ones(mask.shape), mask, mask * 1.0, Back.ROUNDED, 0)
+    body = make_body(np.ones(mask.shape), np.ones(mask.shape), mask, Rim(mask), Back.ROUNDED, 0)
     np.testing.assert_array_equal(body.texture[body.front], body.places[body.front])
     rows, columns = np.rint(body.texture).astype(int).T + 9
     wide = np.pad(mask, 9)
@@ -100,7 +101,7 @@ def test_texture_comes_from_inside(seed: int) -> None:
 def test_the_rim_of_a_ball_lies_in_a_plane() -> None:
     """Depths of single pixels would be 10 pixels apart, as their distances to the outline are."""
     height, mask = hemisphere(80, 180)
-    body = make_body(height, height / 80, mask, mask.astype(float), Back.ROUNDED, 0)
+    body = make_body(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
     inner = int(body.front.sum())
     rim = body.heights[inner : len(body.heights) - inner]
     assert np.ptp(rim) < 3.5
@@ -122,4 +123,83 @@ def test_an_object_too_thin_is_refused() -> None:
     mask = np.zeros((20, 20), bool)
     mask[10, 3:15] = True
     with pytest.raises(InputError, match="2 x 2"):
-        make_body(np.zeros((20, 20)), np.ones((20, 20)), mask, mask, Back.ROUNDED, 0)
+        make_body(np.zeros((20, 20)), np.ones((20, 20)), mask, Rim(mask), Back.ROUNDED, 0)
+
+
+def disc(radius: float, centre: np.ndarray) -> np.ndarray:
+    """The cover of pixels by a disc, from 16 x 16 points in each."""
+    side, points = int(2 * radius + 12), 16
+    row, column = (np.indices((side * points,) * 2) + 0.5) / points - 0.5
+    inside = np.hypot(row - centre[0], column - centre[1]) < radius
+    return inside.reshape(side, points, side, points).mean((1, 3))
+
+
+@pytest.mark.parametrize("radius", [20.0, 35.0])
+def test_the_outline_follows_the_cover_between_the_pixels(radius: float) -> None:
+    """A third of the error of a hard mask's outline, and a tenth of that of the pixels' steps."""
+    rng, errors = np.random.default_rng(0), []
+    for _ in range(4):
+        centre = radius + 5 + rng.uniform(0, 1, 2)
+        cover = disc(radius, centre)
+        mask, flat = cover >= 0.5, np.zeros(cover.shape)
+        sheets = [outlined(smooth_cover(one), flat, flat + 1, 0) for one in (cover, mask)]
+        places = [sheet.places[sheet.inner :] for sheet in sheets]
+        places.append(np.argwhere(mask & ~ndimage.binary_erosion(mask)))
+        errors.append([np.square(np.hypot(*(p - centre).T) - radius).mean() for p in places])
+    soft, hard, steps = np.sqrt(np.mean(errors, axis=0))
+    assert soft < 0.05
+    assert soft < hard / 3 and soft < steps / 10
+
+
+def fur(back: Back) -> tuple[Rim, Body]:
+    """A ball whose rim is soft on the right."""
+    height, mask = hemisphere(40, 110)
+    row, column = np.indices(mask.shape) - 55 + 0.3
+    away = np.hypot(row, column) - 40
+    soft = (column > 0) & (np.abs(away) < 16)
+    rim = Rim(np.where(soft, np.clip(0.5 - away / 20, 0, 1), np.clip(0.5 - away, 0, 1)), soft)
+    return rim, make_body(height, height / 40, mask, rim, back, 3000)
+
+
+def layers(body: Body, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """How many triangles lie over each place."""
+    corners = body.places[body.faces]
+    count = np.zeros(len(rows), int)
+    for k, place in enumerate(np.stack([rows, columns], -1) + (0.31, 0.17)):
+        a, b, c = corners[np.abs(corners - place).max((1, 2)) < 90].transpose(1, 0, 2) - place
+        sides = [p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0] for p, q in ((a, b), (b, c), (c, a))]
+        count[k] = (np.stack(sides) > 0).all(0).sum() + (np.stack(sides) < 0).all(0).sum()
+    return count
+
+
+@pytest.mark.parametrize("back", Back)
+def test_a_soft_rim_is_one_sheet_around_a_closed_core(back: Back) -> None:
+    rim, body = fur(back)
+    assert rim.soft is not None
+    outline = body.places[~body.front & rim.sheet[body.pixels[:, 0], body.pixels[:, 1]]]
+    assert len(outline) > 50
+    ends = rim.cover[tuple(np.rint(outline).astype(int).T)]
+    assert np.median(ends) < 0.06, "it fades to nothing"
+    assert len(np.unique(body.faces)) == len(body.places), "no loose vertices"
+    rows, columns = (part[::37] for part in np.nonzero(ndimage.binary_erosion(rim.sheet)))
+    seen = rim.cover[rows, columns] > 0.1
+    assert (layers(body, rows[seen], columns[seen]) == 1).all()
+    core = ndimage.binary_erosion((rim.cover > 0.99), iterations=3)
+    rows, columns = (part[::101] for part in np.nonzero(core))
+    assert (layers(body, rows, columns) == (1 if back is Back.OPEN else 2)).all()
+
+
+@pytest.mark.parametrize("back", CLOSED)
+def test_the_core_of_a_soft_rim_has_no_hole(back: Back) -> None:
+    """Edges of one triangle alone are those of the sheet, or where it begins."""
+    rim, body = fur(back)
+    edges = np.sort(body.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    kinds, count = np.unique(edges, axis=0, return_counts=True)
+    near = ndimage.binary_dilation(rim.sheet, np.ones((3, 3)), 2)
+    assert near[tuple(body.pixels[kinds[count == 1]].reshape(-1, 2).T)].all()
+
+
+def test_the_texture_of_the_sheet_is_not_folded() -> None:
+    rim, body = fur(Back.ROUNDED)
+    thin = rim.sheet[body.pixels[:, 0], body.pixels[:, 1]]
+    np.testing.assert_array_equal(body.texture[thin], body.places[thin])

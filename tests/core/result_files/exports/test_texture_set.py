@@ -2,7 +2,6 @@
 
 import errno
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,9 +12,7 @@ from PIL import Image
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
-from isc_core.photo.grabcut import encoded_mask
 from isc_core.result_files.exports import texture_set
-from isc_core.result_files.exports.soft_alpha import object_cover
 from isc_core.result_files.exports.targets import TARGETS
 from isc_core.result_files.exports.texture_set import texture_files, write_texture_set
 from isc_core.result_files.mesh import MeshResult, build_mesh
@@ -192,26 +189,3 @@ def test_a_full_disk_leaves_the_earlier_set(
     assert "\n" not in str(caught.value)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert list(tmp_path.iterdir()) == [folder]
-
-
-def test_alpha_is_soft_where_the_mask_was(tmp_path: Path) -> None:
-    """A mask of the photo at twice the size of the maps, whose edge is a ramp of four pixels."""
-    d = ball((96, 120), 40.0, (44.0, 66.0))
-    source = {**d.provenance.input, "scale": 0.5}
-    d = replace(d, provenance=replace(d.provenance, input=source))
-    row, column = (np.indices((192, 240)) + 0.5) / 2 - 0.5
-    away = np.hypot(row - 44, column - 66)
-    cover = np.clip((0.99 * 40 + 1 - away) / 2, 0, 1)
-    cover[:20, :20] = 1  # another thing
-    (tmp_path / "mask.png").write_bytes(encoded_mask(cover))
-    found = object_cover(d, tmp_path / "mask.png")
-    assert found.shape == d.mask.shape
-    mean = cover.reshape(96, 2, 120, 2).mean((1, 3))
-    near = np.hypot(*(np.indices(d.mask.shape) - np.array([44, 66])[:, None, None])) < 42
-    assert np.abs(found - mean)[near].max() < 0.004
-    assert found[:8, :8].max() == 0
-    soft = (found > 0.02) & (found < 0.98)
-    assert soft.sum() > 200
-    assert (object_cover(d, tmp_path / "absent.png") == d.mask).all()
-    (tmp_path / "other.png").write_bytes(encoded_mask(cover[:100]))
-    assert (object_cover(d, tmp_path / "other.png") == d.mask).all()

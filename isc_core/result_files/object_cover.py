@@ -1,0 +1,144 @@
+"""How much of each pixel of the maps the object covers.
+
+Problem: the maps of a result end at pixels that the object covers by half. The edge of a mask that
+was found in the photo, of a soft mask and of an alpha channel is known more finely: `mask.png` has
+the cover of each of the photo's pixels.
+
+Equation: the cover of a pixel of the maps is the mean over its area. Beyond two pixels from the
+object it is 0, for the photo may show other things, unless the rim is soft (`photo.soft_rim`) and
+the way there leads over pixels that the object covers in part. There the cover is the opacity of
+the surface.
+
+Citation: the cover as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
+doi:10.1145/800031.808606.
+
+Limits: without that file the edge is that of the maps, of pixels that are the object's or not.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from ..imaging.area_resize import AreaFilter
+from ..imaging.upsampling import enlarged
+from ..io.decoders import read_raster
+from ..photo.soft_rim import soft_rim
+from ..scene.decomposition import Decomposition
+
+_NEAR = 2  # pixels
+_SOME = 0.02  # of a pixel: less is none
+
+
+@dataclass(frozen=True)
+class ObjectCover:
+    """The object's cover of the pixels of the maps.
+
+    Attributes
+    ----------
+    share : (H, W) float32 ndarray
+        In [0, 1].
+    soft : (H, W) bool ndarray or None
+        Where the rim is soft, and some pixels around; None where it is nowhere.
+    fine : (h, w) uint8 ndarray or None
+        The photo's own cover, in codes.
+    scale : float
+        Pixels of the maps to one of `fine`.
+    """
+
+    share: np.ndarray
+    soft: np.ndarray | None = None
+    fine: np.ndarray | None = None
+    scale: float = 1.0
+
+    def alpha(self, shape: tuple[int, int] | None = None) -> np.ndarray | None:
+        """Return the opacity of the surface: 1 where the rim is not soft.
+
+        Parameters
+        ----------
+        shape : tuple of int, optional
+            Rows and columns of a texture over the frame of the maps; by default those of the maps.
+
+        Returns
+        -------
+        (h, w) uint8 ndarray or None
+            Codes; None without a soft rim.
+        """
+        if self.soft is None or self.fine is None:
+            return None
+        height, width = shape or self.share.shape
+        factor = max(1.0, width / self.share.shape[1])
+        cover = _resized(self.fine, self.scale * factor, (height, width))
+        weight = enlarged(self.soft.astype(np.float32), (height, width), factor)
+        return np.rint(255 * (1 - weight * (1 - cover))).astype(np.uint8)
+
+
+def read_cover(mask_file: Path) -> np.ndarray | None:
+    """Return the cover that a result's `mask.png` has.
+
+    Parameters
+    ----------
+    mask_file : Path
+        May be absent.
+
+    Returns
+    -------
+    (h, w) ndarray or None
+        0 to 1, of the photo's pixels; None without the file.
+
+    Raises
+    ------
+    InputError
+        If the file is no image.
+    """
+    if not mask_file.is_file():
+        return None
+    raster = read_raster(mask_file)
+    values = raster.values.reshape(*raster.values.shape[:2], -1)[..., 0]
+    return values.astype(np.float32) / np.iinfo(raster.values.dtype).max
+
+
+def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | None:
+    """Return the object's cover of the pixels of the maps.
+
+    Parameters
+    ----------
+    d : Decomposition
+    given : (h, w) ndarray or None
+        That of the photo's pixels, 0 to 1.
+
+    Returns
+    -------
+    ObjectCover or None
+        None where no more is known than the mask says.
+    """
+    if given is None:
+        return None
+    codes = np.rint(255 * np.clip(given, 0, 1)).astype(np.uint8)
+    if not ((codes > 0) & (codes < 255)).any():
+        return None
+    scale = min(1.0, float(d.provenance.input.get("scale", 1.0)))
+    rows, columns = (max(1, int(np.ceil(n * scale - 1e-6))) for n in codes.shape)
+    if (rows, columns) != d.mask.shape:  # of another photo
+        return None
+    share = _resized(codes, scale, (rows, columns))
+    near = ndimage.binary_dilation(d.mask, iterations=_NEAR)
+    way = near | ((share > _SOME) & (share < 0.5))
+    share[~ndimage.binary_propagation(d.mask, mask=way)] = 0
+    own = d.provenance.input.get("mask_from") == "alpha"
+    soft = soft_rim(share, d.mask, own)
+    share[~near if soft is None else ~(near | soft)] = 0
+    return ObjectCover(share, soft, codes, scale)
+
+
+def _resized(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> np.ndarray:
+    """The cover (H, W) float32 at a scale; 0 beyond the photo, from 1 on as it is."""
+    cover = codes.astype(np.float32) / 255
+    if scale < 1:
+        area = AreaFilter.of(cover.shape, scale)
+        cover = np.clip(area(cover) / np.maximum(area.full, 1e-6), 0, 1)
+    found = np.zeros(shape, np.float32)
+    rows, columns = (min(a, b) for a, b in zip(shape, cover.shape, strict=True))
+    found[:rows, :columns] = cover[:rows, :columns]
+    return found
