@@ -16,8 +16,6 @@ given ones. The time grows faster than the number of pixels: some 100,000 take s
 """
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 
 SCALE = 32
 _LARGEST = 200.0  # of a cost difference
@@ -95,6 +93,10 @@ def _source_side(
     """Which of N nodes stay with the source, (N,) bool: those with no way to the sink when the
     largest flow runs.
     """
+    # Imported for a cut alone: every command imports this module.
+    from scipy import sparse
+    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
+
     count = len(pull)
     source, sink = count, count + 1
     nodes = np.arange(count)
