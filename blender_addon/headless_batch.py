@@ -135,14 +135,6 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
     """
     if options.output is None and options.render is None and options.results is None:
         raise InputError("no output: give -o OUT.blend, --render OUT.png or --results DIR")
-    for name, least in (("samples", 1), ("max_size", 0), ("threads", 0), ("triangles", 0)):
-        if getattr(options, name) < least:
-            raise InputError(f"--{name.replace('_', '-')} must be {least} or more")
-    size = options.texture_size
-    if size not in ("photo", "maps") and not (size.isdecimal() and int(size) > 0):
-        raise InputError("--texture-size must be photo, maps or a number of pixels")
-    if not 0 < options.size < 1e6:
-        raise InputError("--size must be above 0 metres")
     sources = find_sources(options.inputs, options.mask)
     blends = output_files(sources, options.output, (".blend",), "-o", together=True)
     renders = output_files(

@@ -19,6 +19,7 @@ LIGHT_MODULES = frozenset(
     {
         "isc_core.cli.interface.interrupts",
         "isc_core.cli.interface.terminal",
+        "isc_core.cli.interface.values",
         "isc_core.errors",
         "isc_core.extras",
         "isc_core.imaging.srgb",

@@ -47,8 +47,6 @@ class LobeFitOptions:
         Deviation of the specular light as a share of its peak, in (0, 1).
     relative : float
         Deviation as a share of the light itself, in [0, 1).
-    darkest : float
-        Radiance >= 0 up to which nothing is a highlight.
     thresholded : bool
         The specular image is a separator's, which shows only light above an unknown level.
 
@@ -64,7 +62,6 @@ class LobeFitOptions:
     normal_error: float = 0.0
     floor: float = 0.02
     relative: float = 0.1
-    darkest: float = 1e-6
     thresholded: bool = False
 
     def __post_init__(self) -> None:
@@ -76,11 +73,9 @@ class LobeFitOptions:
             0 <= self.normal_error < 90
             and 0 < self.floor < 1
             and 0 <= self.relative < 1
-            and self.darkest >= 0
         ):
             raise InputError(
-                "normal_error has to be within [0, 90), floor within (0, 1), relative within "
-                "[0, 1), darkest 0 or more"
+                "normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1)"
             )
 
 

@@ -215,9 +215,13 @@ def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
     [
         (["none.png", "-o", "x.blend"], "none.png: no such photo or folder"),
         (["RESULT"], "no output: give"),
-        (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
-        (["RESULT", "-o", "x.blend", "--triangles", "-4"], "--triangles must be 0 or more"),
-        (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
+        (
+            ["RESULT", "-o", "x.blend", "--samples", "0"],
+            "argument --samples: '0' is not a whole number, 1 or",
+        ),
+        (["RESULT", "-o", "x.blend", "--triangles", "-4"], "'-4' is not a whole number, 0 or more"),
+        (["RESULT", "-o", "x.blend", "--size", "nan"], "'nan' is not a number other than 0"),
+        (["RESULT", "-o", "x.blend", "--texture-size", "0"], "'0' is not photo, maps or a number"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
         (
             ["RESULT", "--render", "x.jpg"],

@@ -7,7 +7,7 @@ from ...masking.hints import Hints
 from ...masking.search import separate_parts
 from ...photo.grabcut import Box
 from ...photo.photo import Photo
-from .values import pixel
+from .options import add_pixels
 
 Group = argparse._ArgumentGroup
 
@@ -26,19 +26,8 @@ def add_hints(group: Group | argparse.ArgumentParser) -> None:
         metavar="x,y,w,h",
         help="left, top, width and height in pixels around the object, with some background",
     )
-    for option, name, place in (
-        ("--point", "points", "the object"),
-        ("--not", "others", "the background"),
-    ):
-        group.add_argument(
-            option,
-            type=pixel,
-            action="append",
-            default=[],
-            dest=name,
-            metavar="x,y",
-            help=f"a pixel of {place}, from the top left; can be repeated",
-        )
+    add_pixels(group, "--point", "points", "the object")
+    add_pixels(group, "--not", "others", "the background")
 
 
 def add_each(group: Group | argparse.ArgumentParser, what: str) -> None:
