@@ -111,6 +111,11 @@ def _add_files(group: argparse._ArgumentGroup) -> None:
         ),
     )
     add(
+        "--each",
+        action="store_true",
+        help="create an object for each separate thing of a photo, in one scene",
+    )
+    add(
         "-o",
         "--output",
         type=Path,

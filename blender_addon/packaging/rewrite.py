@@ -44,6 +44,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.shading.brdf.energy",
         "isc_core.shading.brdf.ggx",
         "isc_core.shading.perspective",
+        "isc_core.shading.spherical_harmonics",
     }
 )
 _BLENDER = {
