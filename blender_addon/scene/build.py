@@ -37,8 +37,7 @@ from ..datablocks.provenance import (
 )
 from ..datablocks.staging import StagedBlocks, completed, stage
 from ..files.result_arrays import ResultArrays
-from .camera import ensure_camera, set_render_size
-from .camera_background import set_background_photo
+from .camera import ensure_camera, set_background_photo, set_render_size
 from .collection import (
     ensure_collection,
     ensure_optional_part,
