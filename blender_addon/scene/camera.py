@@ -1,6 +1,6 @@
-"""The photo's camera with the photo's frame and the photo behind: orthographic, or a pinhole where its focal length is
-known. A render of the maps' size matches them pixel by pixel, or one of the photo's size the photo:
-the last row and column of maps may reach past the photo.
+"""The photo's camera with the photo's frame, and the photo behind: orthographic, or a pinhole where
+its focal length is known. A render of the maps' size matches them pixel by pixel, or one of the
+photo's size the photo: the last row and column of maps may reach past the photo.
 
 Equation: with a focal length of f pixels and a frame of w x h, Blender's lens is f / max(w, h) of
 the sensor's width, and its shift the distance of the frame's middle from the principal point, over
