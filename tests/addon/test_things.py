@@ -1,6 +1,7 @@
 """Each thing of a photo becomes an object: a photo of rendered things, and the scene it becomes."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
+from blender_addon.datablocks.staging import completed  # noqa: E402
 from blender_addon.files.result_arrays import read_result, things_in  # noqa: E402
 from blender_addon.operators import decompose as operators  # noqa: E402
 from blender_addon.operators import result  # noqa: E402
@@ -19,9 +21,12 @@ from blender_addon.operators.worker_run import begin_run  # noqa: E402
 from blender_addon.scene.build import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from blender_addon.scene.things import place_things, prepare_things, stage_things  # noqa: E402
+from isc_core.result_files.result_folder import save  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 from tests.addon.test_operators import census  # noqa: E402
+from tests.addon.test_scene_perspective import evaluated_vertices, seen_pixels  # noqa: E402
+from tests.core import perspective_scene  # noqa: E402
 
 SIZE = (120, 64)
 PLACES = ((-1.9, 0.1, 0.7), (0.2, -0.2, 0.95), (2.2, 0.35, 0.5))  # x, z, radius
@@ -196,18 +201,25 @@ def test_things_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path
     assert max(one.base_color.max() for one in (first, second)) <= max(
         one.base_color.max() for one in results
     )
-    staged = []
-    steps = stage_things(prepared)
-    while True:
-        try:
-            next(steps)
-        except StopIteration as stop:
-            staged = stop.value
-            break
-    left, right = (built.object for built in place_things(staged))
+    left, right = (one.object for one in place_things(completed(stage_things(prepared))))
     step = 0.5 / results[0].longest_side
     offset = right.location - left.location
     expected = (results[1].origin - results[0].origin)[:2] * step
     np.testing.assert_allclose(offset, (expected[0], 0, -expected[1]), atol=1e-6)
     cameras = [built.camera for one in (left, right) if (built := find_built(one)) is not None]
     assert cameras[0] is not None and cameras[1:] == [None], "one camera, of the photo"
+
+
+def test_one_pinhole_camera_sees_each_thing_where_the_photo_does(
+    blender: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder, centre in (("1", (34.0, 24.0)), ("2", (24.0, 58.0))):
+        monkeypatch.setattr(perspective_scene, "CENTRE", centre)
+        save(perspective_scene.bump_before_camera(), tmp_path / folder, arrays=True)
+    results = [read_result(thing) for thing in things_in(tmp_path)]
+    prepared = prepare_things(results, BuildOptions(name="pair", each=True))
+    built = place_things(completed(stage_things(prepared)))
+    assert abs(built[1].object.location.y) < 1e-3, "in one plane across the view"
+    for one, thing in zip(built, results, strict=True):
+        off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
+        assert np.abs(off - thing.vertex_pixel).max() < 0.01
