@@ -114,7 +114,7 @@ def test_the_scene_looks_like_the_photo(addon: Any, shelf: Path, tmp_path: Path)
         reach = 0.7 * radius * SIZE[0] / 6
         inner = (across - column) ** 2 + (down - row) ** 2 < reach**2
         given, got = (np.median(one[inner], axis=0) for one in (photo, picture[..., :3]))
-        np.testing.assert_allclose(got, given, rtol=0.3, atol=0.02)
+        np.testing.assert_allclose(got, given, rtol=0.2, atol=0.02)
 
 
 @pytest.mark.slow
