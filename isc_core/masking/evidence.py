@@ -11,8 +11,9 @@ is told with certainty, 0 where all are even odds. w is fitted
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines", 1999.
 
-Limits: fitted to photos without hints. With hints, the looks have seen them; what the sureness then
-is worth is measured in docs/methods/automatic_mask.md.
+Limits: fitted to photos without hints. With hints, the looks have seen them, and the probability is
+multiplied by the share of points that the mask obeys; docs/methods/automatic_mask.md tells what it
+is then worth.
 """
 
 import math

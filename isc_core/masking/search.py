@@ -62,12 +62,19 @@ def find_mask(
     whole = predict_part(small, _all_of(small), given, network)
     found = _at_size(_second_look(small, whole, given, network), light.shape)
     if hints.box is None or hints.points or _fills(found.mask, hints.box):
-        return found
+        return replace(found, sureness=found.sureness * _obeyed(found.mask, hints))
     cover = grabcut(light, hints.box).astype(np.float32)
     weights = (network or MaskNetwork.shipped()).sureness
     evidence = of_another_mask(found.evidence, found.cover, cover)
     sureness = sureness_of(evidence, weights)
     return replace(found, cover=cover, evidence=evidence, sureness=sureness)
+
+
+def _obeyed(mask: np.ndarray, hints: Hints) -> float:
+    """The share of points that a mask holds or leaves out as it should; a right one does of all."""
+    told = [bool(mask[y, x]) for x, y in hints.points]
+    told += [not mask[y, x] for x, y in hints.others]
+    return sum(told) / len(told) if told else 1.0
 
 
 def _fills(mask: np.ndarray, box: Box) -> bool:
