@@ -69,11 +69,7 @@ class LobeFitOptions:
             raise InputError(f"unknown lobe {self.model!r}: choose {', '.join(CONVENTION)}")
         if not 1 <= self.most_lights <= 3 or self.most_pixels < 100:
             raise InputError("most_lights has to be 1 to 3 and most_pixels at least 100")
-        if not (
-            0 <= self.normal_error < 90
-            and 0 < self.floor < 1
-            and 0 <= self.relative < 1
-        ):
+        if not (0 <= self.normal_error < 90 and 0 < self.floor < 1 and 0 <= self.relative < 1):
             raise InputError(
                 "normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1)"
             )
