@@ -17,7 +17,7 @@ from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
 
 from .datablocks.provenance import find_tagged
-from .files.result_arrays import ARRAYS
+from .files.result_arrays import ARRAYS, things_in
 from .headless_sources import Source, find_sources, output_files
 from .operators.messages import join_notes
 from .operators.request import DecomposeRequest, MethodSettings
@@ -25,6 +25,7 @@ from .operators.result import build_as_undo_step
 from .operators.run_steps import result_notes
 from .operators.worker_run import RunOutput
 from .registration import register
+from .scene.copies import OBJECT
 from .scene.preparation import BuildOptions
 from .settings.preferences import read_preferences, worker_environment
 from .worker.commands import DecomposeJob, start_arrays, start_decompose
@@ -104,7 +105,9 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
             try:
                 folder = _make_result(plan.source, results, options, part.part(0.0, 0.9))
-                if notes := join_notes(result_notes(folder)):
+                of_things = things_in(folder) if _each(plan.source, options) else [folder]
+                lines = [note for result in of_things for note in result_notes(result)]
+                if notes := join_notes(dict.fromkeys(lines)):
                     report.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
                     new_file_needed = previous is None or plan.blend != previous
@@ -135,14 +138,6 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
     """
     if options.output is None and options.render is None and options.results is None:
         raise InputError("no output: give -o OUT.blend, --render OUT.png or --results DIR")
-    for name, least in (("samples", 1), ("max_size", 0), ("threads", 0), ("triangles", 0)):
-        if getattr(options, name) < least:
-            raise InputError(f"--{name.replace('_', '-')} must be {least} or more")
-    size = options.texture_size
-    if size not in ("photo", "maps") and not (size.isdecimal() and int(size) > 0):
-        raise InputError("--texture-size must be photo, maps or a number of pixels")
-    if not 0 < options.size < 1e6:
-        raise InputError("--size must be above 0 metres")
     sources = find_sources(options.inputs, options.mask)
     blends = output_files(sources, options.output, (".blend",), "-o", together=True)
     renders = output_files(
@@ -178,6 +173,7 @@ def _make_result(
         transfer=options.transfer,
         camera=options.camera,
         texture_size=options.texture_size,
+        each=_each(source, options),
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -212,8 +208,10 @@ def _write_outputs(
     name = plan.source.name
     monitor.report(f"building {name}", 0.0)
     empty_scenes = open_empty_file() if new_file_needed else []
-    build_as_undo_step(bpy.context, RunOutput(folder), _create_request(plan.source, options))
-    scene = find_tagged(bpy.data.scenes, name, "scene")
+    request = _create_request(plan.source, options)
+    build_as_undo_step(bpy.context, RunOutput(folder), request)
+    first = f"{name} 1" if request.build.each else name
+    scene = find_tagged(bpy.data.objects, first, OBJECT).users_scene[0]
     for other in empty_scenes:
         bpy.data.scenes.remove(other)
     if plan.blend is not None:
@@ -222,6 +220,11 @@ def _write_outputs(
         monitor.report(f"rendering {name}", 0.3)
         render_scene(scene, plan.render)
     monitor.report(f"building {name}", 1.0)
+
+
+def _each(source: Source, options: argparse.Namespace) -> bool:
+    """Whether each thing of a source becomes an object; a result is one thing."""
+    return bool(options.each) and not source.is_result
 
 
 def _create_request(source: Source, options: argparse.Namespace) -> DecomposeRequest:
@@ -244,6 +247,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         own_shadows=True if options.own_shadows else None,
         specular_from=options.specular,
         name=source.name,
+        each=_each(source, options),
     )
     photo = "" if source.is_result else _load_image(source.path)
     mask = "" if source.mask is None or not photo else _load_image(source.mask)

@@ -14,6 +14,7 @@ from typing import NoReturn
 
 from isc_core.cli.interface.interrupts import Interrupts
 from isc_core.cli.interface.terminal import ProgressBar, printable
+from isc_core.cli.interface.values import count, positive, texture_size, whole
 from isc_core.errors import Cancelled, InputError
 from isc_core.extras import install_command
 
@@ -110,6 +111,11 @@ def _add_files(group: argparse._ArgumentGroup) -> None:
         ),
     )
     add(
+        "--each",
+        action="store_true",
+        help="create an object for each separate thing of a photo, in one scene",
+    )
+    add(
         "-o",
         "--output",
         type=Path,
@@ -124,7 +130,7 @@ def _add_files(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--samples",
-        type=int,
+        type=whole,
         default=64,
         metavar="N",
         help="samples per pixel (default: %(default)s)",
@@ -171,7 +177,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--max-size",
-        type=int,
+        type=count,
         default=512,
         metavar="N",
         help=(
@@ -181,6 +187,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--texture-size",
+        type=_texture_size,
         default="photo",
         metavar="photo|maps|N",
         help=(
@@ -190,7 +197,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--threads",
-        type=int,
+        type=count,
         default=0,
         metavar="N",
         help="number of threads, 0 uses one per core (default: %(default)s)",
@@ -201,7 +208,7 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add(
         "--size",
-        type=float,
+        type=positive,
         default=0.1,
         metavar="M",
         help="longer side of the object in metres (default: %(default)s)",
@@ -231,9 +238,15 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--triangles",
-        type=int,
+        type=count,
         default=50_000,
         metavar="N",
         help="most triangles of the visible side, 0 keeps two for each pixel "
         "(default: %(default)s)",
     )
+
+
+def _texture_size(text: str) -> str:
+    """The text, which is handed on to `isc decompose`, if it is a size."""
+    texture_size(text)
+    return text

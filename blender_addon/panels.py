@@ -66,6 +66,7 @@ class _Main(_Panel):
         if settings.mask_source == "IMAGE":
             column.template_ID(settings, "mask", open="image.open")
             column.prop(settings, "scale_mask")
+        column.prop(settings, "each")
         column.prop(settings, "preset")
         if running:
             draw_progress(self.layout, context)

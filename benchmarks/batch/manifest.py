@@ -20,7 +20,7 @@ from pathlib import Path
 import psutil  # type: ignore[import-untyped]
 
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import DONE, ImageJob, ImageOutcome
+from isc_core.batch.item import DONE, ImageJob, ImageOutcome, Outcomes
 from isc_core.batch.run_batch import Batch, run_batch
 from isc_core.errors import Cancelled
 from isc_core.progress import Monitor, ProgressEvent
@@ -150,21 +150,20 @@ class RunObserver:
         return self.count >= _OUTCOMES
 
 
-def no_task(job: ImageJob) -> ImageOutcome:
+def no_task(job: ImageJob) -> Outcomes:
     """Do nothing.
 
     Parameters
     ----------
     job : ImageJob
-        Ignored.
+        Not done.
 
     Returns
     -------
-    ImageOutcome
+    Outcomes
         Done.
     """
-    del job
-    return ImageOutcome(DONE)
+    return {job.name: ImageOutcome(DONE)}
 
 
 def _peak_mb() -> float:

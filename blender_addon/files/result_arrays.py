@@ -245,6 +245,25 @@ def read_result(folder: Path | str) -> ResultArrays:
     return ResultArrays(**values, description=description, folder=folder)
 
 
+def things_in(folder: Path) -> list[Path]:
+    """Return the results of the things of a photo, from left to right.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder that `isc decompose --each` has written.
+
+    Returns
+    -------
+    list of Path
+        Its folders 1, 2 and so on.
+    """
+    things: list[Path] = []
+    while ((thing := folder / str(len(things) + 1)) / DESCRIPTION).is_file():
+        things.append(thing)
+    return things
+
+
 def read_description(path: Path) -> dict[str, Any]:
     """Read the description of a result.
 

@@ -82,6 +82,31 @@ class ResultCache:
             os.utime(place)
         return result
 
+    def take(self, key: str, made: Path) -> None:
+        """Move what was made into the cache, completely or not at all.
+
+        Parameters
+        ----------
+        key : str
+            As `content_key` returns it.
+        made : Path
+            A folder.
+
+        Raises
+        ------
+        InputError
+            If it cannot be moved.
+        """
+        place = self.place(key)
+        partial = place.with_name(f"{key}.partial")
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            shutil.rmtree(partial, ignore_errors=True)
+            shutil.move(made, partial)
+            partial.rename(place)
+        except OSError as error:
+            raise InputError(f"cannot write {place}: {error.strerror or error}") from error
+
     def trim(self, keep: str) -> None:
         """Remove the results that were not used for the longest time, until the rest fits.
 

@@ -2,6 +2,8 @@
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+from collections.abc import Iterator
+from itertools import count, takewhile
 from typing import Any
 
 import bpy
@@ -10,7 +12,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..datablocks.provenance import find_tagged
-from ..files.result_arrays import ARRAYS
+from ..files.result_arrays import ARRAYS, things_in
 from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
@@ -66,8 +68,9 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     def finish(context: Any, output: RunOutput) -> ImportSteps:
         message = yield from build_in_steps(context, output, request, view)
         if output.path.is_relative_to(folder):
-            # By far the largest file; the scene holds its content now.
-            (output.path / ARRAYS).unlink(missing_ok=True)
+            # By far the largest files; the scene holds their content now.
+            for result in (output.path, *things_in(output.path)):
+                (result / ARRAYS).unlink(missing_ok=True)
         else:
             remove_folder(folder)
         return message
@@ -168,9 +171,15 @@ class _Overwrites(WorkerOperator):
 
 
 def _edited_object(request: DecomposeRequest) -> Any:
-    """The object that a request would update, if its mesh was edited by hand; else None."""
-    obj = find_tagged(bpy.data.objects, request.build.name, OBJECT)
-    return obj if obj is not None and is_edited_by_hand(obj) else None
+    """An object that a request would update, if its mesh was edited by hand; else None."""
+    return next((obj for obj in _updated_objects(request) if is_edited_by_hand(obj)), None)
+
+
+def _updated_objects(request: DecomposeRequest) -> Iterator[Any]:
+    name = request.build.name
+    names = (f"{name} {number}" for number in count(1)) if request.build.each else iter((name,))
+    found = (find_tagged(bpy.data.objects, one, OBJECT) for one in names)
+    return takewhile(lambda obj: obj is not None, found)
 
 
 class ISC_OT_confirm_overwrite(bpy.types.Operator):

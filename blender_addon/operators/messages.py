@@ -26,6 +26,7 @@ _FIELDS = {
     "--not-highlight": "Not Highlights",
     "--point": "Points",
     "--not": "Background",
+    "--each": "Each Object",
 }
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
@@ -52,7 +53,8 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
         message = message.replace(path, name)
     problem, colon, advice = message.rpartition(": ")
     if colon and (_MASK_OPTION.search(advice) or _MASK_COMMAND in advice):
-        message = f"{problem}: {_MASK_ADVICE}"
+        several = ", or enable Each Object" if "--each" in advice else ""
+        message = f"{problem}: {_MASK_ADVICE}{several}"
     for option, field in _FIELDS.items():
         message = re.sub(rf"{option}(?![\w-])=?", field, message)
     return message

@@ -287,7 +287,7 @@ def object_key(image: Any) -> str:
 
 
 def store_request(obj: Any, request: DecomposeRequest) -> None:
-    """Store in an object how it was made, under the name it was given.
+    """Store in an object how it was made, under the name it was given, or that of its photo.
 
     The object also points to the images, so that they stay with it when they are renamed.
 
@@ -298,7 +298,9 @@ def store_request(obj: Any, request: DecomposeRequest) -> None:
     request : DecomposeRequest
         How it was made.
     """
-    named = replace(request, build=replace(request.build, name=str(obj[KEY])))
+    named = request
+    if not request.build.each:
+        named = replace(request, build=replace(request.build, name=str(obj[KEY])))
     obj[_REQUEST] = named.to_json()
     for role, name in ((_IMAGE, request.image), (_MASK, request.mask)):
         image = find_by_full_name(bpy.data.images, name) if name else None

@@ -12,16 +12,9 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..datablocks.staging import completed
-from ..files.result_arrays import DESCRIPTION, read_result
-from ..scene.build import (
-    BuiltObject,
-    StagedObject,
-    build_object,
-    find_built,
-    place_object,
-    stage_object,
-)
-from ..scene.preparation import prepare
+from ..files.result_arrays import DESCRIPTION
+from ..scene.build import BuiltObject, StagedObject, find_built
+from ..scene.things import discard, place_things, stage_things
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .messages import error_line
 from .modal import WorkerOperator
@@ -32,12 +25,12 @@ from .request import (
     request_from_json,
     store_request,
 )
-from .run_steps import import_steps
+from .run_steps import import_steps, read_and_prepare
 from .viewport import activate, show, started_in
 from .worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder, require_no_active_run
 
 # Objects whose datablocks are made, until they are placed: operators take plain values only.
-_staged: dict[str, StagedObject] = {}
+_staged: dict[str, list[StagedObject]] = {}
 _CAME_FROM = "isc_came_from"
 
 
@@ -72,10 +65,10 @@ def build_in_steps(
     del context
     request = request or _panel_request(bpy.context.scene)
     folder, photo = str(output.path), find_by_full_name(bpy.data.images, request.image)
-    prepared = output.prepared or prepare(
-        read_result(output.path), request.build, with_photo=photo is None
+    prepared = output.prepared or read_and_prepare(
+        output.path, request.build, with_photo=photo is None
     )
-    _staged[folder] = yield from stage_object(prepared, photo=photo)
+    _staged[folder] = yield from stage_things(prepared, photo=photo)
     before = {obj.session_uid for obj in bpy.data.objects}
     try:
         # From Python, an operator pushes an undo step only if told to.
@@ -83,15 +76,16 @@ def build_in_steps(
     except RuntimeError as error:
         raise InputError(error_line(error)) from error
     finally:
-        _staged.pop(folder).blocks.discard()
+        discard(_staged.pop(folder))
     built = find_built(bpy.context.object)
     if built is None:
         return "the object is in the scene"
+    what = built.object.name if len(prepared) == 1 else f"{len(prepared)} objects"
     if built.object.session_uid in before:
-        return f"{built.object.name} updated"
+        return f"{what} updated"
     show(bpy.context, built, request.build.own_scene, view)
     where = f"in the scene {built.scene.name}" if request.build.own_scene else "at the 3D cursor"
-    return f"{built.object.name} created {where}"
+    return f"{what} created {where}"
 
 
 def build_as_undo_step(
@@ -151,19 +145,21 @@ class ISC_OT_build_result(bpy.types.Operator):
             request = (
                 request_from_json(self.request) if self.request else _panel_request(context.scene)
             )
-            staged = _staged.get(self.directory)
             scene = find_by_full_name(bpy.data.scenes, request.scene) or context.scene
             photo = find_by_full_name(bpy.data.images, request.image)
-            if staged is not None:
-                built = place_object(staged, scene=scene, photo=photo)
-            else:
-                result = read_result(Path(self.directory))
-                built = build_object(result, request.build, scene=scene, photo=photo)
+            staged = _staged.get(self.directory)
+            if staged is None:
+                prepared = read_and_prepare(
+                    Path(self.directory), request.build, with_photo=photo is None
+                )
+                staged = completed(stage_things(prepared, photo=photo))
+            built = place_things(staged, scene=scene, photo=photo)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        _complete(built, request, scene)
-        activate(context, built)
+        for one in built:
+            _complete(one, request, scene)
+        activate(context, *built)
         return {"FINISHED"}
 
 

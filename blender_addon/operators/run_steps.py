@@ -12,14 +12,23 @@ from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
+from isc_core.errors import InputError
 from isc_core.result_files.diagnostics_text import status_lines
 from isc_core.result_files.reading_notes_text import stored_note_lines
 
 from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
-from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
+from ..files.result_arrays import (
+    ARRAYS,
+    DESCRIPTION,
+    ResultArrays,
+    read_description,
+    read_result,
+    things_in,
+)
 from ..files.result_cache import ResultCache, content_key
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
+from ..scene.things import prepare_things
 from ..worker.commands import (
     Box,
     DecomposeJob,
@@ -126,15 +135,59 @@ def decompose_steps(
         highlight_odds=method.highlight_odds if method.model == "joint" else "3",
         highlights=highlights,
         not_highlights=not_highlights,
+        each=place.build.each,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
-    prepared = yield from _cached_result(job, place, names, environment)
+    if job.each:
+        output = yield from _things(job, place, names, environment)
+    else:
+        prepared = yield from _cached_result(job, place, names, environment)
+        result = prepared.result.folder
+        output = RunOutput(result, _notes(result), (prepared,))
     for exported in (photo_path, mask_path):
         # Exported copies are no longer needed; the user's own files are not in the run's folder.
         if exported is not None and exported.parent == folder:
             exported.unlink(missing_ok=True)
-    result = prepared.result.folder
-    return RunOutput(result, _notes(result), prepared)
+    return output
+
+
+def _things(
+    job: DecomposeJob,
+    place: ResultPlace,
+    names: Mapping[str, str],
+    environment: WorkerEnvironment,
+) -> RunSteps:
+    """What is built of each thing: of earlier results of the same content, or a worker's."""
+    cache, key, folder = place.cache, "", job.output
+    if cache is not None:
+        key = yield from _in_thread(partial(_job_key, job, environment), _LOOKING)
+    if cache is None or not key or not cache.place(key).is_dir():
+        # How long that takes is not known before the things are found.
+        yield from _run_worker(lambda: start_decompose(job, environment), names)
+        if cache is not None and key:
+            yield from _in_thread(partial(cache.take, key, folder), _READING)
+    if cache is not None and key:
+        folder = cache.place(key)
+    made = partial(read_and_prepare, folder, place.build, with_photo=place.with_photo)
+    try:
+        prepared = yield from _in_thread(made, _READING)
+    except InputError:
+        if cache is not None and key:  # or it would be found again
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    if cache is not None and key:
+        yield from _in_thread(partial(cache.trim, key), _READING)
+        if place.keep:
+            yield from _in_thread(partial(_copy_result, folder, job.output), _READING)
+            folder = job.output
+            prepared = tuple(_moved(one, folder) for one in prepared)
+    notes = dict.fromkeys(note for thing in things_in(folder) for note in _notes(thing))
+    return RunOutput(folder, tuple(notes), prepared)
+
+
+def _moved(prepared: PreparedObject, folder: Path) -> PreparedObject:
+    result = prepared.result
+    return replace(prepared, result=replace(result, folder=folder / result.folder.name))
 
 
 def _cached_result(
@@ -293,9 +346,39 @@ def import_steps(result: Path, build: BuildOptions, environment: WorkerEnvironme
     """
     if not (result / ARRAYS).is_file():
         yield from _run_worker(lambda: start_arrays(result, environment), {})
-    arrays = yield from _in_thread(partial(read_result, result), _READING)
-    prepared = yield from _in_thread(partial(prepare, arrays, build, with_photo=True), _READING)
+    made = partial(read_and_prepare, result, build, with_photo=True)
+    prepared = yield from _in_thread(made, _READING)
     return RunOutput(result, _notes(result), prepared)
+
+
+def read_and_prepare(
+    folder: Path, build: BuildOptions, *, with_photo: bool = False
+) -> tuple[PreparedObject, ...]:
+    """Read a result, or those of each thing of a photo, and make in advance what takes time.
+
+    Parameters
+    ----------
+    folder : Path
+        A result, or with `build.each` the folder of results of things.
+    build : BuildOptions
+        What will be built.
+    with_photo : bool, optional
+        Whether the masked photo becomes an image.
+
+    Returns
+    -------
+    tuple of PreparedObject
+        One object, or one for each thing.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be read.
+    """
+    if not build.each:
+        return (prepare(read_result(folder), build, with_photo=with_photo),)
+    results = [read_result(thing) for thing in things_in(folder)]
+    return tuple(prepare_things(results, build, with_photo=with_photo))
 
 
 def _notes(result: Path) -> tuple[str, ...]:

@@ -57,15 +57,17 @@ def find_view(window: Any, address: int) -> Any:
     )
 
 
-def activate(context: Any, built: BuiltObject) -> None:
-    """Select an object alone and make it active, in the window's scene or in its own.
+def activate(context: Any, built: BuiltObject, *others: BuiltObject) -> None:
+    """Select objects alone and make one active, in the window's scene or in its own.
 
     Parameters
     ----------
     context : bpy.types.Context
         Blender's context.
     built : BuiltObject
-        The object.
+        The object that becomes active.
+    *others : BuiltObject
+        Selected as well; in the same scene.
     """
     if context.window is not None and context.window.scene != built.scene:
         context.window.scene = built.scene
@@ -75,7 +77,8 @@ def activate(context: Any, built: BuiltObject) -> None:
         return
     for other in list(layer.objects.selected):
         other.select_set(False, view_layer=layer)
-    built.object.select_set(True, view_layer=layer)
+    for one in (built, *others):
+        one.object.select_set(True, view_layer=layer)
     layer.objects.active = built.object
 
 

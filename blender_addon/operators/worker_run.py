@@ -35,13 +35,13 @@ class RunOutput:
         File or folder.
     notes : tuple of str
         Notes on the result; those that advise something begin with "note: ".
-    prepared : PreparedObject or None
-        What is built of the folder, if it was read.
+    prepared : tuple of PreparedObject
+        What is built of the folder, if it was read: one object, or one for each thing.
     """
 
     path: Path
     notes: tuple[str, ...] = ()
-    prepared: PreparedObject | None = None
+    prepared: tuple[PreparedObject, ...] = ()
 
 
 RunSteps = Generator[WorkerUpdate, None, RunOutput]

@@ -19,6 +19,7 @@ LIGHT_MODULES = frozenset(
     {
         "isc_core.cli.interface.interrupts",
         "isc_core.cli.interface.terminal",
+        "isc_core.cli.interface.values",
         "isc_core.errors",
         "isc_core.extras",
         "isc_core.imaging.srgb",
@@ -44,6 +45,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.shading.brdf.energy",
         "isc_core.shading.brdf.ggx",
         "isc_core.shading.perspective",
+        "isc_core.shading.spherical_harmonics",
     }
 )
 _BLENDER = {

@@ -7,6 +7,8 @@ from collections.abc import Generator
 from dataclasses import asdict, dataclass, replace
 
 import bpy
+import numpy as np
+from mathutils import Matrix
 
 from isc_core.errors import InputError
 
@@ -35,8 +37,7 @@ from ..datablocks.provenance import (
 )
 from ..datablocks.staging import StagedBlocks, completed, stage
 from ..files.result_arrays import ResultArrays
-from .camera import ensure_camera, set_render_size
-from .camera_background import set_background_photo
+from .camera import ensure_camera, set_background_photo, set_render_size
 from .collection import (
     ensure_collection,
     ensure_optional_part,
@@ -175,6 +176,8 @@ def place_object(
     *,
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
+    place: Matrix | None = None,
+    room: np.ndarray | None = None,
 ) -> BuiltObject:
     """Put a staged object in the scene, as `build_object` does, in one short call.
 
@@ -184,6 +187,11 @@ def place_object(
         The object; its datablocks are used or removed.
     scene, photo
         As of `build_object`.
+    place : Matrix, optional
+        Transform of a new object; None puts it at the 3D cursor, or at the origin of its own scene.
+    room : (2, 3) ndarray, optional
+        The lowest and the highest corner of what is at the cursor, from the object's origin; those
+        of its mesh if None.
 
     Returns
     -------
@@ -196,9 +204,35 @@ def place_object(
         As of `build_object`.
     """
     try:
-        return _place(staged.prepared, staged.blocks, scene or bpy.context.scene, photo)
+        scene = scene or bpy.context.scene
+        return _place(staged.prepared, staged.blocks, scene, photo, (place, room))
     finally:
         staged.blocks.discard()
+
+
+def require_placeable(
+    staged: StagedObject,
+    *,
+    scene: bpy.types.Scene | None = None,
+    photo: bpy.types.Image | None = None,
+) -> None:
+    """Check that a staged object can be placed.
+
+    Parameters
+    ----------
+    staged : StagedObject
+        The object.
+    scene, photo
+        As of `build_object`.
+
+    Raises
+    ------
+    InputError
+        As of `build_object`.
+    """
+    options = staged.prepared.options
+    key = _choose_key(staged.prepared.result, options, photo)
+    _require_ready(key, options, scene or bpy.context.scene)
 
 
 def _place(
@@ -206,6 +240,7 @@ def _place(
     blocks: StagedBlocks,
     scene: bpy.types.Scene,
     photo: bpy.types.Image | None,
+    standing: tuple[Matrix | None, np.ndarray | None],
 ) -> BuiltObject:
     result, options = prepared.result, prepared.options
     key = _choose_key(result, options, photo)
@@ -234,8 +269,8 @@ def _place(
         add_displacement(key, obj, images["displacement"], result.eye is not None)
     else:
         remove_displacement(key, obj)
-    if is_new and not options.own_scene:
-        obj.location = free_place(obj, scene)
+    if is_new:
+        _stand(obj, options, scene, *standing)
     attach_maps(key, obj, {name: images[name] for name in MAPS if name in images})
     world = ensure_world(key, images["environment_map"], result.sun_ambient, options.sun)
     # Saves and appends the light with the object, whether or not a scene uses it.
@@ -353,6 +388,19 @@ def _ensure_object(
     if not mesh.materials:
         mesh.materials.append(material)
     return obj
+
+
+def _stand(
+    obj: bpy.types.Object,
+    options: BuildOptions,
+    scene: bpy.types.Scene,
+    place: Matrix | None,
+    room: np.ndarray | None,
+) -> None:
+    if place is not None:
+        obj.matrix_basis = place
+    elif not options.own_scene:
+        obj.location = free_place(obj, scene, room)
 
 
 def _ensure_camera_and_light(

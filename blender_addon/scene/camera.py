@@ -1,6 +1,6 @@
-"""The photo's camera with the photo's frame: orthographic, or a pinhole where its focal length is
-known. A render of the maps' size matches them pixel by pixel, or one of the photo's size the photo:
-the last row and column of maps may reach past the photo.
+"""The photo's camera with the photo's frame, and the photo behind: orthographic, or a pinhole where
+its focal length is known. A render of the maps' size matches them pixel by pixel, or one of the
+photo's size the photo: the last row and column of maps may reach past the photo.
 
 Equation: with a focal length of f pixels and a frame of w x h, Blender's lens is f / max(w, h) of
 the sensor's width, and its shift the distance of the frame's middle from the principal point, over
@@ -18,6 +18,7 @@ from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
 from .collection import link_object
 
+_PHOTO = "isc_background"
 _SENSOR = 36.0  # millimetres: Blender's usual sensor
 
 
@@ -162,3 +163,24 @@ def set_render_size(scene: bpy.types.Scene, size: tuple[int, int]) -> None:
     render = scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = *size, 100
     render.pixel_aspect_x, render.pixel_aspect_y, render.use_border = 1.0, 1.0, False
+
+
+def set_background_photo(camera: bpy.types.Object, photo: bpy.types.Image) -> None:
+    """Show a photo behind the object in the camera view; the user's other images stay.
+
+    Parameters
+    ----------
+    camera : bpy.types.Object
+        The camera.
+    photo : bpy.types.Image
+        The photo; it replaces the one that ISC has set before.
+    """
+    images = camera.data.background_images
+    before = camera.data.get(_PHOTO)
+    background = (
+        next((entry for entry in images if entry.image in (photo, before) and entry.image), None)
+        or images.new()
+    )
+    background.source, background.image, background.alpha = "IMAGE", photo, 1.0
+    background.display_depth, background.frame_method = "BACK", "STRETCH"
+    camera.data.show_background_images, camera.data[_PHOTO] = True, photo

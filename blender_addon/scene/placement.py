@@ -19,7 +19,9 @@ _MOST_STEPS = 16
 _SOLID = {"SOLID", "TEXTURED"}
 
 
-def free_place(obj: bpy.types.Object, scene: bpy.types.Scene) -> Vector:
+def free_place(
+    obj: bpy.types.Object, scene: bpy.types.Scene, room: np.ndarray | None = None
+) -> Vector:
     """Find the location of a new object.
 
     Parameters
@@ -28,6 +30,9 @@ def free_place(obj: bpy.types.Object, scene: bpy.types.Scene) -> Vector:
         The object, unrotated; the bounding box of its mesh is used.
     scene : bpy.types.Scene
         The scene with the 3D cursor; its visible meshes can be in the way.
+    room : (2, 3) ndarray, optional
+        The lowest and the highest corner of what has to find a place, from the object's origin;
+        those of its mesh if None.
 
     Returns
     -------
@@ -36,6 +41,7 @@ def free_place(obj: bpy.types.Object, scene: bpy.types.Scene) -> Vector:
     """
     points = np.empty((len(obj.data.vertices), 3), np.float32)
     obj.data.vertices.foreach_get("co", points.ravel())
+    points = points if room is None else room
     low, high = Vector(points.min(0)), Vector(points.max(0))
     middle = (low + high) / 2
     place = scene.cursor.location - Vector((middle.x, middle.y, low.z))

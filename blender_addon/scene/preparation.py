@@ -75,6 +75,8 @@ class BuildOptions:
         Whether the file also holds the layers and maps that neither material nor exports use.
     name : str
         Name of the object; "" for the result's own.
+    each : bool
+        Whether each separate thing of the photo becomes an object.
     """
 
     size_metres: float = 0.1
@@ -93,6 +95,7 @@ class BuildOptions:
     own_shadows: bool | None = None
     all_maps: bool = True
     name: str = ""
+    each: bool = False
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,8 @@ class PreparedObject:
         The specular part of the material.
     plain : ImageFile or None
         The base colour without its compensation for the specular share, where it is needed.
+    offset : tuple of float
+        Where it lies from the first object of the same photo; metres in Blender's axes.
     """
 
     result: ResultArrays
@@ -124,6 +129,7 @@ class PreparedObject:
     files: dict[str, ImageFile]
     specular: SpecularSettings
     plain: ImageFile | None
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def prepare(

@@ -192,7 +192,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     image: PointerProperty(
         name="Photo",
-        description="Photo of one object: an image file, or any image in this file",
+        description="Photo of an object: an image file, or any image in this file",
         type=bpy.types.Image,
         poll=_is_still_image,
         update=_forget_points,
@@ -212,6 +212,11 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     scale_mask: BoolProperty(
         name="Scale Mask",
         description="Scale a mask of another size to the photo's size",
+        default=False,
+    )
+    each: BoolProperty(
+        name="Each Object",
+        description="Create an object for each separate thing in the photo",
         default=False,
     )
     box: IntVectorProperty(

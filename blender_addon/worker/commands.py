@@ -72,6 +72,8 @@ class DecomposeJob:
         Value of `--highlight-odds`.
     highlights, not_highlights : tuple of (x, y)
         Values of `--highlight` and `--not-highlight`.
+    each : bool
+        Whether each thing is decomposed, into the folders 1, 2 and so on of `output`.
     """
 
     photo: Path
@@ -88,6 +90,7 @@ class DecomposeJob:
     highlight_odds: str = "3"
     highlights: tuple[tuple[int, int], ...] = ()
     not_highlights: tuple[tuple[int, int], ...] = ()
+    each: bool = False
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,7 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]
+    words += ["--each"] * job.each
     words += [f"--highlight={x},{y}" for x, y in job.highlights]
     words += [f"--not-highlight={x},{y}" for x, y in job.not_highlights]
     return _start(words, job.output, environment, job.threads)

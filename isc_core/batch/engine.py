@@ -29,7 +29,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..extras import install_command
-from .item import FAILED, ImageJob, ImageOutcome
+from .item import FAILED, ImageJob, ImageOutcome, Outcomes
 from .work import process
 
 _POLL_SECONDS = 0.2  # interval of checks for cancellation
@@ -230,9 +230,9 @@ def run_jobs(
     client: Client,
     jobs: Iterator[ImageJob],
     tick: Callable[[], None],
-    task: Callable[[ImageJob], ImageOutcome] = process,
-) -> Iterator[tuple[ImageJob, ImageOutcome]]:
-    """Run every job and yield it with its outcome, in order of completion.
+    task: Callable[[ImageJob], Outcomes] = process,
+) -> Iterator[tuple[ImageJob, Outcomes]]:
+    """Run every job and yield it with its outcomes, in order of completion.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def run_jobs(
 
     Returns
     -------
-    iterator of (ImageJob, ImageOutcome)
+    iterator of (ImageJob, Outcomes)
 
     Raises
     ------
@@ -274,9 +274,9 @@ def run_jobs(
                 future.add_done_callback(completed.put)
                 continue
             job, _ = waiting.pop(future.key)
-            outcome = _outcome(future)
+            outcomes = _outcomes(future, job)
             future.release()
-            yield job, outcome
+            yield job, outcomes
 
 
 class _WorkerMonitor:
@@ -321,19 +321,18 @@ def _completed(completed: "queue.SimpleQueue[Any]") -> Iterator[Any]:
         return
 
 
-def _outcome(future: Any) -> ImageOutcome:
+def _outcomes(future: Any, job: ImageJob) -> Outcomes:
     from dask.distributed import KilledWorker
 
     if future.status == "finished":
-        outcome: ImageOutcome = future.result()
-        return outcome
+        outcomes: Outcomes = future.result()
+        return outcomes
     if future.status != "error":
         raise InputError(_LOST)
     error = future.exception()
     if isinstance(error, KilledWorker):
-        return ImageOutcome(
-            FAILED,
-            "workers crashed while processing it: it may need more memory than they have",
-        )
-    text = re.sub(r"\s+", " ", str(error))
-    return ImageOutcome(FAILED, f"internal error, please report it: {type(error).__name__}: {text}")
+        reason = "workers crashed while processing it: it may need more memory than they have"
+    else:
+        text = re.sub(r"\s+", " ", str(error))
+        reason = f"internal error, please report it: {type(error).__name__}: {text}"
+    return {job.name: ImageOutcome(FAILED, reason)}

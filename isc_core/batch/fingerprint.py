@@ -41,6 +41,7 @@ def fingerprint(job: ImageJob, photo_sha256: str, mask_sha256: str) -> str:
         plan.arrays,
         plan.priors_sha256,
         plan.version,
+        *((job.thing,) if job.thing else ()),
     ]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
@@ -64,9 +65,24 @@ def is_finished(folder: Path, expected: str, arrays: bool) -> bool:
         path = folder / name
         if not path.is_file() or path.stat().st_size == 0:
             return False
+    return recorded_input(folder).get("fingerprint") == expected
+
+
+def recorded_input(folder: Path) -> dict[str, object]:
+    """Return what a result records of its input.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    dict
+        Empty where there is no result.
+    """
     try:
         description = read_json(folder / "decomposition.json")
     except InputError:
-        return False
+        return {}
     recorded = description.get("input") if isinstance(description, dict) else None
-    return isinstance(recorded, dict) and recorded.get("fingerprint") == expected
+    return recorded if isinstance(recorded, dict) else {}

@@ -1,4 +1,4 @@
-"""One image of a batch: its inputs, settings and outcome."""
+"""One image of a batch: its inputs, settings and outcomes."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -23,6 +23,7 @@ _TYPES: dict[str, type] = {
     "shading_only": bool,
     "seed": int,
     "transfer": str,
+    "each": bool,
 }
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
@@ -40,10 +41,13 @@ class ImageRecipe:
     settings : Settings
     transfer : str
         One of `photo.TRANSFERS`.
+    each : bool
+        Whether each of several separate things has a result of its own.
     """
 
     settings: Settings = field(default_factory=Settings)
     transfer: str = "auto"
+    each: bool = False
 
     def changed(self, options: Options) -> "ImageRecipe":
         """Return the recipe with a manifest line's options.
@@ -51,7 +55,7 @@ class ImageRecipe:
         Parameters
         ----------
         options : tuple of (str, value)
-            Names of settings or "transfer", and their values.
+            Names of settings, "transfer" or "each", and their values.
 
         Returns
         -------
@@ -64,11 +68,12 @@ class ImageRecipe:
         """
         given = dict(options)
         transfer = str(given.pop("transfer", self.transfer))
+        each = bool(given.pop("each", self.each))
         if transfer not in TRANSFERS:
             raise InputError(f'unknown transfer "{transfer}": choose {", ".join(TRANSFERS)}')
         settings = replace(self.settings, **given)  # type: ignore[arg-type]
         settings.check()
-        return ImageRecipe(settings, transfer)
+        return ImageRecipe(settings, transfer, each)
 
 
 @dataclass(frozen=True)
@@ -141,6 +146,8 @@ class ImageJob:
         Absolute paths or URLs.
     recipe : ImageRecipe
     plan : RunPlan
+    thing : int
+        Number of the thing, from 1 on, where it is one of several; 0 for the whole photo.
     """
 
     number: int
@@ -149,16 +156,31 @@ class ImageJob:
     mask: str
     recipe: ImageRecipe
     plan: RunPlan
+    thing: int = 0
 
     @property
     def folder(self) -> Path:
         """The result's folder."""
         return self.plan.output / self.name
 
+    def of_thing(self, thing: int) -> "ImageJob":
+        """Return the part of the job that is one thing of the photo.
+
+        Parameters
+        ----------
+        thing : int
+            From 1 on.
+
+        Returns
+        -------
+        ImageJob
+        """
+        return replace(self, name=f"{self.name}/{thing}", thing=thing)
+
 
 @dataclass(frozen=True)
 class ImageOutcome:
-    """The outcome of a job.
+    """The outcome of one result.
 
     Attributes
     ----------
@@ -176,6 +198,10 @@ class ImageOutcome:
     reason: str = ""
     seconds: float = 0.0
     peak_mb: float = 0.0
+
+
+# The outcomes of a job by the names of its results: one, or one for each thing.
+Outcomes = dict[str, ImageOutcome]
 
 
 def parse_options(given: Mapping[str, object], where: str) -> Options:

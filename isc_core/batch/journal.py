@@ -18,7 +18,7 @@ from .run_folder import RunFolder
 
 @dataclass(frozen=True)
 class JournalEntry:
-    """One image's line.
+    """The line of an image, or of one of its things.
 
     Attributes
     ----------
@@ -46,6 +46,11 @@ class JournalEntry:
             "mask": self.mask,
             **asdict(self.outcome),
         }
+
+    def failure(self) -> dict[str, object]:
+        """Return the line of `failures.jsonl` as a JSON-ready dictionary."""
+        row = self.row()
+        return {name: row[name] for name in ("image", "mask", "name", "reason")}
 
     @staticmethod
     def of(row: dict[str, object]) -> "JournalEntry":
@@ -76,40 +81,45 @@ class Journal:
 
     def __init__(self, folder: RunFolder, count: int) -> None:
         self.counts: Counter[str] = Counter()
-        self.total = count
+        self.total = count  # of results, as far as is known
         self._offsets = array("q", [-1]) * count
         self._files = ExitStack()
         self._all = self._files.enter_context(folder.journal.open("w+b"))
         self._failures = self._files.enter_context(folder.failures.open("wb"))
 
-    def add(self, entry: JournalEntry) -> None:
-        """Write an image's line; a failure also goes into `failures.jsonl`.
+    def add(self, *entries: JournalEntry) -> None:
+        """Write an image's lines; failures also go into `failures.jsonl`.
 
         Parameters
         ----------
-        entry : JournalEntry
+        *entries : JournalEntry
+            All of one image: one, or one for each thing.
         """
-        self._offsets[entry.number] = self._all.tell()
-        self._all.write(_line(entry.row()))
+        self._offsets[entries[0].number] = self._all.tell()
+        self._all.write(b"".join(_line(entry.row()) for entry in entries))
         self._all.flush()
-        self.counts[entry.outcome.status] += 1
-        if entry.outcome.status == FAILED:
-            row = {
-                "image": entry.image,
-                "mask": entry.mask,
-                "name": entry.name,
-                "reason": entry.outcome.reason,
-            }
-            self._failures.write(_line(row))
-            self._failures.flush()
+        self.counts.update(entry.outcome.status for entry in entries)
+        self.total += len(entries) - 1
+        for entry in entries:
+            if entry.outcome.status == FAILED:
+                self._failures.write(_line(entry.failure()))
+                self._failures.flush()
 
     def entries(self) -> Iterator[JournalEntry]:
         """Iterate over all entries in input order."""
-        for offset in self._offsets:
+        for number, offset in enumerate(self._offsets):
             if offset >= 0:
                 self._all.seek(offset)
-                yield JournalEntry.of(json.loads(self._all.readline()))
+                yield from self._entries_of(number)
         self._all.seek(0, 2)
+
+    def _entries_of(self, number: int) -> Iterator[JournalEntry]:
+        """Those of an image, which begin here."""
+        while line := self._all.readline():
+            entry = JournalEntry.of(json.loads(line))
+            if entry.number != number:
+                return
+            yield entry
 
     def __enter__(self) -> "Journal":
         return self

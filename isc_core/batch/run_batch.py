@@ -15,7 +15,7 @@ from ..progress import Monitor
 from ..sirfs.priors.prior_file import load_prior_set
 from .engine import Crew, connected, dashboard, require_dask, run_jobs
 from .fetch import is_url, sha256
-from .item import SKIPPED, BatchItem, ImageJob, ImageOutcome, ImageRecipe, RunPlan
+from .item import SKIPPED, BatchItem, ImageJob, ImageOutcome, ImageRecipe, Outcomes, RunPlan
 from .journal import Journal, JournalEntry
 from .names import Names
 from .run_folder import RunFolder
@@ -64,7 +64,7 @@ def run_batch(
     batch: Batch,
     monitor: Monitor | None = None,
     announce: Callable[[str], None] = lambda line: None,
-    task: Callable[[ImageJob], ImageOutcome] = process,
+    task: Callable[[ImageJob], Outcomes] = process,
 ) -> Counter[str]:
     """Decompose every image that has no result yet.
 
@@ -82,7 +82,7 @@ def run_batch(
     Returns
     -------
     Counter
-        Number of images by status.
+        Number of results by status: of images, or of the things of those that have each.
 
     Raises
     ------
@@ -110,16 +110,21 @@ def run_batch(
                 with connected(crew) as client:
                     announce("; ".join([_counted(names.count), *dashboard(client)]))
                     progress = _Progress(journal, monitor)
-                    for job, outcome in run_jobs(
+                    for job, outcomes in run_jobs(
                         client, _jobs(inputs, names, recipe, plan, journal), progress.tick, task
                     ):
-                        journal.add(
-                            JournalEntry(job.number, job.name, job.image, job.mask, outcome)
-                        )
-                        progress.count(outcome)
+                        journal.add(*_entries(job, outcomes))
+                        progress.count(outcomes)
             finally:
                 write_summary(folder, journal)
         return journal.counts
+
+
+def _entries(job: ImageJob, outcomes: Outcomes) -> list[JournalEntry]:
+    return [
+        JournalEntry(job.number, name, job.image, job.mask, outcome)
+        for name, outcome in outcomes.items()
+    ]
 
 
 def _counted(number: int) -> str:
@@ -188,9 +193,9 @@ class _Progress:
         self._journal, self._monitor = journal, monitor
         self._recent: deque[float] = deque([time.monotonic()], maxlen=_RECENT)
 
-    def count(self, outcome: ImageOutcome) -> None:
+    def count(self, outcomes: Outcomes) -> None:
         """Count an image; skipped ones do not enter the estimate of the remaining time."""
-        if outcome.status != SKIPPED:
+        if any(outcome.status != SKIPPED for outcome in outcomes.values()):
             self._recent.append(time.monotonic())
 
     def tick(self) -> None:

@@ -1,7 +1,8 @@
 """The output folder of a batch: its lock, its files, and remains of killed runs.
 
     OUT/NAME/                one result each, complete or absent
-    OUT/thumbnails/NAME.jpg
+    OUT/NAME/1, 2, ...       one result for each thing of a photo
+    OUT/thumbnails/NAME.jpg, thumbnails/each/NAME/1.jpg, ...
     OUT/failures.jsonl       grows during a run
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    written at the end
     OUT/.isc-batch/          lock, owner, run identifier, journal, attempts, fetched files
@@ -22,6 +23,24 @@ from ..errors import InputError
 from ..io.atomic import remove_unfinished_in
 from .names import OWN_FILES
 
+THUMBNAILS, _EACH = "thumbnails", "each"
+
+
+def thumbnail_place(name: str) -> str:
+    """Return the path of a result's thumbnail, from the output folder.
+
+    Parameters
+    ----------
+    name : str
+        Of the result; that of a thing has a "/".
+
+    Returns
+    -------
+    str
+        With "/". Things have a folder apart: a photo's name may end with ".jpg", too.
+    """
+    return "/".join((THUMBNAILS, *((_EACH,) if "/" in name else ()), f"{name}.jpg"))
+
 
 class RunFolder:
     """The paths of an output folder, and operations on it as a whole."""
@@ -37,7 +56,7 @@ class RunFolder:
         self.lock, self.owner = private / "lock", private / "owner"
         self.run, self.journal = private / "run", private / "journal.jsonl"
         self.failures = output / "failures.jsonl"
-        self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
+        self.thumbnails, self.pages = output / THUMBNAILS, output / "summary-pages"
 
     def thumbnail(self, name: str) -> Path:
         """Return the path of a result's thumbnail.
@@ -51,7 +70,32 @@ class RunFolder:
         -------
         Path
         """
-        return self.thumbnails / f"{name}.jpg"
+        return self.output / thumbnail_place(name)
+
+    def attempt(self, name: str) -> Path:
+        """Return the file that is there while a worker is at a result, see `attempts`.
+
+        Parameters
+        ----------
+        name : str
+            Name of the result.
+
+        Returns
+        -------
+        Path
+        """
+        return self.attempts / name.replace("/", " ")  # names have no spaces
+
+    def begin_things(self, name: str) -> None:
+        """Make the folders of a photo with a result for each thing.
+
+        Parameters
+        ----------
+        name : str
+            Of the photo.
+        """
+        for folder in (self.output / name, self.output / THUMBNAILS / _EACH / name):
+            folder.mkdir(parents=True, exist_ok=True)
 
     @contextmanager
     def locked(self, run: str) -> Iterator[None]:
@@ -154,9 +198,16 @@ class RunFolder:
         No other run writes here while the lock is held. Workers of a killed run may still process
         their last image; what they write is locked.
         """
-        for folder in (self.output, self.thumbnails, self.pages):
+        for folder in (self.output, self.thumbnails, self.pages, *self._folders_of_things()):
             remove_unfinished_in(folder)
         shutil.rmtree(self.fetched, ignore_errors=True)
         with contextlib.suppress(FileNotFoundError):
             for entry in os.scandir(self.attempts):
                 Path(entry.path).unlink(missing_ok=True)
+
+    def _folders_of_things(self) -> Iterator[Path]:
+        """Those that `begin_things` makes; found by the thumbnails, since results are many."""
+        with contextlib.suppress(FileNotFoundError):
+            for entry in os.scandir(self.thumbnails / _EACH):
+                yield Path(entry.path)
+                yield self.output / entry.name

@@ -15,9 +15,9 @@ from typing import Any
 
 from ..io.atomic import new_file
 from .journal import Journal, JournalEntry
-from .run_folder import RunFolder
+from .run_folder import RunFolder, thumbnail_place
 
-PAGE = 500  # images
+PAGE = 500  # results
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")
 _COLUMNS = ("number", "name", "image", "mask", "status", "reason", "seconds", "peak_mb")
 
@@ -87,5 +87,6 @@ def _page(
             page=page,
             links=sorted(near) if count > 1 else [],
             base="" if page == 1 else "../",
+            thumbnail=thumbnail_place,
         )
     )

@@ -1,99 +1,69 @@
 """The job of one image, as a worker runs it.
 
 A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
-belong to the process.
+belong to the process. The things of a photo are decomposed one after the other, each an attempt of
+its own, so that one that fails, hangs or kills its worker does not take the others along.
 """
 
-import contextlib
-import gc
+import shutil
 import threading
-import time
-from collections.abc import Callable
-from dataclasses import replace
-from functools import lru_cache
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path, PurePath
 
-from .. import __version__
 from ..decomposition.pipeline import decompose
-from ..errors import Cancelled, InputError
-from ..io.memory import memory_message
-from ..masking.finder import MaskSearch
-from ..photo import read_photo
+from ..errors import InputError
+from ..masking.finder import MaskSearch, read_each
+from ..photo import Photo, read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
-from ..result_files.result_folder import require_room, save
+from ..result_files.result_folder import require_room, require_writable_result, save
 from ..sirfs.priors.prior_file import load_prior_set
 from ..sirfs.priors.prior_set import PriorSet
-from .attempts import attempt
 from .fetch import is_url, local_copy, sha256
-from .fingerprint import fingerprint, is_finished
-from .item import DONE, FAILED, SKIPPED, ImageJob, ImageOutcome
+from .fingerprint import fingerprint, is_finished, recorded_input
+from .item import DONE, FAILED, SKIPPED, ImageJob, Outcomes
+from .outcome import Work, outcome_of
 from .run_folder import RunFolder
 
-_CHECK_SECONDS = 2.0
+_THINGS = "things"  # in `input` of decomposition.json: how many the photo has
 _process_lock = threading.Lock()
 
-Work = Callable[[ImageJob, Monitor], str]
+
+@dataclass(frozen=True)
+class _Files:
+    """Local files of a job, and their checksums; "" for no mask."""
+
+    photo: Path
+    mask: Path | None
+    photo_sha256: str
+    mask_sha256: str
+
+    @property
+    def sums(self) -> tuple[str, str]:
+        return self.photo_sha256, self.mask_sha256
 
 
-def process(job: ImageJob, work: "Work | None" = None) -> ImageOutcome:
-    """Decompose the job's image unless its result exists.
-
-    A problem of the image is an outcome; a bug of the program raises.
+def process(job: ImageJob, work: Work | None = None) -> Outcomes:
+    """Decompose the job's image, or each of its things, unless the results exist.
 
     Parameters
     ----------
     job : ImageJob
     work : callable, optional
-        What to do; `decompose_into` by default. Returns the status.
+        What to do instead. Returns the status.
 
     Returns
     -------
-    ImageOutcome
+    Outcomes
+        Those of a photo whose things cannot be told are its own.
     """
     with _process_lock:
-        start = time.perf_counter()
-        _reset_peak()
-        status, reason = _run(job, work or decompose_into)
-        # Meshes have reference cycles: without this they stay for a hundred images, 3 MB each.
-        gc.collect(1)
-        return ImageOutcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
-
-
-def _run(job: ImageJob, work: Work) -> tuple[str, str]:
-    plan = job.plan
-    try:
-        if plan.version != __version__:
-            raise InputError(
-                f"this worker has ISC {__version__}, the run {plan.version}: install the same "
-                "version everywhere"
-            )
-        folder = RunFolder(plan.output)
-        folder.require_run(plan.run)
-        with attempt(folder.attempts / job.name, plan.run, plan.timeout) as monitor:
-            return work(job, _cancelled_with_run(monitor, folder, plan.run)), ""
-    except Cancelled as stopped:
-        return FAILED, f"exceeded --timeout {plan.timeout:g} s, in the stage: {stopped}"
-    except InputError as error:
-        return FAILED, str(error)
-    except MemoryError as error:
-        remedy = "use a smaller image, a smaller --max-size or fewer workers"
-        return FAILED, memory_message(error, remedy)
-    except OSError as error:
-        return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
-
-
-def _cancelled_with_run(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
-    """Cancel also when the run has ended: on a cluster, nothing else stops its workers."""
-    checked, expected = time.monotonic(), True
-
-    def cancelled() -> bool:
-        nonlocal checked, expected
-        if (now := time.monotonic()) - checked > _CHECK_SECONDS:
-            checked, expected = now, folder.runs(run)
-        return not expected or monitor.cancelled()
-
-    return Monitor(cancelled=cancelled)
+        if job.recipe.each and work is None:
+            return _process_each(job)
+        return {job.name: outcome_of(job, work or decompose_into)}
 
 
 def decompose_into(job: ImageJob, monitor: Monitor) -> str:
@@ -109,38 +79,126 @@ def decompose_into(job: ImageJob, monitor: Monitor) -> str:
     str
         "done" or "skipped".
     """
-    plan, fetched = job.plan, RunFolder(job.plan.output).fetched
-    with contextlib.ExitStack() as stack:
-        photo = stack.enter_context(local_copy(job.image, plan.limits, fetched))
-        mask = stack.enter_context(local_copy(job.mask, plan.limits, fetched)) if job.mask else None
-        sums = sha256(photo), "" if mask is None else sha256(mask)
-        expected = fingerprint(job, *sums)
-        if is_finished(job.folder, expected, plan.arrays):
-            _draw_thumbnail(job, redraw=False)
+    with _fetched(job) as files:
+        if _is_done(job, files):
             return SKIPPED
         monitor.report("reading", 0.0)
-        try:
-            _decompose(job, photo, mask, sums, expected, monitor)
-        except InputError as error:
-            # Replace the name of the temporary copy by the location.
-            raise InputError(
-                _renamed(str(error), ((photo, job.image), (mask, job.mask)))
-            ) from error
-    _draw_thumbnail(job, redraw=True)
+        recipe, limits = job.recipe, job.plan.limits
+        with _locations_named(job, files):
+            photo = read_photo(
+                files.photo, files.mask, recipe.transfer, limits=limits, finder=MaskSearch()
+            )
+            _decompose(job, photo, files, {}, monitor)
     return DONE
 
 
+def _process_each(job: ImageJob) -> Outcomes:
+    with ExitStack() as stack:
+        things: list[tuple[_Files, Photo | None]] = []
+        outcome = outcome_of(job, lambda job, monitor: _find(job, monitor, stack, things))
+        if outcome.status == FAILED:
+            return {job.name: outcome}
+        RunFolder(job.plan.output).begin_things(job.name)
+        parts = [job.of_thing(number) for number in range(1, len(things) + 1)]
+        outcomes = {
+            part.name: outcome_of(
+                part, partial(_decompose_thing, files=files, photo=photo, things=len(things))
+            )
+            for part, (files, photo) in zip(parts, things, strict=True)
+        }
+    _remove_further(job, len(things))
+    return outcomes
+
+
+def _find(
+    job: ImageJob, monitor: Monitor, stack: ExitStack, things: list[tuple[_Files, Photo | None]]
+) -> str:
+    """Add the things of a photo; they are not looked for where all results exist."""
+    if recorded_input(job.folder):
+        raise InputError(
+            f"{job.folder} is the result of the whole photo: move it away, or leave out --each"
+        )
+    files = stack.enter_context(_fetched(job))
+    if count := _finished_things(job, files):
+        things += [(files, None)] * count
+        return SKIPPED
+    monitor.report("reading", 0.0)
+    with _locations_named(job, files):
+        photos = read_each(files.photo, files.mask, job.recipe.transfer, job.plan.limits)
+    things += [(files, photo) for photo in photos]
+    return DONE
+
+
+def _finished_things(job: ImageJob, files: _Files) -> int:
+    """How many things the photo has; 0 where the result of one is missing."""
+    count = recorded_input(job.of_thing(1).folder).get(_THINGS)
+    if not isinstance(count, int):
+        return 0
+    parts = [job.of_thing(number) for number in range(1, count + 1)]
+    finished = (
+        is_finished(part.folder, fingerprint(part, *files.sums), part.plan.arrays) for part in parts
+    )
+    return count if all(finished) else 0
+
+
+def _decompose_thing(
+    job: ImageJob, monitor: Monitor, files: _Files, photo: Photo | None, things: int
+) -> str:
+    if photo is None or _is_done(job, files):
+        _draw_thumbnail(job, redraw=False)
+        return SKIPPED
+    with _locations_named(job, files):
+        _decompose(job, photo, files, {"thing": job.thing, _THINGS: things}, monitor)
+    return DONE
+
+
+def _remove_further(job: ImageJob, count: int) -> None:
+    """Remove results of more things, which an earlier run found."""
+    number = count + 1
+    while recorded_input(folder := job.of_thing(number).folder).get(_THINGS):
+        require_writable_result(folder)  # nothing but a result
+        shutil.rmtree(folder)
+        RunFolder(job.plan.output).thumbnail(job.of_thing(number).name).unlink(missing_ok=True)
+        number += 1
+
+
+@contextmanager
+def _fetched(job: ImageJob) -> Iterator[_Files]:
+    plan, fetched = job.plan, RunFolder(job.plan.output).fetched
+    with (
+        local_copy(job.image, plan.limits, fetched) as photo,
+        local_copy(job.mask, plan.limits, fetched) if job.mask else nullcontext() as mask,
+    ):
+        yield _Files(photo, mask, sha256(photo), "" if mask is None else sha256(mask))
+
+
+@contextmanager
+def _locations_named(job: ImageJob, files: _Files) -> Iterator[None]:
+    """Errors name the location of an input, not its temporary copy."""
+    try:
+        yield
+    except InputError as error:
+        message = str(error)
+        for copy, location in ((files.photo, job.image), (files.mask, job.mask)):
+            if copy is not None and is_url(location):
+                message = message.replace(str(copy), location)
+        raise InputError(message) from error
+
+
+def _is_done(job: ImageJob, files: _Files) -> bool:
+    done = is_finished(job.folder, fingerprint(job, *files.sums), job.plan.arrays)
+    if done:
+        _draw_thumbnail(job, redraw=False)
+    return done
+
+
 def _decompose(
-    job: ImageJob,
-    path: Path,
-    mask: Path | None,
-    sums: tuple[str, str],
-    expected: str,
-    monitor: Monitor,
+    job: ImageJob, photo: Photo, files: _Files, more: dict[str, object], monitor: Monitor
 ) -> None:
-    plan, recipe = job.plan, job.recipe
-    photo = read_photo(path, mask, recipe.transfer, limits=plan.limits, finder=MaskSearch())
-    if photo.original.sha256 != sums[0] or (mask is not None and sha256(mask) != sums[1]):
+    plan, recipe, mask = job.plan, job.recipe, files.mask
+    if photo.original.sha256 != files.photo_sha256 or (
+        mask is not None and sha256(mask) != files.mask_sha256
+    ):
         raise InputError(f"{job.image} changed while it was read: run again when it is complete")
     require_room(job.folder, 0, arrays=plan.arrays)
     priors = _priors(plan.priors, plan.priors_sha256) if plan.priors else None
@@ -148,17 +206,16 @@ def _decompose(
     result = decompose(
         photo, recipe.settings, prior_set=priors, name=name, monitor=monitor.part(0.0, 0.8)
     )
-    source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": expected}
+    source = {
+        **result.provenance.input,
+        "mask_sha256": files.mask_sha256 or None,
+        "fingerprint": fingerprint(job, *files.sums),
+        **more,
+    }
     result = replace(result, provenance=replace(result.provenance, input=source))
     writing = monitor.part(0.8, 1.0)
     save(result, job.folder, arrays=plan.arrays, cover=photo.cover, monitor=writing)
-
-
-def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:
-    for copy, location in copies:
-        if copy is not None and is_url(location):
-            message = message.replace(str(copy), location)
-    return message
+    _draw_thumbnail(job, redraw=True)
 
 
 @lru_cache(maxsize=2)
@@ -175,21 +232,3 @@ def _draw_thumbnail(job: ImageJob, *, redraw: bool) -> None:
     target = RunFolder(job.plan.output).thumbnail(job.name)
     if redraw or not target.is_file():
         thumbnail(job.folder / "preview.png", target)
-
-
-# --- peak memory ----------------------------------------------------------------------------------
-
-
-def _reset_peak() -> None:
-    """Reset the peak memory of the process (Linux only; elsewhere without effect)."""
-    with contextlib.suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
-
-
-def _peak_mb() -> float:
-    """Peak memory since the reset, in MB; 0 if the system does not report it."""
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/self/status").read_text().splitlines():
-            if line.startswith("VmHWM:"):
-                return round(int(line.split()[1]) / 1024, 1)
-    return 0.0

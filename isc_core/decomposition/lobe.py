@@ -12,6 +12,7 @@ import numpy as np
 
 from ..lobe_fitting import PixelData, RecoveredScene, fit_lobe
 from ..lobe_fitting.observed import channel_means
+from ..photo.photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import LobeDiagnostics, LobeStatus
@@ -106,21 +107,26 @@ def fit_specular(
     if none_separated or not task.options.fit_lobe:
         return FittedLobe(None)
     with task.clock.stage("fit lobe"):
+        clipped = float(photo.clipped[photo.mask].mean())
+        if not _shines(split.specular, photo):
+            none = LobeFitOutcome.NO_SPECULAR
+            return FittedLobe(LobeFit.without_lobe(model, none, photo.image.shape), clipped)
         normal, shading = shaded(shape.height, shape.light, photo.mask)
-        white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
-        options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True)
-        # Without specular light nothing is fitted: what the fit relies on need not be known.
-        shines = float(channel_means(split.specular, photo.mask).max()) > options.darkest
         fit = fit_lobe(
             split.specular,
             normal,
             photo.mask,
-            options=options,
+            options=LobeFitOptions(model, thresholded=True),
             pixels=PixelData(clipped=photo.clipped, height=shape.height),
-            recovered=_recovered(shading, task) if shines else None,
+            recovered=_recovered(shading, task),
             monitor=monitor,
         )
-        return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
+        return FittedLobe(fit, clipped)
+
+
+def _shines(specular: np.ndarray, photo: Photo) -> bool:
+    white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
+    return float(channel_means(specular, photo.mask).max()) > _NOTHING * white
 
 
 def _recovered(shading: np.ndarray, task: DecompositionTask) -> RecoveredScene | None:

@@ -41,6 +41,7 @@ from .smooth_light import smooth_loss
 from .starts import bright_half_vectors, light_of_half_vector
 from .uncertainty import covariance, naive_variance
 
+_NOTHING = 1e-6  # radiance: no highlight
 _START_ALPHAS = (0.06, 0.2, 0.45)
 _FEW_STEPS = 7
 _PIXELS_UNDER_MAP = 600  # each reads the whole environment map
@@ -110,7 +111,7 @@ def fit_lobe(
     observed = observe(specular, normal, mask, pixels, silhouette_normals)
     fixed = _direction(light)
     monitor.report("fitting the gloss", 0.0)
-    if observed.peak <= options.darkest:
+    if observed.peak <= _NOTHING:
         return LobeFit.without_lobe(
             options.model, LobeFitOutcome.NO_SPECULAR, observed.specular.shape
         )

@@ -11,7 +11,9 @@ is told with certainty, 0 where all are even odds. w is fitted
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines", 1999.
 
-Limits: fitted to photos without hints.
+Limits: fitted to photos without hints. With hints, the looks have seen them, and the probability is
+multiplied by the share of points that the mask obeys; docs/methods/automatic_mask.md tells what it
+is then worth.
 """
 
 import math
@@ -23,6 +25,7 @@ from .frames import PartPrediction
 
 _UNSURE = 1e-3
 _LEAST = 1e-6
+_OVERLAP = 3  # place of the overlap's log odds
 
 
 def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarray) -> np.ndarray:
@@ -40,17 +43,35 @@ def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarra
     (SURENESS,) ndarray
         1, and log odds.
     """
-    smaller, larger = (
-        float(join(before, second.cover).sum(dtype=float)) for join in (np.minimum, np.maximum)
-    )
     shares = [
         float(first.counts[Count.ONE]),
         float(second.counts[Count.ONE]),
-        smaller / max(larger, _LEAST),
+        _overlap(before, second.cover),
         _firmness(first.cover),
         _firmness(second.cover),
     ]
     return _log_odds(np.array(shares))
+
+
+def of_another_mask(evidence: np.ndarray, looked: np.ndarray, taken: np.ndarray) -> np.ndarray:
+    """Return the evidence of a mask that was taken in place of the network's.
+
+    Parameters
+    ----------
+    evidence : (SURENESS,) ndarray
+        As `evidence_of`.
+    looked, taken : (H, W) ndarray
+        Covers: the network's, and that of the mask.
+
+    Returns
+    -------
+    (SURENESS,) ndarray
+        The overlap is that of both, where it is less than that of the looks.
+    """
+    overlap = _log_odds(np.array([_overlap(looked, taken)]))[1]
+    changed = evidence.copy()
+    changed[_OVERLAP] = min(changed[_OVERLAP], overlap)
+    return changed
 
 
 def no_evidence(first: PartPrediction) -> np.ndarray:
@@ -83,6 +104,13 @@ def sureness_of(evidence: np.ndarray, weights: np.ndarray) -> float:
     float
     """
     return 1 / (1 + math.exp(-float((weights * evidence).sum())))
+
+
+def _overlap(one: np.ndarray, other: np.ndarray) -> float:
+    smaller, larger = (
+        float(join(one, other).sum(dtype=float)) for join in (np.minimum, np.maximum)
+    )
+    return smaller / max(larger, _LEAST)
 
 
 def _firmness(cover: np.ndarray) -> float:

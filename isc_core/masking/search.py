@@ -25,7 +25,7 @@ from ..networks.mask_network import Count, MaskNetwork
 from ..photo.found_mask import FoundMask
 from ..photo.grabcut import Box, grabcut
 from ..photo.masks import tidy_mask
-from .evidence import evidence_of, no_evidence, sureness_of
+from .evidence import evidence_of, no_evidence, of_another_mask, sureness_of
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
 from .refinement import refined
@@ -62,8 +62,19 @@ def find_mask(
     whole = predict_part(small, _all_of(small), given, network)
     found = _at_size(_second_look(small, whole, given, network), light.shape)
     if hints.box is None or hints.points or _fills(found.mask, hints.box):
-        return found
-    return replace(found, cover=grabcut(light, hints.box).astype(np.float32))
+        return replace(found, sureness=found.sureness * _obeyed(found.mask, hints))
+    cover = grabcut(light, hints.box).astype(np.float32)
+    weights = (network or MaskNetwork.shipped()).sureness
+    evidence = of_another_mask(found.evidence, found.cover, cover)
+    sureness = sureness_of(evidence, weights)
+    return replace(found, cover=cover, evidence=evidence, sureness=sureness)
+
+
+def _obeyed(mask: np.ndarray, hints: Hints) -> float:
+    """The share of points that a mask holds or leaves out as it should; a right one does of all."""
+    told = [bool(mask[y, x]) for x, y in hints.points]
+    told += [not mask[y, x] for x, y in hints.others]
+    return sum(told) / len(told) if told else 1.0
 
 
 def _fills(mask: np.ndarray, box: Box) -> bool:

@@ -17,7 +17,7 @@ class FoundMask:
     cover : (H, W) float32 ndarray
         Share of each pixel that the thing covers.
     sureness : float
-        Probability that this is the one thing meant, 0 to 1; not calibrated with hints.
+        Probability, 0 to 1, that the mask overlaps the one thing meant by half or more.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several things.
     evidence : (N,) ndarray

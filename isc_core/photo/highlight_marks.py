@@ -5,8 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_diagonal
 
 Place = tuple[float, float]
+_REACH = 0.02  # of the object's diagonal
+_LEAST_REACH = 2.0  # pixels
 
 
 @dataclass(frozen=True)
@@ -65,3 +68,18 @@ class HighlightMarks:
                     f"the mark {column},{row} lies outside of the object: mark a pixel of it, "
                     "counted from 0 at the top left"
                 )
+
+
+def mark_reach(mask: np.ndarray) -> float:
+    """Return how far from a mark the highlight may lie that it means, in pixels.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        The object; not empty.
+
+    Returns
+    -------
+    float
+    """
+    return max(_LEAST_REACH, _REACH * mask_diagonal(mask))

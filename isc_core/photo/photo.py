@@ -37,7 +37,7 @@ class PhotoSource:
     cropped : bool
         The metadata give a focal length, but of a frame of another shape: it does not hold.
     sureness : float or None
-        Of a mask that was found automatically.
+        Of a mask that was found automatically or by hints, see `FoundMask`.
     """
 
     sha256: str

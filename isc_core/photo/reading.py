@@ -175,7 +175,7 @@ def _photo(
             "" if raster.space is None else raster.space.name,
             tuple(_notes(raster, used, linear, mask)),
             cropped,
-            None if found is None or mask_from == "hints" else found.sureness,
+            None if found is None else found.sureness,
         ),
         found=found,
         cover=cover,

@@ -47,8 +47,6 @@ class LobeFitOptions:
         Deviation of the specular light as a share of its peak, in (0, 1).
     relative : float
         Deviation as a share of the light itself, in [0, 1).
-    darkest : float
-        Radiance >= 0 up to which nothing is a highlight.
     thresholded : bool
         The specular image is a separator's, which shows only light above an unknown level.
 
@@ -64,7 +62,6 @@ class LobeFitOptions:
     normal_error: float = 0.0
     floor: float = 0.02
     relative: float = 0.1
-    darkest: float = 1e-6
     thresholded: bool = False
 
     def __post_init__(self) -> None:
@@ -72,15 +69,9 @@ class LobeFitOptions:
             raise InputError(f"unknown lobe {self.model!r}: choose {', '.join(CONVENTION)}")
         if not 1 <= self.most_lights <= 3 or self.most_pixels < 100:
             raise InputError("most_lights has to be 1 to 3 and most_pixels at least 100")
-        if not (
-            0 <= self.normal_error < 90
-            and 0 < self.floor < 1
-            and 0 <= self.relative < 1
-            and self.darkest >= 0
-        ):
+        if not (0 <= self.normal_error < 90 and 0 < self.floor < 1 and 0 <= self.relative < 1):
             raise InputError(
-                "normal_error has to be within [0, 90), floor within (0, 1), relative within "
-                "[0, 1), darkest 0 or more"
+                "normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1)"
             )
 
 

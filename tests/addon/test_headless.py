@@ -147,6 +147,20 @@ def test_a_folder_becomes_one_file_with_several_scenes_or_several_files(
 
 
 @pytest.mark.slow
+def test_each_thing_of_a_photo_becomes_an_object_of_one_scene(tmp_path: Path) -> None:
+    single = cv2.imread(str(photo(tmp_path)), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(tmp_path / "pair.png"), np.concatenate([single, single], axis=1))
+    blend, kept = tmp_path / "pair.blend", tmp_path / "kept"
+    words = ["--each", "--model", "retinex", "--max-size", "64", "--threads", "1"]
+    done = run(tmp_path / "pair.png", "-o", blend, "--results", kept, *words)
+    assert done.returncode == 0, done.stdout + done.stderr
+    scenes, active, loose = scenes_of(blend)
+    assert scenes == {"pair": ["CYCLES", 64, 128, 3]}, "two objects and one camera"
+    assert (active, loose) == ("pair", [])
+    assert sorted(path.name for path in (kept / "pair").iterdir()) == ["1", "2"]
+
+
+@pytest.mark.slow
 def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree(
     tmp_path: Path,
 ) -> None:
@@ -215,9 +229,13 @@ def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
     [
         (["none.png", "-o", "x.blend"], "none.png: no such photo or folder"),
         (["RESULT"], "no output: give"),
-        (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
-        (["RESULT", "-o", "x.blend", "--triangles", "-4"], "--triangles must be 0 or more"),
-        (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
+        (
+            ["RESULT", "-o", "x.blend", "--samples", "0"],
+            "argument --samples: '0' is not a whole number, 1 or",
+        ),
+        (["RESULT", "-o", "x.blend", "--triangles", "-4"], "'-4' is not a whole number, 0 or more"),
+        (["RESULT", "-o", "x.blend", "--size", "nan"], "'nan' is not a number other than 0"),
+        (["RESULT", "-o", "x.blend", "--texture-size", "0"], "'0' is not photo, maps or a number"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
         (
             ["RESULT", "--render", "x.jpg"],

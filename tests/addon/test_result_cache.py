@@ -104,7 +104,7 @@ def test_a_second_run_starts_no_worker(
 
     outputs = [run(n, MethodSettings(samples=n)) for n in range(2)]
     assert len(jobs) == 1, "how it is rendered does not count"
-    assert all(output.prepared is not None for output in outputs)
+    assert all(output.prepared for output in outputs)
     assert outputs[1].path == (tmp_path / "1" / "result" if keep else outputs[0].path)
     assert not keep or (outputs[1].path / "decomposition.json").is_file()
     run(2, MethodSettings(separator="none"))

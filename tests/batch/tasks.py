@@ -8,7 +8,7 @@ import signal
 import time
 from pathlib import Path
 
-from isc_core.batch.item import DONE, ImageJob, ImageOutcome
+from isc_core.batch.item import DONE, ImageJob, Outcomes
 from isc_core.batch.work import process
 from isc_core.progress import Monitor
 
@@ -43,6 +43,6 @@ def _first_time(job: ImageJob) -> bool:
     return first
 
 
-def obedient(job: ImageJob) -> ImageOutcome:
+def obedient(job: ImageJob) -> Outcomes:
     """The task of a run whose images say what happens."""
     return process(job, obey)

@@ -69,7 +69,7 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     assert "Traceback" not in told
     done = run_isc(*words)
     assert done.returncode == 1, done.stderr
-    assert "1 of 4 images failed" in done.stderr
+    assert "1 of 4 results failed" in done.stderr
     assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
 
 
@@ -109,7 +109,7 @@ def test_a_worker_that_is_lost_while_it_starts_is_started_again(
             ]
     starting[0].kill()
     printed, told = run.communicate(timeout=300)
-    assert "1 image done" in printed, told
+    assert "1 result done" in printed, told
     assert (tmp_path / "out" / "one" / "mesh.glb").is_file()
 
 

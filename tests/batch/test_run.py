@@ -18,7 +18,7 @@ from isc_core.batch import engine
 from isc_core.batch import run_batch as run_module
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageJob, ImageRecipe
-from isc_core.batch.journal import Journal
+from isc_core.batch.journal import Journal, JournalEntry
 from isc_core.batch.run_batch import run_batch
 from isc_core.batch.summary import PAGE
 from isc_core.decomposition.pipeline import decompose
@@ -77,7 +77,7 @@ def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
     with (made / "summary.csv").open(newline="") as file:
         assert [row["name"] for row in csv.DictReader(file)] == ["bad", "one", "three", "two"]
     page = (made / "summary.html").read_text()
-    assert "4 images: 3 done, 0 skipped, 1 failed" in page
+    assert "4 results: 3 done, 0 skipped, 1 failed" in page
     for name in ("one", "two", "three"):
         assert f'src="thumbnails/{name}.jpg"' in page
         assert (made / "thumbnails" / f"{name}.jpg").read_bytes().startswith(b"\xff\xd8")
@@ -320,8 +320,8 @@ def test_a_stream_is_worked_off_in_a_window(
             next(taken)
 
     class Counted(Journal):
-        def add(self, entry: object) -> None:
-            super().add(entry)
+        def add(self, *entries: JournalEntry) -> None:
+            super().add(*entries)
             next(ended)
             ahead.append(int(repr(taken)[6:-1]) - int(repr(ended)[6:-1]))
 

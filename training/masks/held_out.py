@@ -75,14 +75,25 @@ def held_out_ingredients(
     kept = [one.radiance for one in read_crops(panoramas, seed) if one.judged][half::2]
     grounds = [background(kept, found.atlas, rng, SIDE) for _ in range(_BACKGROUNDS)]
     if photos is not None:
-        pictures = [_picture(path) for path in sorted(photos.glob("*.png"))]
+        pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
     else:
         found.views[Split.BODY][:] = found.views[Split.BODY][half::2]
         pictures = list(lit_bodies(found, Split.BODY, found.judged, 1, rng, _PICTURE))
     return Ingredients(np.stack(pictures), np.stack(grounds))
 
 
-def _picture(path: Path) -> np.ndarray:
+def masked_picture(path: Path) -> np.ndarray:
+    """Read a masked photo as a body of composites.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    (4, 256, 256) uint8 ndarray
+        As of `Ingredients.bodies`.
+    """
     photo = read_photo(path)
     light = torch.from_numpy(photo.image).permute(2, 0, 1)[None]
     return next(cut_out(light, torch.from_numpy(photo.mask)[None, None].float(), _PICTURE))

@@ -10,6 +10,7 @@ from ...batch.run_batch import Batch, run_batch
 from ...decomposition.settings import Settings
 from ...errors import Rejected
 from ...progress import Monitor
+from ..interface.mask_options import add_each
 from ..interface.options import (
     add_engine,
     add_limits,
@@ -26,6 +27,7 @@ from ..interface.values import count, positive
 
 _EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
+  isc batch shelves --each -o results      each thing of each photo: results/shelf/1, /2, ...
   isc batch list.csv -o results --workers 4 --memory 4GB
   isc batch list.jsonl -o /net/results --scheduler tcp://node7:8786
 
@@ -65,6 +67,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="a folder with the masks of all photos: cup.png or cup_mask.png for cup.jpg",
     )
+    add_each(main, "DIR/PHOTO/1, DIR/PHOTO/2 and so on, from left to right")
     add_main_settings(main)
     main.add_argument(
         "--timeout",
@@ -122,8 +125,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         If images failed.
     """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
+    recipe = ImageRecipe(settings, options.transfer, options.each)
     batch = Batch(
-        options.inputs, options.output, options.masks, ImageRecipe(settings, options.transfer),
+        options.inputs, options.output, options.masks, recipe,
         Crew(options.workers, options.threads, options.memory, options.scheduler),
         limits_of(options), options.timeout, options.arrays, options.priors,
     )  # fmt: skip
@@ -136,11 +140,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     where = f"see {options.output / 'summary.html'}"
     if counts[FAILED]:
         raise Rejected(
-            f"{counts[FAILED]} of {sum(counts.values())} images failed (reasons in "
+            f"{counts[FAILED]} of {sum(counts.values())} results failed (reasons in "
             f"failures.jsonl): {where}"
         )
     done, skipped = counts[DONE], counts[SKIPPED]
     return hints(
         options,
-        f"{done} image{'s' * (done != 1)} done, {skipped} already finished: {where}",
+        f"{done} result{'s' * (done != 1)} done, {skipped} already finished: {where}",
     )

@@ -25,7 +25,7 @@ from ...scene.decomposition import Decomposition
 from ..interface.options import add_limits, add_triangles, limits_of
 from ..interface.parser import describe, hints
 from ..interface.result_photo import photo_of_result
-from ..interface.values import count, share
+from ..interface.values import MAPS_SIZE, share, texture_size
 
 _EXAMPLES = """  isc export cup --textures unreal -o cup_textures
   isc export cup --textures generic --name mug -o mug_textures
@@ -96,10 +96,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     fine.add_argument(
         "--texture-size",
-        type=count,
-        default=0,
-        metavar="N",
-        help="longest side in pixels at most (default 0: the photo's)",
+        type=texture_size,
+        metavar="photo|maps|N",
+        help="longest side, the photo's, that of the maps, or N pixels at most (default photo)",
     )
     add_limits(fine)
 
@@ -123,7 +122,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         If the result cannot be read, or the output cannot be written.
     """
     output: Path = options.output
-    if options.photo is None and (options.mask is not None or options.texture_size):
+    if options.photo is None and (options.mask, options.texture_size) != (None, None):
         raise InputError("--mask and --texture-size need --photo: give it too")
     if options.textures is not None and options.back != Back.OPEN:
         raise InputError("--back is that of a mesh: use it with --format")
@@ -137,12 +136,12 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.textures is not None:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
-    fine = None if options.photo is None else _fine_texture(d, options)
     cover = object_cover(d, read_cover(options.result / MASK))
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
     # Textures are those of the plane of the photo, whose mesh has a vertex at its pixels.
     built = mesh_of(d, how, None if options.format is None else cover)
-    built = replace(built, texture=fine)
+    if options.photo is not None and options.texture_size != MAPS_SIZE:
+        built = replace(built, texture=_fine_texture(d, options))
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
         built = replace(built, gloss=replace(built.gloss, **given))
@@ -170,7 +169,7 @@ def _fine_texture(d: Decomposition, options: argparse.Namespace) -> np.ndarray |
     )
     if photo.original.sha256 != d.provenance.input.get("sha256"):
         raise InputError(f"{options.photo} is not the photo of {options.result}: give that one")
-    return full_texture(photo, d, options.texture_size)
+    return full_texture(photo, d, options.texture_size or 0)
 
 
 def _name_of(d: Decomposition, folder: Path) -> str:

@@ -19,7 +19,6 @@ from ..interface.standard_input import photo_file
 _SOURCES = {
     "alpha": "from the alpha channel",
     "black border": "all that is not black",
-    "hints": "as marked",
     "each": "one of several things",
     "file": "part of a mask",
 }

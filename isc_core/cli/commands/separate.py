@@ -16,7 +16,7 @@ from ...result_files.result_folder import require_writable_result, save_separati
 from ...scene.decomposition import Separation
 from ...separation import BEST, IMPROVED, METHODS, separate
 from ...separation.option_text import parse_changes
-from ..interface.mask_options import add_hints, hints_of
+from ..interface.mask_options import add_hints, hints_of, how_found
 from ..interface.options import (
     add_limits,
     add_mask,
@@ -159,11 +159,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Iterator[str]:
     """Notes on the result."""
-    if photo.original.mask_from == "automatic":
-        yield (
-            f"the mask was found automatically ({photo.original.sureness:.0%} sure), see mask.png "
-            "in the result; --whole processes the whole photo"
-        )
+    if found := how_found(photo):
+        yield f"{found}, see mask.png in the result; --whole processes the whole photo"
     if photo.original.mask_from == "whole frame":
         yield "no mask: the whole image was processed; set one with --mask"
     if options.method != "none" and not layers.specular[~photo.clipped].any():

@@ -5,12 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...photo.highlight_marks import HighlightMarks, Place
+from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
 from ...photo.photo import Photo
 from ...scene.decomposition import Decomposition
-from .values import pixel
-
-_NEAR = 0.02  # of the frame's longer side
+from .options import add_pixels
 
 
 def add_highlight_marks(group: argparse._ArgumentGroup) -> None:
@@ -21,19 +19,12 @@ def add_highlight_marks(group: argparse._ArgumentGroup) -> None:
     group : argparse._ArgumentGroup
         Changed in place.
     """
-    for option, name, what in (
-        ("--highlight", "highlights", "of a highlight, which is then taken off"),
-        ("--not-highlight", "paint", "of what is no highlight, though it looks like one"),
-    ):
-        group.add_argument(
-            option,
-            type=pixel,
-            action="append",
-            default=[],
-            dest=name,
-            metavar="x,y",
-            help=f"a pixel {what}; from the top left, can be repeated; for --model joint",
-        )
+    add_pixels(
+        group, "--highlight", "highlights", "a highlight, which is taken off (--model joint)"
+    )
+    add_pixels(
+        group, "--not-highlight", "paint", "what only looks like a highlight (--model joint)"
+    )
 
 
 def marks_of(options: argparse.Namespace) -> HighlightMarks:
@@ -84,15 +75,15 @@ def mark_notes(photo: Photo, result: Decomposition) -> list[str]:
     list of str
     """
     scale = result.mask.shape[1] / photo.mask.shape[1]
+    reach = mark_reach(result.mask)
     return [
         f"no light was taken off at {int(x)},{int(y)}: neither colour nor form tells a highlight "
         "from the paint there"
         for x, y in photo.marks.highlights
-        if not _near(result.specular, (scale * x, scale * y)).any()
+        if not _shines_near(result.specular, (scale * x, scale * y), reach)
     ]
 
 
-def _near(layer: np.ndarray, place: Place) -> np.ndarray:
-    reach = max(2, int(_NEAR * max(layer.shape[:2])))
-    column, row = map(int, place)
-    return layer[max(0, row - reach) : row + reach + 1, max(0, column - reach) : column + reach + 1]
+def _shines_near(specular: np.ndarray, place: Place, reach: float) -> bool:
+    rows, columns = np.nonzero(specular.any(axis=2))
+    return bool((np.hypot(columns + 0.5 - place[0], rows + 0.5 - place[1]) <= reach).any())

@@ -7,7 +7,7 @@ from ...masking.hints import Hints
 from ...masking.search import separate_parts
 from ...photo.grabcut import Box
 from ...photo.photo import Photo
-from .values import pixel
+from .options import add_pixels
 
 Group = argparse._ArgumentGroup
 
@@ -26,19 +26,8 @@ def add_hints(group: Group | argparse.ArgumentParser) -> None:
         metavar="x,y,w,h",
         help="left, top, width and height in pixels around the object, with some background",
     )
-    for option, name, place in (
-        ("--point", "points", "the object"),
-        ("--not", "others", "the background"),
-    ):
-        group.add_argument(
-            option,
-            type=pixel,
-            action="append",
-            default=[],
-            dest=name,
-            metavar="x,y",
-            help=f"a pixel of {place}, from the top left; can be repeated",
-        )
+    add_pixels(group, "--point", "points", "the object")
+    add_pixels(group, "--not", "others", "the background")
 
 
 def add_each(group: Group | argparse.ArgumentParser, what: str) -> None:
@@ -92,11 +81,8 @@ def mask_notes(photo: Photo) -> list[str]:
     list of str
     """
     notes = []
-    if photo.original.mask_from == "automatic":
-        notes.append(
-            f"the mask was found automatically ({photo.original.sureness:.0%} sure): check "
-            "mask.png in the result; --box, --point and --not correct it"
-        )
+    if found := how_found(photo):
+        notes.append(f"{found}: check mask.png in the result; --box, --point and --not correct it")
     parts = len(separate_parts(photo.mask))
     if parts > 1:
         notes.append(
@@ -104,6 +90,25 @@ def mask_notes(photo: Photo) -> list[str]:
             "decomposes each of them"
         )
     return notes
+
+
+def how_found(photo: Photo) -> str:
+    """Return how the mask of a photo was found, and how sure it is.
+
+    Parameters
+    ----------
+    photo : Photo
+
+    Returns
+    -------
+    str
+        "" for a mask that was given, or that was not asked for its sureness.
+    """
+    source = photo.original
+    if source.sureness is None:
+        return ""
+    how = "from your hints" if source.mask_from == "hints" else "automatically"
+    return f"the mask was found {how} ({source.sureness:.0%} sure)"
 
 
 def _box(text: str) -> Box:

@@ -15,7 +15,7 @@ from ...photo import TRANSFERS
 from ...result_files.mesh_options import MeshOptions
 from ...separation import SUMMARIES
 from .parser import table
-from .values import count, current_name, not_negative, whole
+from .values import count, current_name, not_negative, pixel, whole
 
 Group = argparse._ArgumentGroup
 
@@ -54,6 +54,31 @@ def add_mask(group: Group) -> None:
         metavar="MASK",
         help="image of the photo's size, the object white on black (default: the photo's alpha "
         "channel, else the pixels that are not black, else the thing that stands out)",
+    )
+
+
+def add_pixels(group: argparse.ArgumentParser | Group, option: str, name: str, of: str) -> None:
+    """Add an option that declares pixels.
+
+    Parameters
+    ----------
+    group : argparse.ArgumentParser or argparse._ArgumentGroup
+        Changed in place.
+    option : str
+        Such as --point.
+    name : str
+        Of the list of (x, y) in the parsed options.
+    of : str
+        What the pixels belong to, for the help.
+    """
+    group.add_argument(
+        option,
+        type=pixel,
+        action="append",
+        default=[],
+        dest=name,
+        metavar="x,y",
+        help=f"a pixel of {of}; from the top left, can be repeated",
     )
 
 

@@ -34,12 +34,11 @@ from scipy import ndimage
 
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
-from ...photo.highlight_marks import HighlightMarks, Place
+from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added before logarithms
 _CORE, _RING = 0.5, 0.02  # of a region's peak; distance of the ring, of the object's diagonal
-_NEAR = 0.02  # of the object's diagonal: from a mark to the region that it means
 _LEAST = 6  # pixels of a region that can be judged
 _MOST_STEP = 5.0  # of each number that is weighed
 WEIGHTS = (-1.725, 0.948, 0.602, -0.337, 2.064)
@@ -193,7 +192,7 @@ def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np
     if not places or not labels.any():
         return found
     distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
-    reach = max(2.0, _NEAR * mask_diagonal(mask))
+    reach = mark_reach(mask)
     for x, y in places:
         at = (min(int(y), labels.shape[0] - 1), min(int(x), labels.shape[1] - 1))
         if distance[at] <= reach:

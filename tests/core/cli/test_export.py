@@ -108,11 +108,12 @@ def test_the_photo_gives_a_finer_base_color(tmp_path: Path, what: list[str]) -> 
     (tmp_path / "out").mkdir()
     given = [folder, "-q", "--roughness", "0.5", *what, "-o", out]
     sizes = []
-    for more in ([], ["--photo", photo], ["--photo", photo, "--texture-size", "50"]):
+    fine = ["--photo", photo]
+    for more in ([], fine, [*fine, "--texture-size", "50"], [*fine, "--texture-size", "maps"]):
         assert exported(*given, *more) == 0
         (picture,) = (tmp_path / "out").glob("*_basecolor.png")
         sizes.append(max(Image.open(picture).size))
-    assert sizes[0] < sizes[2] <= 50 < sizes[1]
+    assert sizes[0] == sizes[3] < sizes[2] <= 50 < sizes[1]
 
 
 def test_another_photo_is_refused(
@@ -138,6 +139,10 @@ def test_another_photo_is_refused(
         (["--textures", "unity", "--back", "flat", "-o", "out"], "use it with --format"),
         (["--format", "glb", "--back", "round", "-o", "out.glb"], "invalid choice: 'round'"),
         (["--format", "glb", "--texture-size", "90", "-o", "out.glb"], "need --photo"),
+        (
+            ["--format", "glb", "--texture-size", "0", "-o", "out.glb"],
+            "not photo, maps or a number",
+        ),
         (["--format", "glb", "--photo", "none.png", "-o", "out.glb"], "none.png"),
     ],
 )

@@ -1,13 +1,19 @@
 """`isc decompose --highlight`: what is taken off, noted, and refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import isc_core
+from isc_core.cli.interface.highlight_options import mark_notes
 from isc_core.cli.main import main
-from tests.core.command_line import ball_photo, write_image
+from isc_core.decomposition.settings import Settings
+from isc_core.photo.highlight_marks import HighlightMarks, mark_reach
+from isc_core.photo.reading import read_photo
+from tests.core.command_line import ball_codes, ball_photo, write_image
 
 
 def decompose(photo: Path, output: Path, *options: str) -> int:
@@ -26,6 +32,22 @@ def test_a_mark_where_there_is_no_highlight_is_noted(
     assert "no light was taken off at 30,31" in capsys.readouterr().out
     stored = json.loads((output / "decomposition.json").read_text())["input"]
     assert stored["marked_highlights"] == [[30, 31]] and "marked_paint" not in stored
+
+
+@pytest.mark.parametrize(("further", "noted"), [(-0.5, False), (1.5, True)])
+def test_the_note_looks_as_far_as_the_mark_reaches(
+    tmp_path: Path, further: float, noted: bool
+) -> None:
+    """Whatever the frame around the object."""
+    path, codes = tmp_path / "ball.png", np.zeros((60, 900, 3), np.uint16)
+    codes[:52, :56] = ball_codes()
+    photo = read_photo(write_image(path, codes))
+    result = isc_core.decompose(photo.image, photo.mask, settings=Settings(model="naive"))
+    specular = np.zeros_like(result.specular)
+    specular[30, 30] = 1
+    x = 30.5 + mark_reach(result.mask) + further
+    marked = replace(photo, marks=HighlightMarks(((x, 30.5),)))
+    assert bool(mark_notes(marked, replace(result, specular=specular))) is noted
 
 
 @pytest.mark.parametrize(

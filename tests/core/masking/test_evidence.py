@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from isc_core.masking.evidence import evidence_of, no_evidence, sureness_of
+from isc_core.masking.evidence import (
+    evidence_of,
+    no_evidence,
+    of_another_mask,
+    sureness_of,
+)
 from isc_core.masking.frames import PartPrediction
 from isc_core.networks.mask_network import SURENESS
 
@@ -37,3 +42,14 @@ def test_sureness_is_a_probability() -> None:
     weights = np.ones(SURENESS)
     assert sureness_of(np.zeros(SURENESS), weights) == 0.5
     assert sureness_of(np.full(SURENESS, 0.5), weights) > 0.9
+
+
+def test_another_mask_than_the_looks_is_less_sure() -> None:
+    sure = look(0.99, 0.01)
+    evidence = evidence_of(sure, sure, sure.cover)
+    same = (sure.cover > 0.5).astype(np.float32)
+    other = np.roll(same, 8, axis=1)
+    assert of_another_mask(evidence, sure.cover, sure.cover) == pytest.approx(evidence)
+    shares = [of_another_mask(evidence, sure.cover, one)[3] for one in (same, other)]
+    assert evidence[3] >= shares[0] > shares[1]
+    assert of_another_mask(evidence, sure.cover, other)[4:] == pytest.approx(evidence[4:])

@@ -82,6 +82,14 @@ def test_points_choose_the_thing() -> None:
         assert overlap(found.mask, truth) > 0.8
 
 
+def test_hints_make_a_mask_sure_or_not() -> None:
+    """Points on the thing do, points on the wall that say it were one do not."""
+    light, _ = balls(ONE)
+    right = find_mask(light, Hints(points=((100, 75),)))
+    wrong = find_mask(light, Hints(points=((12, 12), (190, 20)), others=((100, 75), (90, 70))))
+    assert right.sureness > 0.8 and wrong.sureness < right.sureness - 0.3
+
+
 def test_each_thing_is_found() -> None:
     light, truths = balls(TWO)
     found = find_masks(light)
@@ -127,6 +135,7 @@ def test_hints_come_before_the_alpha_channel(tmp_path: Path) -> None:
     hints = Hints(points=((50, 80),), others=((150, 75),))
     photo = read_photo(tmp_path / "two.png", finder=MaskSearch(hints))
     assert photo.original.mask_from == "hints" and not photo.mask[75, 150]
+    assert photo.found is not None and photo.original.sureness == photo.found.sureness
 
 
 def test_each_part_of_a_given_mask_becomes_a_photo(tmp_path: Path) -> None:

@@ -1,0 +1,234 @@
+"""How good are masks that points and boxes make, and is their sureness what it says?
+
+  python -m benchmarks.decomposition.hinted_masks PHOTOS --panoramas DIR [--count N] [--json FILE]
+
+Composites of masked photos of real things before crops of panoramas that no fit has seen, half of
+them with other things beside. One thing is meant. A box around it leaves up to 15 % on each side;
+points are one to three pixels of it, and with `not` one or two of the background besides. A mask is
+right with an overlap of .5. The weights of the sureness are those fitted without hints; nothing
+here was chosen on these composites. What is refused counts as an empty mask that is not sure.
+Intervals are those of resampled masks.
+
+Limits: those of `benchmarks.decomposition.automatic_mask`. Pixels are drawn evenly; people point at
+the middle.
+"""
+
+import argparse
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from scipy import ndimage
+
+from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import mask_box
+from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.masking.hints import Hints, Point
+from isc_core.masking.search import find_mask
+from training.masks.backgrounds import crop, read_crops
+from training.masks.composites import Composites
+from training.masks.held_out import SIDE, masked_picture
+from training.masks.ingredients import Ingredients
+
+KINDS = ("box", "points", "points and not")
+_BACKGROUNDS, _BATCH, _SEED = 60, 8, 5
+_MOST_MARGIN = 0.15  # of a box, of the thing's width or height
+_LEAST = 200  # pixels of a thing
+_RIGHT = 0.5  # overlap
+_BINS = (0.0, 0.5, 0.8, 0.95, 1.01)  # of sureness
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A mask that hints made.
+
+    Attributes
+    ----------
+    kind : str
+        One of `KINDS`.
+    overlap : float
+        Intersection over union with the truth.
+    sureness : float
+    """
+
+    kind: str
+    overlap: float
+    sureness: float
+
+
+def composites(
+    photos: Path, panoramas: Path, count: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Compose photos.
+
+    Parameters
+    ----------
+    photos, panoramas : Path
+    count : int
+
+    Yields
+    ------
+    light : (H, W, 3) float32 ndarray
+    truth : (H, W) bool ndarray
+        The thing that is meant.
+    """
+    rng = np.random.default_rng(_SEED)
+    torch.manual_seed(_SEED)
+    judged = [one.radiance for one in read_crops(panoramas, 0) if one.judged]
+    grounds = [_coded(crop(judged, rng, SIDE)) for _ in range(_BACKGROUNDS)]
+    pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
+    bodies = Ingredients(np.stack(pictures), np.stack(grounds))
+    compose, made = Composites(bodies, _BATCH, SIDE, hinted=1, shares=(0, 0.5, 0.5)), 0
+    while made < count:
+        batch = compose(rng)
+        for photo, frame, mask in zip(batch.photo, batch.frame, batch.mask, strict=True):
+            place = np.ix_(*(frame[0].numpy().any(axis) for axis in (1, 0)))
+            truth = mask[0].numpy()[place] >= 0.5
+            if made < count and truth.sum() >= _LEAST:
+                made += 1
+                yield photo.permute(1, 2, 0).numpy()[place], truth
+
+
+def _coded(light: np.ndarray) -> np.ndarray:
+    coded = linear_to_srgb(np.clip(light, 0, 1))
+    return np.asarray(np.rint(255 * coded).transpose(2, 0, 1), np.uint8)
+
+
+def drawn_hints(truth: np.ndarray, kind: str, rng: np.random.Generator) -> Hints:
+    """Draw hints as a user gives them.
+
+    Parameters
+    ----------
+    truth : (H, W) bool ndarray
+    kind : str
+        One of `KINDS`.
+    rng : numpy.random.Generator
+
+    Returns
+    -------
+    Hints
+    """
+    if kind == "box":
+        x, y, width, height = mask_box(truth)
+        left, right, above, below = (
+            int(np.ceil(share * side))
+            for share, side in zip(
+                rng.uniform(0, _MOST_MARGIN, 4), (width, width, height, height), strict=True
+            )
+        )
+        first = max(x - left, 0), max(y - above, 0)
+        last = min(x + width + right, truth.shape[1]), min(y + height + below, truth.shape[0])
+        return Hints(box=(*first, last[0] - first[0], last[1] - first[1]))
+    inner = ndimage.binary_erosion(truth, iterations=2)
+    points = _some(inner if inner.any() else truth, rng, int(rng.integers(1, 4)))
+    around = ~ndimage.binary_dilation(truth, iterations=3)
+    if kind == "points" or not around.any():
+        return Hints(points)
+    return Hints(points, _some(around, rng, int(rng.integers(1, 3))))
+
+
+def _some(where: np.ndarray, rng: np.random.Generator, count: int) -> tuple[Point, ...]:
+    rows, columns = np.nonzero(where)
+    return tuple((int(columns[k]), int(rows[k])) for k in rng.integers(len(rows), size=count))
+
+
+def judged_masks(photos: Path, panoramas: Path, count: int) -> list[Judged]:
+    """Make masks from hints of each kind on composites.
+
+    Parameters
+    ----------
+    photos, panoramas : Path
+    count : int
+        Of composites.
+
+    Returns
+    -------
+    list of Judged
+    """
+    rng = np.random.default_rng([_SEED, 1])
+    return [
+        Judged(kind, *_judge(light, truth, drawn_hints(truth, kind, rng)))
+        for light, truth in composites(photos, panoramas, count)
+        for kind in KINDS
+    ]
+
+
+def _judge(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, float]:
+    try:
+        found = find_mask(light, hints)
+    except InputError:
+        return 0.0, 0.0
+    return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.sureness
+
+
+def report(found: list[Judged]) -> str:
+    """Format the figures.
+
+    Parameters
+    ----------
+    found : list of Judged
+
+    Returns
+    -------
+    str
+        Two Markdown tables: by kind of hint, and by sureness.
+    """
+    lines = [
+        "| hints | masks | IoU, median | 10th percentile | right | mean sureness |",
+        "|---|---|---|---|---|---|",
+    ]
+    for kind in (*KINDS, ""):
+        chosen = [one for one in found if kind in ("", one.kind)]
+        overlap = np.array([one.overlap for one in chosen])
+        middle, low = np.quantile(overlap, (0.5, 0.1))
+        mean = np.mean([one.sureness for one in chosen])
+        lines.append(
+            f"| {kind or 'all'} | {len(chosen)} | {middle:.3f} | {low:.3f} | {_right(overlap)} "
+            f"| {mean:.1%} |"
+        )
+    lines += ["", "| sureness | masks | mean sureness | right |", "|---|---|---|---|"]
+    for least, most in zip(_BINS, _BINS[1:], strict=False):
+        chosen = [one for one in found if least <= one.sureness < most]
+        if chosen:
+            mean = np.mean([one.sureness for one in chosen])
+            right = _right(np.array([one.overlap for one in chosen]))
+            lines.append(
+                f"| {least:.0%} to {min(most, 1):.0%} | {len(chosen)} | {mean:.1%} | {right} |"
+            )
+    return "\n".join(lines)
+
+
+def _right(overlap: np.ndarray) -> str:
+    """The share of right masks with its interval."""
+    rng = np.random.default_rng(0)
+    again = (overlap[rng.integers(len(overlap), size=(2000, len(overlap)))] >= _RIGHT).mean(axis=1)
+    low, high = np.quantile(again, (0.025, 0.975))
+    return f"{(overlap >= _RIGHT).mean():.1%} ({100 * low:.0f}-{100 * high:.0f})"
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("photos", type=Path, metavar="PHOTOS", help="folder of photos on black or transparent")
+    add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    add("--count", type=int, default=100, help="composites (default: %(default)s)")
+    add("--json", type=Path, metavar="FILE", help="write every mask's figures")
+    given = parser.parse_args()
+    try:
+        found = judged_masks(given.photos, given.panoramas, given.count)
+    except InputError as error:
+        parser.error(str(error))
+    print(report(found))
+    if given.json is not None:
+        rows = [[one.kind, one.overlap, one.sureness] for one in found]
+        given.json.write_text(json.dumps(rows))
+
+
+if __name__ == "__main__":
+    main()

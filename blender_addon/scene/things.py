@@ -1,0 +1,251 @@
+"""Several things of one photo, decomposed one by one: at one scale, side by side, under one light.
+
+Problem: each result has a scale, an origin and a light of its own. In one scene, things share them.
+
+Equation: a pixel of the photo has one length everywhere, so that things stand in one plane across
+the view: their depths are not known. With s_i(n) the shading that light i gives a normal n, and b_i
+the base color that goes with it, diffuse light is b_i s_i. Multiplying b_i by g_i and dividing
+light i by it changes nothing. Under the light of the largest thing, 0, thing i is as bright as in
+the photo where
+
+    g_i / g_0 = sum_n b_i s_i(n) / sum_n b_i s_0(n),
+
+summed over its pixels; the largest g is 1, so that no base color exceeds what it was.
+
+Limits: one number for each thing. Where the lights that were recovered differ in direction or
+color, shading differs from the photo's.
+"""
+
+from collections.abc import Generator, Sequence
+from dataclasses import replace
+from typing import Any
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.shading.spherical_harmonics import real_sh
+
+from ..datablocks.provenance import KEY, datablock_name
+from ..files.result_arrays import ResultArrays
+from .build import BuiltObject, StagedObject, place_object, require_placeable, stage_object
+from .camera import eye_of
+from .preparation import BuildOptions, PreparedObject, prepare
+
+_CONSTANT = 0.5 / np.sqrt(np.pi)  # the first spherical harmonic
+_LEAST = 1e-9
+# What of a scene only the first thing changes.
+_SHARED = (
+    "own_scene",
+    "light_and_camera",
+    "set_world",
+    "set_camera",
+    "set_resolution",
+    "set_view_transform",
+    "sun",
+)
+
+
+def prepare_things(
+    results: Sequence[ResultArrays], options: BuildOptions, *, with_photo: bool = False
+) -> list[PreparedObject]:
+    """Make in advance what takes time of several things of a photo.
+
+    Parameters
+    ----------
+    results : sequence of ResultArrays
+        From left to right.
+    options : BuildOptions
+        What will be built; the size is that of the largest thing, the name that of the photo.
+    with_photo : bool, optional
+        Whether the masked photo becomes an image.
+
+    Returns
+    -------
+    list of PreparedObject
+        The largest thing first: scene, light and camera are its own.
+    """
+    lengths = [result.longest_side / result.crop_scale for result in results]
+    step = options.size_metres / max(lengths)
+    first = lengths.index(max(lengths))
+    name, shadows = options.name or results[0].name, options.own_shadows
+    if shadows is None and options.own_scene:
+        shadows = False
+    lit, made = _under_one_light(results, first), []
+    for index in sorted(range(len(lit)), key=lambda index: index != first):
+        own = replace(options, size_metres=step * lengths[index], name=f"{name} {index + 1}")
+        if index != first:
+            none: dict[str, Any] = dict.fromkeys(_SHARED, False)
+            own = replace(own, own_shadows=shadows, **none)
+        prepared = prepare(lit[index], own, with_photo=with_photo and index == first)
+        offset = offset_of(results[first], results[index], step)
+        made.append(replace(prepared, offset=offset))
+    return made
+
+
+def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[float, float, float]:
+    """Return where a thing lies from another one of the same photo.
+
+    Parameters
+    ----------
+    first, other : ResultArrays
+        The things.
+    step : float
+        Metres for a pixel of the photo.
+
+    Returns
+    -------
+    tuple of float
+        Metres in Blender's axes, from the first one's origin to the other's.
+    """
+    eyes = [eye_of(one, step * one.longest_side / one.crop_scale) for one in (first, other)]
+    if eyes[0] is not None and eyes[1] is not None:
+        right, behind, up = map(float, eyes[0] - eyes[1])  # both are before the same eye
+        return right, behind, up
+    (x, y), (other_x, other_y) = (
+        (one.origin[:2].astype(float) + 0.5) / one.crop_scale for one in (first, other)
+    )
+    return float(other_x - x) * step, 0.0, float(y - other_y) * step
+
+
+def stage_things(
+    prepared: Sequence[PreparedObject], *, photo: bpy.types.Image | None = None
+) -> Generator[None, None, list[StagedObject]]:
+    """Make the images and the meshes of things in short steps, see `build.stage_object`.
+
+    Parameters
+    ----------
+    prepared : sequence of PreparedObject
+        What they are built of.
+    photo : bpy.types.Image, optional
+        Image behind the objects.
+
+    Returns
+    -------
+    list of StagedObject
+        For `place_things`, to be called at once.
+    """
+    staged: list[StagedObject] = []
+    complete = False
+    try:
+        while not complete:
+            for one in prepared:
+                made = yield from stage_object(one, photo=photo)
+                staged.append(made)
+            # An undo in the meantime takes away what was made first.
+            complete = all(one.blocks.are_there for one in staged)
+            if not complete:
+                discard(staged)
+        return staged
+    finally:
+        if not complete:
+            discard(staged)
+
+
+def discard(staged: list[StagedObject]) -> None:
+    """Remove the datablocks of staged things that were not placed.
+
+    Parameters
+    ----------
+    staged : list of StagedObject
+        Emptied.
+    """
+    while staged:
+        staged.pop().blocks.discard()
+
+
+def place_things(
+    staged: Sequence[StagedObject],
+    *,
+    scene: bpy.types.Scene | None = None,
+    photo: bpy.types.Image | None = None,
+) -> list[BuiltObject]:
+    """Put things in a scene as they lie in the photo, in one short call.
+
+    Parameters
+    ----------
+    staged : sequence of StagedObject
+        One object, or the things of one photo; their datablocks are used or removed.
+    scene, photo
+        As of `build.build_object`.
+
+    Returns
+    -------
+    list of BuiltObject
+        In the same order; objects that were there stay where they are.
+
+    Raises
+    ------
+    InputError
+        Before any change, as of `build.build_object`.
+    """
+    first, *others = staged
+    try:
+        for one in staged:
+            require_placeable(one, scene=scene, photo=photo)
+        built = [place_object(first, scene=scene, photo=photo, room=_room(staged))]
+        place = Matrix.LocRotScale(*built[0].object.matrix_basis.decompose()[:2], None)
+        for one in others:
+            beside = place @ Matrix.Translation(one.prepared.offset)
+            built.append(place_object(one, scene=built[0].scene, photo=photo, place=beside))
+        if others and first.prepared.options.own_scene:
+            _name_scene(built[0])
+        return built
+    finally:
+        discard([*staged])
+
+
+def _name_scene(built: BuiltObject) -> None:
+    """Name a new scene after the photo, not after its first thing."""
+    key = str(built.object[KEY])
+    if built.scene.name == datablock_name(key):
+        built.scene.name = datablock_name(key.rpartition(" ")[0])
+
+
+def _room(staged: Sequence[StagedObject]) -> np.ndarray:
+    """The lowest and the highest corner (2, 3) of all things, from the first one's origin."""
+    corners = []
+    for one in staged:
+        points = one.prepared.mesh.positions.reshape(-1, 3) + np.array(one.prepared.offset)
+        corners += [points.min(axis=0), points.max(axis=0)]
+    return np.stack([np.min(corners, axis=0), np.max(corners, axis=0)])
+
+
+def _under_one_light(results: Sequence[ResultArrays], first: int) -> list[ResultArrays]:
+    light = results[first].mesh_illumination
+    gains = np.array([_gain(result, light) for result in results])
+    return [
+        _with_gain(result, float(gain))
+        for result, gain in zip(results, gains / gains.max(), strict=True)
+    ]
+
+
+def _gain(result: ResultArrays, light: np.ndarray) -> float:
+    """What a thing's base color is multiplied with, to be as bright under another light."""
+    basis = real_sh(result.normal[result.mask].astype(float))
+    color = result.base_color[result.mask].astype(float)
+    own, under = (
+        float((color * np.exp(basis @ coefficients)).sum())
+        for coefficients in (result.mesh_illumination.astype(float), light.astype(float))
+    )
+    return max(own, _LEAST) / max(under, _LEAST)
+
+
+def _with_gain(result: ResultArrays, gain: float) -> ResultArrays:
+    """The same result with a base color so many times as bright, and a light as many times less."""
+    light = result.mesh_illumination.copy()
+    light[0] -= np.float32(np.log(gain) / _CONSTANT)
+    codes = srgb_to_linear(np.arange(256) / 255)
+    codes = np.rint(255 * np.clip(linear_to_srgb(gain * codes), 0, 1)).astype(np.uint8)
+    return replace(
+        result,
+        base_color=result.base_color * np.float32(gain),
+        texture=None if result.texture is None else codes[result.texture],
+        reflectance_scale=result.reflectance_scale * gain,
+        mesh_illumination=light,
+        environment_map=result.environment_map / np.float32(gain),
+        sun_strength=result.sun_strength / np.float32(gain),
+        sun_ambient=result.sun_ambient / np.float32(gain),
+        specular_level=result.specular_level * gain,
+    )

@@ -1,0 +1,225 @@
+"""Each thing of a photo becomes an object: a photo of rendered things, and the scene it becomes."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+from blender_addon.datablocks.staging import completed  # noqa: E402
+from blender_addon.files.result_arrays import read_result, things_in  # noqa: E402
+from blender_addon.operators import decompose as operators  # noqa: E402
+from blender_addon.operators import result  # noqa: E402
+from blender_addon.operators.modal import advance_run  # noqa: E402
+from blender_addon.operators.request import request_from_settings  # noqa: E402
+from blender_addon.operators.worker_run import begin_run  # noqa: E402
+from blender_addon.scene.build import find_built  # noqa: E402
+from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from blender_addon.scene.things import place_things, prepare_things, stage_things  # noqa: E402
+from isc_core.result_files.result_folder import save  # noqa: E402
+from tests.addon.scene_fixture import bump, write_result  # noqa: E402
+from tests.addon.scene_render import render  # noqa: E402
+from tests.addon.test_operators import census  # noqa: E402
+from tests.addon.test_scene_perspective import evaluated_vertices, seen_pixels  # noqa: E402
+from tests.core import perspective_scene  # noqa: E402
+
+SIZE = (120, 64)
+PLACES = ((-1.9, 0.1, 0.7), (0.2, -0.2, 0.95), (2.2, 0.35, 0.5))  # x, z, radius
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A photo of three balls of one paint each under one lamp, rendered before nothing."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    scene = bpy.context.scene
+    for (x, z, radius), color in zip(
+        PLACES, ((0.6, 0.1, 0.08), (0.12, 0.3, 0.5), (0.5, 0.45, 0.1)), strict=True
+    ):
+        bpy.ops.mesh.primitive_uv_sphere_add(segments=48, ring_count=24, location=(x, 0, z))
+        ball = bpy.context.object
+        ball.scale = (radius, radius, radius)
+        for face in ball.data.polygons:
+            face.use_smooth = True
+        material = bpy.data.materials.new("paint")
+        material.use_nodes = True
+        shader = material.node_tree.nodes["Principled BSDF"]
+        shader.inputs["Base Color"].default_value = (*color, 1)
+        shader.inputs["Roughness"].default_value = 0.35
+        ball.data.materials.append(material)
+    lamp = bpy.data.objects.new("lamp", bpy.data.lights.new("lamp", "SUN"))
+    lamp.data.energy, lamp.rotation_euler = 2.5, (0.9, -0.4, 0)
+    camera = bpy.data.objects.new("camera", bpy.data.cameras.new("camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 6.0
+    camera.location, camera.rotation_euler = (0, -8, 0), (np.pi / 2, 0, 0)
+    for one in (lamp, camera):
+        scene.collection.objects.link(one)
+    scene.world = bpy.data.worlds.new("world")
+    scene.world.use_nodes = True
+    scene.world.node_tree.nodes["Background"].inputs[0].default_value = (0.3, 0.3, 0.3, 1)
+    scene.camera, scene.render.film_transparent = camera, True
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    folder = tmp_path_factory.mktemp("shelf")
+    combined = render(scene, folder, samples=16)["Combined"]
+    codes = np.where(
+        combined[..., :3] <= 0.0031308,
+        12.92 * combined[..., :3],
+        1.055 * np.maximum(combined[..., :3], 1e-6) ** (1 / 2.4) - 0.055,
+    )
+    pixels = np.dstack([codes[..., ::-1], combined[..., 3] > 0.5])
+    cv2.imwrite(str(folder / "shelf.png"), np.rint(65535 * np.clip(pixels, 0, 1)).astype("uint16"))
+    return folder / "shelf.png"
+
+
+def use(addon: Any, path: Path, **options: Any) -> Any:
+    settings = addon.context.scene.isc
+    settings.image = addon.data.images.load(str(path))
+    for name, value in {"each": True, "max_size": 48, "model": "mdr", **options}.items():
+        setattr(settings, name, value)
+    return settings
+
+
+def looks(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Linear colors and mask of the photo."""
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]].astype(float) / 65535
+    coded = pixels[..., :3]
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    return linear, pixels[..., 3] > 0.5
+
+
+@pytest.mark.slow
+def test_the_scene_looks_like_the_photo(addon: Any, shelf: Path, tmp_path: Path) -> None:
+    use(addon, shelf, own_scene=True, back="rounded")
+    assert addon.ops.isc.decompose() == {"FINISHED"}
+    shown = addon.context.window_manager.isc
+    assert shown.message == "3 objects created in the scene shelf", shown.message
+    scene = addon.context.scene
+    things = [addon.data.objects[f"shelf {number}"] for number in (1, 2, 3)]
+    assert all(thing.users_scene == (scene,) and thing.select_get() for thing in things)
+    assert addon.context.object == things[1], "the largest one, whose light shines"
+    assert len([one for one in scene.objects if one.type == "CAMERA"]) == 1
+    photo, mask = looks(shelf)
+    assert scene.render.resolution_x == SIZE[0]
+    picture = render(scene, tmp_path, samples=32)["Combined"]
+    seen = picture[..., 3] > 0.5
+    assert (seen & mask).sum() / (seen | mask).sum() > 0.9
+    for x, z, radius in PLACES:
+        column, row = (SIZE[0] * (0.5 + x / 6), 0.5 * SIZE[1] - z * SIZE[0] / 6)
+        down, across = np.indices(mask.shape) + 0.5
+        reach = 0.7 * radius * SIZE[0] / 6
+        inner = (across - column) ** 2 + (down - row) ** 2 < reach**2
+        given, got = (np.median(one[inner], axis=0) for one in (photo, picture[..., :3]))
+        np.testing.assert_allclose(got, given, rtol=0.2, atol=0.02)
+
+
+@pytest.mark.slow
+def test_all_come_in_one_undo_step_and_update_changes_them(
+    addon: Any, shelf: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The operator that has the undo step is called once; Blender undoes in windows only."""
+    use(addon, shelf, own_scene=False, max_size=24)
+    placed = []
+
+    def place(staged: list[Any], **given: Any) -> Any:
+        placed.append(len(staged))
+        return place_things(staged, **given)
+
+    monkeypatch.setattr(result, "place_things", place)
+    assert "UNDO" in result.ISC_OT_build_result.bl_options
+    assert addon.ops.isc.decompose() == {"FINISHED"}
+    assert addon.context.window_manager.isc.message == "3 objects created at the 3D cursor"
+    thing = addon.data.objects["shelf 2"]
+    thing.location.x += 1
+    moved, vertices = thing.location.copy(), len(thing.data.vertices)
+    assert addon.ops.isc.redo(max_size=48) == {"FINISHED"}
+    assert addon.context.window_manager.isc.message == "3 objects updated"
+    thing = addon.data.objects["shelf 2"]
+    assert thing.location == moved and len(thing.data.vertices) > vertices
+    stored = json.loads(thing["isc_request"])["build"]
+    assert stored["name"] == "shelf" and stored["each"]
+    assert placed == [3, 3] and len([o for o in addon.data.objects if o.type == "MESH"]) == 3
+
+
+@pytest.mark.slow
+def test_cancel_leaves_nothing_half_made(addon: Any, shelf: Path) -> None:
+    """At any step of the import, when some things are made and others are not."""
+    use(addon, shelf, own_scene=False, max_size=32)
+    before = census(addon)
+    request = request_from_settings(addon.context.scene)
+    for steps in (0, 1, 11, 20):
+        run = begin_run(operators.create_decompose_run(addon.context, request))
+        while run.step().state == "running":
+            pass
+        assert run.status.state == "ready", run.status.message
+        importing = run._finish(addon.context, run._output)
+        for _ in range(steps):
+            next(importing)
+        importing.close()
+        run.cancel()
+        assert census(addon) == before and not run.folder.exists()
+
+
+@pytest.mark.slow
+def test_highlights_that_are_marked_belong_to_one_object(addon: Any, shelf: Path) -> None:
+    use(addon, shelf, model="joint", highlights="60,32")
+    run = begin_run(
+        operators.create_decompose_run(addon.context, request_from_settings(addon.context.scene))
+    )
+    while not advance_run(addon.context, run):
+        pass
+    assert run.status.state == "failed" and "Each Object" in run.status.message
+    assert "--" not in run.status.message
+
+
+def things(folder: Path) -> list[Any]:
+    """The bump, and a smaller one beside it in the same photo, under a light half as strong."""
+    left, right = bump(64, 200, (27.0, 38.0)), bump(64, 200, (35.0, 150.0))
+    right.reflectance[:] *= 2
+    right.shading[:] /= 2
+    right.illumination[0] -= np.log(2) * 2 * np.sqrt(np.pi)
+    write_result(folder / "1", left)
+    write_result(folder / "2", right)
+    return [read_result(thing) for thing in things_in(folder)]
+
+
+def test_things_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path) -> None:
+    results = things(tmp_path)
+    options = BuildOptions(size_metres=0.5, name="pair", each=True, own_scene=False)
+    prepared = prepare_things(results, options)
+    assert [one.options.name for one in prepared] == ["pair 1", "pair 2"]
+    first, second = (one.result for one in prepared)
+    inside = second.mask
+    np.testing.assert_allclose(
+        second.base_color[inside].mean() / first.base_color[first.mask].mean(), 1, rtol=0.05
+    )
+    np.testing.assert_allclose(second.mesh_illumination, first.mesh_illumination, atol=0.05)
+    assert max(one.base_color.max() for one in (first, second)) <= max(
+        one.base_color.max() for one in results
+    )
+    left, right = (one.object for one in place_things(completed(stage_things(prepared))))
+    step = 0.5 / results[0].longest_side
+    offset = right.location - left.location
+    expected = (results[1].origin - results[0].origin)[:2] * step
+    np.testing.assert_allclose(offset, (expected[0], 0, -expected[1]), atol=1e-6)
+    cameras = [built.camera for one in (left, right) if (built := find_built(one)) is not None]
+    assert cameras[0] is not None and cameras[1:] == [None], "one camera, of the photo"
+
+
+def test_one_pinhole_camera_sees_each_thing_where_the_photo_does(
+    blender: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder, centre in (("1", (34.0, 24.0)), ("2", (24.0, 58.0))):
+        monkeypatch.setattr(perspective_scene, "CENTRE", centre)
+        save(perspective_scene.bump_before_camera(), tmp_path / folder, arrays=True)
+    results = [read_result(thing) for thing in things_in(tmp_path)]
+    prepared = prepare_things(results, BuildOptions(name="pair", each=True))
+    built = place_things(completed(stage_things(prepared)))
+    assert abs(built[1].object.location.y) < 1e-3, "in one plane across the view"
+    for one, thing in zip(built, results, strict=True):
+        off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
+        assert np.abs(off - thing.vertex_pixel).max() < 0.01
