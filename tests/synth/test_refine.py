@@ -11,6 +11,7 @@ pytest.importorskip("mitsuba")
 
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
+from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition, Provenance
 from isc_core.shading.environment_map import environment_from_shading, shading_under
@@ -20,7 +21,7 @@ from isc_core.sirfs.settings import isc_weights
 from synth.commands import refine as command_module
 from synth.refine.held_out import BLOCK, explains_better, fitted_weight, held_out_blocks
 from synth.refine.light_field import LightField
-from synth.refine.light_objective import LightObjective, ReflectanceTerms
+from synth.refine.light_objective import LightObjective
 from synth.refine.refine import RefineOptions, refine
 from synth.refine.transport import light_transport
 
