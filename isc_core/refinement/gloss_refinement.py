@@ -136,13 +136,12 @@ def refine_gloss(
     start = work.reduced(fit.predicted.mean(axis=2), d.mask)[work.mask]
     before, after = explained(problem, gloss, start)
     done = GlossRefinement(d, False, len(gloss.units), before, after)
-    reflectance = _Reflectance.of(d, work)
-    if after < _LEAST or after <= before or not _allowed(d, problem, gloss, reflectance):
+    worse = after < _LEAST or after <= before
+    if worse or not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
         return _noted(done, options)
     x = gloss.packed()
     minimised(GlossObjective(problem.data, problem.bumps), x, options.steps, monitor.part(0.7, 1))
-    gloss = problem.unpacked(x)
-    result = _refined(d, fit, problem, gloss)
+    result = _refined(d, fit, problem, problem.unpacked(x))
     return _noted(replace(done, result=result, kept=True), options)
 
 
