@@ -124,7 +124,7 @@ def mirrored_basis(normal: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(normal)), grazing**2, grazing**5, 2 * normal[:, 2] * normal[:, 1]])
 
 
-# Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l, the deviation v . h, n . v.
+# Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l, v . h and n . v.
 _Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 

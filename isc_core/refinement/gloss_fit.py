@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from ..lobe_fitting.specular_level import lamp_shading
 from ..lobe_fitting.starts import light_of_half_vector
 from ..numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from ..progress import Monitor
@@ -36,7 +37,6 @@ from .working_scale import WorkingScale
 
 _SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: of the object's longer side
 _LEAST_SPACING = 2.0  # pixels
-_BRIGHTEST = 97.0  # percentile of the shading
 _BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one of so many blocks is held out
 _BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across all that is bright
 _SPOT, _FAINT, _SPOTS = 0.4, 0.15, 2  # shares of the peak: of a spot, of the faintest spot
@@ -102,7 +102,7 @@ def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int)
     """
     assert fit.alpha is not None
     down, right = work.slopes
-    shading = d.shading[d.mask].mean(axis=1, dtype=float)
+    direction = np.asarray(fit.lights[0].direction, float)
     data = GlossData(
         work.specular[work.mask],
         work.clipped[work.mask],
@@ -111,8 +111,8 @@ def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int)
         right,
         work.mask,
         fit.alpha,
-        np.asarray(fit.lights[0].direction, float),
-        float(np.pi * np.percentile(shading, _BRIGHTEST)),
+        direction,
+        np.pi * lamp_shading(d, direction),
     )
     return GlossProblem(
         work, data, _held_out(work, seed), bumps_of(work) if d.camera is None else None
@@ -226,7 +226,7 @@ def explained(problem: GlossProblem, gloss: Gloss, start: np.ndarray) -> tuple[f
     data, which = problem.data, problem.held & ~problem.data.clipped
     light = rendered(gloss, problem.normal(gloss)[problem.work.mask])
     total = max(float(np.square(data.specular[which]).sum()), 1e-30)
-    errors = (start - data.specular, shown(gloss, light, data.peak) - data.specular)
+    errors = (start - data.specular, light - data.specular)
     before, after = (1 - float(np.square(error[which]).sum()) / total for error in errors)
     return before, after
 
@@ -238,7 +238,7 @@ def _start(problem: GlossProblem, direction: np.ndarray) -> np.ndarray:
     return Gloss(
         np.zeros(0 if problem.bumps is None else problem.bumps.size),
         direction[None],
-        np.array([min(height, float(np.log(data.brightest)))]),
+        np.array([min(height, float(np.log(data.irradiance)))]),
         float(np.log(data.alpha)),
         data.log_level,
     ).packed()

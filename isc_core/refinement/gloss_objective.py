@@ -4,14 +4,14 @@ Equation: with slopes p0 + dz/dr, q0 + dz/dc of the height, z the bumps of u (`h
 normals n of these slopes, the gloss is G = sum_k E_k f(n, l_k; alpha), f the GGX lobe with its
 cosine. A separator shows only what exceeds an unknown level b, so s ~ max(G - b, 0), softened:
 
-    F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + |u|^2 / 2 + (log alpha / alpha_0)^2 / (2 .28^2)
-        + |l_0 - l*|^2 / (2 c^2) + max(log(sum E / (pi A)), 0)^2 / (2 .3^2) + (log b / b_0)^2 / 2,
+    F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + (|u|^2 + (log(alpha / alpha_0) / .28)^2 + |l_0 - l*|^2 / c^2
+        + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2,
     r = (max(G - b, 0) - s) / sqrt((.03 P)^2 + (.15 s)^2)
 
-P is the peak of s, l* the light of the start's lobe, alpha_0 its roughness, A the brightest
-shading: lamps that are brighter than it would light the diffuse surface more than they do. Of
-clipped pixels, only too little gloss counts. w < 1: errors of neighbours are alike. Gradients are
-exact.
+P is the peak of s, l* the light of the start's lobe, alpha_0 its roughness, E* the irradiance that
+the shading has of it (`lobe_fitting.specular_level`): more strength than that is more gloss than
+that of plastic. Of clipped pixels, only too little gloss counts. w < 1: errors of neighbours are
+alike. Gradients are exact.
 
 Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206. P. Charbonnier et al. 1997,
 doi:10.1109/83.551699 (the loss).
@@ -37,10 +37,11 @@ ROUGHNESS_SPREAD = 0.28  # of log alpha: of `lobe_fitting.recovered`
 _WEIGHT = 0.05
 _FLOOR, _RELATIVE = 0.03, 0.15
 _CONE = 0.26  # radians, 15 degrees
-_TOO_BRIGHT, _LEVEL_SPREAD = 0.3, 1.0
-_LEVEL = 0.05  # b_0 over P
+_TOO_BRIGHT, _LEVEL_SPREAD = 0.3, 0.5
+_LEVEL = 0.02  # b_0 over P
 _SOFT = 0.02  # of P
 _ALPHAS = (0.02, 0.9)
+_LOG_STRENGTHS = (-60.0, 30.0)
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,8 @@ class GlossData:
         alpha_0.
     direction : (3,) ndarray
         l*.
-    brightest : float
-        pi A.
+    irradiance : float
+        E*.
     """
 
     specular: np.ndarray
@@ -75,7 +76,7 @@ class GlossData:
     mask: np.ndarray
     alpha: float
     direction: np.ndarray
-    brightest: float
+    irradiance: float
 
     @property
     def peak(self) -> float:
@@ -119,6 +120,11 @@ class Gloss:
     def level(self) -> float:
         """b."""
         return float(np.exp(np.clip(self.log_level, -30, 5)))
+
+    @property
+    def strengths(self) -> np.ndarray:
+        """E (K,), bounded: a line search may try anything."""
+        return np.exp(np.clip(self.log_strengths, *_LOG_STRENGTHS))
 
     @property
     def units(self) -> np.ndarray:
@@ -193,8 +199,8 @@ def rendered(gloss: Gloss, normal: np.ndarray) -> np.ndarray:
     (N,) ndarray
     """
     total = np.zeros(len(normal))
-    for direction, log_strength in zip(gloss.units, gloss.log_strengths, strict=True):
-        total += np.exp(log_strength) * respond("ggx", normal, direction, gloss.alpha).value
+    for direction, strength in zip(gloss.units, gloss.strengths, strict=True):
+        total += strength * respond("ggx", normal, direction, gloss.alpha).value
     return total
 
 
@@ -236,7 +242,7 @@ class GlossObjective:
         gloss = Gloss.unpacked(x, self._size)
         normal = normals_of(*self._slopes(gloss.bumps))[self._data.mask]
         answers = [respond("ggx", normal, light, gloss.alpha) for light in gloss.units]
-        strengths = np.exp(gloss.log_strengths)
+        strengths = gloss.strengths
         light = np.zeros(len(normal))
         for strength, answer in zip(strengths, answers, strict=True):
             light += strength * answer.value
@@ -286,8 +292,8 @@ class GlossObjective:
         rough = (gloss.log_alpha - np.log(data.alpha)) / ROUGHNESS_SPREAD
         level = (gloss.log_level - data.log_level) / _LEVEL_SPREAD
         to_last += (rough / ROUGHNESS_SPREAD, level / _LEVEL_SPREAD)
-        strengths = np.exp(gloss.log_strengths)
-        bright = max(float(np.log(strengths.sum() / data.brightest)), 0.0) / _TOO_BRIGHT
+        strengths = gloss.strengths
+        bright = max(float(np.log(strengths.sum() / data.irradiance)), 0.0) / _TOO_BRIGHT
         to_strength += bright / _TOO_BRIGHT * strengths / strengths.sum()
         unit = gloss.units[0]
         turn = (unit - data.direction) / _CONE

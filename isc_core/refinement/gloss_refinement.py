@@ -258,7 +258,7 @@ def _lobe(
     alpha, factor = gloss.alpha, float(np.exp(_STRENGTH_SPREAD))
     low = _LEAST_ALPHA if fit.outcome.bounded else alpha * float(np.exp(-ROUGHNESS_SPREAD))
     high = alpha if fit.outcome.bounded else min(alpha * float(np.exp(ROUGHNESS_SPREAD)), 1.0)
-    strengths = np.exp(gloss.log_strengths)
+    strengths = gloss.strengths
     lights = []
     for k in np.argsort(-strengths, kind="stable"):
         strength = strengths[k] * colour
