@@ -4,8 +4,8 @@ Equation: with slopes p0 + dz/dr, q0 + dz/dc of the height, z the bumps of u (`h
 normals n of these slopes, the gloss is G = sum_k E_k f(n, l_k; alpha), f the GGX lobe with its
 cosine. A separator shows only what exceeds an unknown level b, so s ~ max(G - b, 0), softened:
 
-    F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + (|u|^2 + (log(alpha / alpha_0) / .28)^2 + |l_0 - l*|^2 / c^2
-        + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2,
+    F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + (|u|^2 + (log(alpha / alpha_0) / .28)^2
+        + |l_0 - l*|^2 / c^2 + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2,
     r = (max(G - b, 0) - s) / sqrt((.03 P)^2 + (.15 s)^2)
 
 P is the peak of s, l* the light of the start's lobe, alpha_0 its roughness, E* the irradiance that

@@ -22,7 +22,7 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     illumination (9, 3)          SH coefficients of log shading, for `reflectance`
     mesh_illumination (9, 3)     the same for `base_color`: the shading divided by k
     sky (h, 2 h, 3)              environment map, radiance, that lights `base_color` accordingly
-    sun_direction (3,)           unit vector toward the light that best explains the shading
+    sun_direction (3,)           unit vector toward the main light, see `light_direction.main_light`
     sun_strength (3,)            its irradiance across its beam, for `base_color`
     sun_ambient (3,)             the remaining ambient shading
     sun_explained ()             share of the shading in [0, 1]
@@ -169,10 +169,10 @@ def _camera(built: MeshResult) -> dict[str, np.ndarray]:
 
 
 def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
-    from ..lobe_fitting.light_direction import explain_shading
+    from ..lobe_fitting.light_direction import main_light
     from ..shading.environment_map import environment_from_shading
 
-    mesh_light, sun = built.illumination(d.illumination), explain_shading(d)
+    mesh_light, sun = built.illumination(d.illumination), main_light(d)
     if d.environment is None:
         sky = environment_from_shading(mesh_light, viewer=d.viewer)
     else:
