@@ -29,7 +29,7 @@ import numpy as np
 
 from ..imaging.luminance import luminance, white_of
 from ..scene.decomposition import Decomposition
-from ..scene.lobe_fit import LobeFitOutcome
+from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.blinn_phong import BlinnPhong
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions
 from ..shading.perspective import far_view_normals
@@ -151,6 +151,20 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
     return DirectionalLight(direction, np.pi * strength, ambient), explained
 
 
+def lies_on_highlights(fit: LobeFit) -> bool:
+    """Return whether a lobe has its highlights where the photo has them, as after `isc refine`.
+
+    Parameters
+    ----------
+    fit : LobeFit
+
+    Returns
+    -------
+    bool
+    """
+    return fit.alpha is not None and bool(fit.lights) and fit.explained >= _LOBE_EXPLAINS
+
+
 def main_light(d: Decomposition) -> DirectionEstimate:
     """Find the one distant light to render a decomposition under.
 
@@ -167,7 +181,7 @@ def main_light(d: Decomposition) -> DirectionEstimate:
         light that best explains the shading.
     """
     best, fit = explain_shading(d), d.brdf
-    if fit is None or fit.direction is None or fit.explained < _LOBE_EXPLAINS:
+    if fit is None or fit.direction is None or not lies_on_highlights(fit):
         return best
     light, explained = share_explained(d, np.asarray(fit.direction, float))
     if explained < _NEARLY * best.explained:

@@ -27,6 +27,9 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     sun_ambient (3,)             the remaining ambient shading
     sun_explained ()             share of the shading in [0, 1]
     sun_cone ()                  standard error of the direction in degrees
+    lamp_direction (K, 3)        unit vectors toward the lamps of the lobe, the brightest first;
+                                 where it lies on the highlights, as after `isc refine`
+    lamp_strength (K, 3)         their irradiance for `base_color` and `specular_level`
     lobe (H, W, 3)               specular image predicted by the fitted lobe; 0 without a fit
     roughness ()                 of Blender and glTF; NaN if unknown
     specular_level ()            for `base_color`, 1 is plastic (f0 = .04); NaN if unknown
@@ -196,4 +199,18 @@ def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
         "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
         "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
     }
-    return values if gloss.variation is None else values | {"specular_variation": gloss.variation}
+    if gloss.variation is not None:
+        values["specular_variation"] = gloss.variation
+    return values | _lamps(d, built)
+
+
+def _lamps(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    from ..lobe_fitting.light_direction import lies_on_highlights
+
+    if d.brdf is None or not built.specular or not lies_on_highlights(d.brdf):
+        return {}
+    return {
+        "lamp_direction": np.stack([light.direction for light in d.brdf.lights]),
+        "lamp_strength": np.stack([light.strength_light for light in d.brdf.lights])
+        / built.specular,
+    }
