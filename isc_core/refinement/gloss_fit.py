@@ -71,11 +71,31 @@ class GlossProblem:
         return replace(self.data, weight=np.where(self.held, 0.0, 1.0))
 
     def unpacked(self, x: np.ndarray) -> Gloss:
-        """Return the gloss of a vector of unknowns."""
+        """Return the gloss of a vector of unknowns.
+
+        Parameters
+        ----------
+        x : (M,) ndarray
+            Of `Gloss.packed`.
+
+        Returns
+        -------
+        Gloss
+        """
         return Gloss.unpacked(x, 0 if self.bumps is None else self.bumps.size)
 
     def normal(self, gloss: Gloss) -> np.ndarray:
-        """Return the normals (h, w, 3) with the change of the shape."""
+        """Return the normals with the change of the shape.
+
+        Parameters
+        ----------
+        gloss : Gloss
+
+        Returns
+        -------
+        (h, w, 3) ndarray
+            Unit vectors.
+        """
         down, right = self.data.down, self.data.right
         if self.bumps is None:
             return normals_of(down, right)

@@ -160,10 +160,25 @@ def test_the_start_stays_where_there_is_nothing_to_gain() -> None:
 def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
     save(shadowed_dome(), tmp_path / "start")
     for name in ("first", "second"):
-        command([str(tmp_path / "start"), "-o", str(tmp_path / name)])
+        lines = command([str(tmp_path / "start"), "--light", "-o", str(tmp_path / name)])
+        assert "no highlight" in lines[0] and "light was refined" in lines[1]
     for file in ("maps.exr", "environment.exr", "decomposition.json"):
         first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "second"))
         assert first == second
+
+
+def test_gloss_needs_no_renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> None:
+        raise InputError("Mitsuba is not installed")
+
+    monkeypatch.setattr("synth.scene.variant.load_mitsuba", absent)
+    start, output = tmp_path / "start", tmp_path / "out"
+    save(dome(), start)
+    assert "the gloss stays" in command([str(start), "-o", str(output)])[0]
+    assert np.array_equal(load(output).shading, load(start).shading)
+    with pytest.raises(InputError, match="not installed"):
+        command([str(start), "--light", "-o", str(tmp_path / "other")])
+    assert not (tmp_path / "other").exists()
 
 
 def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
