@@ -192,6 +192,7 @@ ROOMS = (
     "sirfs",
     "lobe_fitting",
     "decomposition",
+    "refinement",
     "result_files",
     "datasets",
     "evaluation",

@@ -44,6 +44,7 @@ _NUMBERS = (
     "crop_scale",
     "focal_length",
 )
+_LAMPS = ("lamp_direction", "lamp_strength")
 _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(_COLORS, ("H", "W", 3)),
     **dict.fromkeys(_VALUES, ("H", "W")),
@@ -52,6 +53,7 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("uv", "vertex_pixel"), ("V", 2)),
     **dict.fromkeys(("illumination", "mesh_illumination"), (9, 3)),
     **dict.fromkeys(("origin", "sun_direction", "sun_strength", "sun_ambient"), (3,)),
+    **dict.fromkeys(_LAMPS, ("lamps", 3)),
     "faces": ("F", 3),
     "texture": ("rows", "columns", 3),
     "alpha": ("h_alpha", "w_alpha"),
@@ -67,9 +69,10 @@ _DTYPES = {
 }
 _CAMERA = ("focal_length", "principal_point", "eye")
 _OPTIONAL, _MAY_BE_NAN = (
-    {"specular_variation", "texture", "cover", "soft", "alpha", *_CAMERA},
+    {"specular_variation", "texture", "cover", "soft", "alpha", *_CAMERA, *_LAMPS},
     {"roughness", "specular_level"},
 )
+_MOST_LAMPS = 3
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
 
@@ -144,6 +147,9 @@ class ResultArrays:
         Where the rim is soft; None for nowhere.
     alpha : (rows, columns) ndarray of uint8 or None
         Opacity, of an object with a soft rim; without a texture of the size of the maps.
+    lamp_direction, lamp_strength : (K, 3) ndarray or None
+        Unit vectors toward the lamps of the highlights and their irradiances for `base_color`,
+        after `isc refine`; at most three.
     focal_length : float or None
         Of the photo's camera in pixels of the maps; None for an orthographic view.
     principal_point : (2,) ndarray or None
@@ -194,6 +200,8 @@ class ResultArrays:
     cover: np.ndarray | None = None
     soft: np.ndarray | None = None
     alpha: np.ndarray | None = None
+    lamp_direction: np.ndarray | None = None
+    lamp_strength: np.ndarray | None = None
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None
@@ -313,6 +321,9 @@ def _check_arrays(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
     camera = [name for name in _CAMERA if name in values]
     if camera and (len(camera) < len(_CAMERA) or not values["focal_length"] > 0):
         raise InputError(f"{path} is damaged (half a camera): decompose the photo again")
+    lamps = [name for name in _LAMPS if name in values]
+    if lamps and (len(lamps) < len(_LAMPS) or sizes["lamps"] > _MOST_LAMPS):
+        raise InputError(f"{path} is damaged (lamps): decompose the photo again")
     faces, (rows, columns) = values["faces"], values["vertex_pixel"].T
     outside = faces.min() < 0 or faces.max() >= sizes["V"] or min(rows.min(), columns.min()) < 0
     if outside or rows.max() >= sizes["H"] or columns.max() >= sizes["W"]:

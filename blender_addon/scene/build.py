@@ -52,10 +52,12 @@ from .material import MaterialMaps, ensure_material
 from .photo_highlights import forget_view
 from .placement import free_place
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
-from .sun import ensure_sun, relight
+from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
 
 LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
+
+_NO_LAMPS = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -277,6 +279,8 @@ def _place(
     obj["isc_world"] = world
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))
+    lamps = options.own_scene and options.specular_from != "none"
+    ensure_lamps(key, collection, *_lamps(result) if lamps else (_NO_LAMPS, _NO_LAMPS))
     relight(obj, options.sun)
     camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
     photo = photo or images.get("photo")
@@ -286,6 +290,13 @@ def _place(
     _set_scene(built, options, result)
     forget_view(material)  # the layer of highlights belongs to what is seen now
     return built
+
+
+def _lamps(result: ResultArrays) -> tuple[np.ndarray, np.ndarray]:
+    """Directions and irradiances (K, 3) of the lamps of the highlights."""
+    if result.lamp_direction is None or result.lamp_strength is None:
+        return _NO_LAMPS, _NO_LAMPS
+    return result.lamp_direction, result.lamp_strength
 
 
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:

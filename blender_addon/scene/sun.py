@@ -2,6 +2,9 @@
 
 Equation: shading = E / pi * max(0, n . l) + A, with the irradiance E of the sun perpendicular to
 its direction l, which is Blender's strength of a sun, and the uniform light A of the world.
+
+After `isc refine`, the lamps of the lobe are suns too, beside the environment map, which has their
+diffuse light already: they light highlights alone. Turning one moves its highlight.
 """
 
 import bpy
@@ -14,6 +17,8 @@ from ..datablocks.mesh import to_blender
 from ..datablocks.provenance import KEY, datablock_name, find_tagged, tag
 from .collection import link_object
 from .world import set_sun_mix
+
+_LAMPS = ("lamp1", "lamp2", "lamp3")
 
 
 def ensure_sun(
@@ -37,17 +42,61 @@ def ensure_sun(
     bpy.types.Object
         The sun.
     """
-    sun = find_tagged(bpy.data.objects, key, "sun")
+    return _ensure_sun(key, "sun", collection, direction, strength)
+
+
+def _ensure_sun(
+    key: str,
+    role: str,
+    collection: bpy.types.Collection,
+    direction: np.ndarray,
+    strength: np.ndarray,
+) -> bpy.types.Object:
+    sun = find_tagged(bpy.data.objects, key, role)
     if sun is None:
-        name = datablock_name(key, "sun")
-        data = tag(bpy.data.lights.new(name, "SUN"), key, "sun")
-        sun = tag(bpy.data.objects.new(name, data), key, "sun")
+        name = datablock_name(key, role)
+        data = tag(bpy.data.lights.new(name, "SUN"), key, role)
+        sun = tag(bpy.data.objects.new(name, data), key, role)
     link_object(sun, collection)
     brightest = float(max(strength.max(), 1e-9))
     sun.data.energy, sun.data.color = brightest, tuple(float(part) / brightest for part in strength)
     sun.rotation_mode = "QUATERNION"
     sun.rotation_quaternion = Vector(to_blender(direction.astype(float))).to_track_quat("Z", "Y")
     return sun
+
+
+def ensure_lamps(
+    key: str, collection: bpy.types.Collection, directions: np.ndarray, strengths: np.ndarray
+) -> list[bpy.types.Object]:
+    """Create or update the lamps of the highlights, and remove those that are left over.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    collection : bpy.types.Collection
+        Collection of the lamps.
+    directions : (K, 3) ndarray
+        Vectors toward the lamps in the camera frame; K may be 0.
+    strengths : (K, 3) ndarray
+        Irradiances, linear Rec.709.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        The lamps.
+    """
+    lamps = [
+        _ensure_sun(key, f"lamp{k + 1}", collection, direction, strength)
+        for k, (direction, strength) in enumerate(zip(directions, strengths, strict=True))
+    ]
+    for lamp in lamps:
+        lamp.visible_diffuse = False  # Cycles
+        lamp.data.diffuse_factor = 0.0  # EEVEE
+        lamp.data.angle = 0.0
+    for role in _LAMPS[len(lamps) :]:
+        _remove(key, role)
+    return lamps
 
 
 def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
@@ -80,6 +129,10 @@ def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
         )
     direction, strength, ambient = (np.array(value, float) for value in values)
     set_sun_mix(find_tagged(bpy.data.worlds, key, "world"), ambient, sun)
+    for role in _LAMPS:
+        lamp = find_tagged(bpy.data.objects, key, role)
+        if lamp is not None:  # the sun lights highlights itself
+            lamp.hide_render = lamp.hide_viewport = sun
     if not sun:
         remove_sun(key)
         return None
@@ -97,7 +150,11 @@ def remove_sun(key: str) -> None:
     key : str
         Name of the photo.
     """
-    sun = find_tagged(bpy.data.objects, key, "sun")
+    _remove(key, "sun")
+
+
+def _remove(key: str, role: str) -> None:
+    sun = find_tagged(bpy.data.objects, key, role)
     if sun is not None:
         data = sun.data
         bpy.data.objects.remove(sun)

@@ -285,7 +285,8 @@ def _dominant_light(d: Decomposition) -> DirectionalLight | None:
     lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
     if not fit.determined and not lights:
         return None
-    if fit.determined:
+    fitted = 0.0 if d.brdf is None or not lights else d.brdf.explained
+    if fit.determined and fit.explained >= fitted:
         direction, color = fit.light.direction, fit.light.irradiance
     else:
         direction, color = lights[0].direction, lights[0].strength_light

@@ -29,7 +29,7 @@ import numpy as np
 
 from ..imaging.luminance import luminance, white_of
 from ..scene.decomposition import Decomposition
-from ..scene.lobe_fit import LobeFitOutcome
+from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.blinn_phong import BlinnPhong
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions
 from ..shading.perspective import far_view_normals
@@ -43,6 +43,9 @@ _SHARPEST = 2000.0
 _RIM = 0.25
 _ROBUST = 0.2  # of the white: errors from here on count linearly
 _LEAST_SHARE, _WIDEST_CONE = 0.2, 30.0
+# A lobe that explains so much of the specular light has its highlights where the photo has them;
+# its lamp is taken if it explains so much of what the best direction explains of the shading.
+_LOBE_EXPLAINS, _NEARLY = 0.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,44 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
         float(np.clip(1 - rest / whole, 0, 1)) if whole > 1e-12 * samples.values.size else 0.0
     )
     return DirectionalLight(direction, np.pi * strength, ambient), explained
+
+
+def lies_on_highlights(fit: LobeFit) -> bool:
+    """Return whether a lobe has its highlights where the photo has them, as after `isc refine`.
+
+    Parameters
+    ----------
+    fit : LobeFit
+
+    Returns
+    -------
+    bool
+    """
+    return fit.alpha is not None and bool(fit.lights) and fit.explained >= _LOBE_EXPLAINS
+
+
+def main_light(d: Decomposition) -> DirectionEstimate:
+    """Find the one distant light to render a decomposition under.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    DirectionEstimate
+        The lobe's brightest lamp, so that highlights lie where the photo has them, if the lobe
+        explains the specular layer and the lamp the shading, as after `isc refine`; otherwise the
+        light that best explains the shading.
+    """
+    best, fit = explain_shading(d), d.brdf
+    if fit is None or fit.direction is None or not lies_on_highlights(fit):
+        return best
+    light, explained = share_explained(d, np.asarray(fit.direction, float))
+    if explained < _NEARLY * best.explained:
+        return best
+    return DirectionEstimate(light, explained, fit.lights[0].cone)
 
 
 def explain_specular(d: Decomposition) -> DirectionEstimate:

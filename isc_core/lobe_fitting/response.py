@@ -1,5 +1,5 @@
-"""The response of a lobe to one far light, with its derivatives by alpha and by the light's
-direction.
+"""The response of a lobe to one far light, with its derivatives by alpha, by the light's direction
+and by the normal.
 
 Equation: y(n) = f_r(n, v, l) max(0, n . l) with v = (0, 0, 1) and the lobes of `shading.brdf.ggx`
 and `shading.brdf.blinn_phong` ("normalised", exponent p = 2 / alpha^2 - 2). h = (l + v) / m, m =
@@ -34,11 +34,14 @@ class Response:
         Derivative by log alpha.
     by_light : (N, 3) ndarray
         Derivative by the light's direction; only the part perpendicular to it is meaningful.
+    by_normal : (N, 3) ndarray
+        Derivative by the normal; only the part perpendicular to it is meaningful.
     """
 
     value: np.ndarray
     by_log_alpha: np.ndarray
     by_light: np.ndarray
+    by_normal: np.ndarray
 
 
 def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: float) -> Response:
@@ -69,7 +72,7 @@ def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: floa
     half_cos = np.clip((normal * half).sum(axis=1), 0, 1)
     deviation = half[..., 2:]
     lobe = _ggx if model == "ggx" else _blinn_phong
-    value, by_alpha, by_half, by_cos, by_deviation = lobe(
+    value, by_alpha, by_half, by_cos, by_deviation, by_view = lobe(
         view_cos, light_cos, half_cos, deviation[..., 0], alpha
     )
     value = np.where(lit, value, 0)
@@ -80,7 +83,9 @@ def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: floa
         + by_cos[:, None] * normal
         + np.asarray(by_deviation)[..., None] * across
     )
-    return Response(value, value * by_alpha, value[:, None] * by_light)
+    by_normal = by_half[:, None] * half + by_cos[:, None] * light
+    by_normal[:, 2] += by_view
+    return Response(value, value * by_alpha, value[:, None] * by_light, value[:, None] * by_normal)
 
 
 def mirrored_uniform(normal: np.ndarray) -> np.ndarray:
@@ -119,8 +124,8 @@ def mirrored_basis(normal: np.ndarray) -> np.ndarray:
     return np.stack([np.ones(len(normal)), grazing**2, grazing**5, 2 * normal[:, 2] * normal[:, 1]])
 
 
-# Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l and the deviation v . h.
-_Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+# Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l, v . h and n . v.
+_Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 def _ggx(
@@ -145,7 +150,9 @@ def _ggx(
         by_alpha = by_alpha - square * (1 - c * c) / (root * (c + root))
     by_half = 4 * (1 - square) * half_cos / spread
     by_cos = 1 / light_cos - (1 + (1 - square) * light_cos / light_root) / (light_cos + light_root)
-    return value, by_alpha, by_half, by_cos, -5 * (1 - F0) * (1 - deviation) ** 4 / fresnel
+    by_view = -(1 + (1 - square) * view_cos / view_root) / (view_cos + view_root)
+    by_deviation = -5 * (1 - F0) * (1 - deviation) ** 4 / fresnel
+    return value, by_alpha, by_half, by_cos, by_deviation, by_view
 
 
 def _blinn_phong(
@@ -160,4 +167,5 @@ def _blinn_phong(
     safe = np.maximum(half_cos, 1e-9)
     value = (exponent + 8) / (8 * np.pi) * safe**exponent * light_cos
     by_alpha = -4 / alpha**2 * (1 / (exponent + 8) + np.log(safe))
-    return value, by_alpha, exponent / safe, 1 / light_cos, np.zeros_like(deviation)
+    none = np.zeros_like(safe)
+    return value, by_alpha, exponent / safe, 1 / light_cos, np.zeros_like(deviation), none

@@ -156,17 +156,34 @@ def specular_variation(d: Decomposition) -> np.ndarray | None:
     return _ratio(seen, predicted, usable, block)
 
 
-def _level(d: Decomposition, fit: LobeFit) -> float | None:
-    if fit.direction is None or fit.strength_light is None:
-        return None
+def lamp_shading(d: Decomposition, direction: np.ndarray) -> float:
+    """Return the shading that a lamp gives to what faces it.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+    direction : (3,) ndarray
+        Unit vector toward the lamp.
+
+    Returns
+    -------
+    float
+        a above; the brightest shading where the lamp is not visible in it.
+    """
     from scipy.optimize import nnls
 
-    facing = np.maximum(d.normal[d.mask].astype(float) @ fit.direction, 0)
+    facing = np.maximum(d.normal[d.mask].astype(float) @ direction, 0)
     shading = d.shading[d.mask].mean(-1, dtype=float)
     lamp, _ = nnls(np.stack([facing, np.ones_like(facing)], 1), shading)[0]
     brightest = float(np.percentile(shading, _BRIGHTEST_SHADING))
-    lamp = lamp if lamp > _LEAST_LAMP * brightest else brightest
-    level = float(fit.strength_light.mean()) / (np.pi * lamp)
+    return float(lamp) if lamp > _LEAST_LAMP * brightest else brightest
+
+
+def _level(d: Decomposition, fit: LobeFit) -> float | None:
+    if fit.direction is None or fit.strength_light is None:
+        return None
+    level = float(fit.strength_light.mean()) / (np.pi * lamp_shading(d, fit.direction))
     return min(level / F0 if fit.model.startswith("blinn_phong") else level, _MOST)
 
 

@@ -22,11 +22,14 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     illumination (9, 3)          SH coefficients of log shading, for `reflectance`
     mesh_illumination (9, 3)     the same for `base_color`: the shading divided by k
     sky (h, 2 h, 3)              environment map, radiance, that lights `base_color` accordingly
-    sun_direction (3,)           unit vector toward the light that best explains the shading
+    sun_direction (3,)           unit vector toward the main light, see `light_direction.main_light`
     sun_strength (3,)            its irradiance across its beam, for `base_color`
     sun_ambient (3,)             the remaining ambient shading
     sun_explained ()             share of the shading in [0, 1]
     sun_cone ()                  standard error of the direction in degrees
+    lamp_direction (K, 3)        unit vectors toward the lamps of the lobe, the brightest first;
+                                 where it lies on the highlights, as after `isc refine`
+    lamp_strength (K, 3)         their irradiance for `base_color` and `specular_level`
     lobe (H, W, 3)               specular image predicted by the fitted lobe; 0 without a fit
     roughness ()                 of Blender and glTF; NaN if unknown
     specular_level ()            for `base_color`, 1 is plastic (f0 = .04); NaN if unknown
@@ -191,10 +194,10 @@ def _camera(built: MeshResult) -> dict[str, np.ndarray]:
 
 
 def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
-    from ..lobe_fitting.light_direction import explain_shading
+    from ..lobe_fitting.light_direction import main_light
     from ..shading.environment_map import environment_from_shading
 
-    mesh_light, sun = built.illumination(d.illumination), explain_shading(d)
+    mesh_light, sun = built.illumination(d.illumination), main_light(d)
     if d.environment is None:
         sky = environment_from_shading(mesh_light, viewer=d.viewer)
     else:
@@ -218,4 +221,18 @@ def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
         "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
         "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
     }
-    return values if gloss.variation is None else values | {"specular_variation": gloss.variation}
+    if gloss.variation is not None:
+        values["specular_variation"] = gloss.variation
+    return values | _lamps(d, built)
+
+
+def _lamps(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    from ..lobe_fitting.light_direction import lies_on_highlights
+
+    if d.brdf is None or not built.specular or not lies_on_highlights(d.brdf):
+        return {}
+    return {
+        "lamp_direction": np.stack([light.direction for light in d.brdf.lights]),
+        "lamp_strength": np.stack([light.strength_light for light in d.brdf.lights])
+        / built.specular,
+    }

@@ -11,5 +11,5 @@ VALIDATE = CommandEntry(
     "validate", "measure every stage on rendered scenes", f"{__name__}.validate", "synth"
 )
 REFINE = CommandEntry(
-    "refine", "another light for a result, with cast shadows", f"{__name__}.refine", "synth"
+    "refine", "gloss of a result that lies where the highlights are", f"{__name__}.refine", "synth"
 )

@@ -1,4 +1,4 @@
-"""`isc refine`: the light of a result refined by rendering."""
+"""`isc refine`: the gloss of a result, and its light, refined by rendering."""
 
 import argparse
 import hashlib
@@ -12,7 +12,8 @@ from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
 
 _EXAMPLES = """  isc refine cup -o cup_refined
-  isc refine cup --photo cup.jpg -o cup_refined"""
+  isc refine cup --photo cup.jpg -o cup_refined
+  isc refine cup --light -o cup_refined                  shadows too, needs Mitsuba"""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -26,9 +27,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Fits an environment to a result whose shadows the recovered shape casts, traced by "
-        "Mitsuba. The result keeps its shape, layers and lobe; shading, reflectance and light "
-        "change only if pixels that the fit has not seen are explained better.",
+        "Fits lamps, roughness, strength and a bounded change of the shape to the highlights that "
+        "were separated, so that rendered highlights lie where the photo shows them. The image and "
+        "its layers stay; gloss, shape, light and reflectance change only if pixels that the fit "
+        "has not seen are explained better.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -39,6 +41,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="output folder"
+    )
+    parser.add_argument(
+        "--light",
+        action="store_true",
+        help="then fit an environment whose shadows the shape casts, traced by Mitsuba "
+        "(experimental)",
     )
     parser.add_argument(
         "--seed", type=count, default=0, metavar="S", help="of the held-out pixels (default: 0)"
@@ -65,28 +73,37 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Cancelled
         If the user cancels.
     """
+    from isc_core.refinement import GlossOptions, refine_gloss
+    from isc_core.refinement.outcome_text import gloss_line
     from isc_core.result_files.object_cover import read_cover
     from isc_core.result_files.result_folder import MASK, load, require_writable_result, save
 
-    from ..refine.refine import RefineOptions, refine
-    from ..scene.variant import load_mitsuba
+    if options.light:
+        from ..scene.variant import load_mitsuba
 
-    load_mitsuba()
+        load_mitsuba()
     if os.path.realpath(options.output) == os.path.realpath(options.result):
         raise InputError("the refined result cannot replace its start: choose another folder")
     require_writable_result(options.output, inputs=(options.photo,))
     start = load(options.result)
     if options.photo is not None:
         _require_same(options.photo, start)
-    done = refine(start, RefineOptions(seed=options.seed), monitor.part(0, 0.9))
+    end = 0.5 if options.light else 0.9
+    gloss = refine_gloss(start, GlossOptions(seed=options.seed), monitor.part(0, end))
+    result, lines = gloss.result, [gloss_line(gloss)]
+    if options.light:
+        from ..refine.refine import RefineOptions, refine
+
+        done = refine(result, RefineOptions(seed=options.seed), monitor.part(end, 0.9))
+        result = done.result
+        lines.append(
+            f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
+            if done.kept
+            else "the light stays: a new one does not explain held-out pixels better"
+        )
     cover = read_cover(options.result / MASK)
-    save(done.result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))
-    outcome = (
-        f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
-        if done.kept
-        else "the start stays: a new light does not explain held-out pixels better"
-    )
-    return [outcome, *hints(options, f"wrote {options.output}")]
+    save(result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))
+    return [*lines, *hints(options, f"wrote {options.output}")]
 
 
 def _require_same(photo: Path, start: Decomposition) -> None:

@@ -80,7 +80,10 @@ def _add_scenes(parser: argparse.ArgumentParser) -> None:
 
 def _add_stages(parser: argparse.ArgumentParser) -> None:
     stages = parser.add_argument_group("stages")
-    known = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
+    known = (
+        "separation, sirfs, gloss (default: these, and the chain with its error budget), refine "
+        "(the gloss of isc refine over that of isc decompose)"
+    )
     stages.add_argument("--stages", type=names, metavar="a,b", help=known)
     models = f"models to compare with plain SIRFS: {', '.join(SEPARATING_MODELS)} (default: none)"
     stages.add_argument("--models", type=names, metavar="a,b", help=models)

@@ -15,9 +15,8 @@ not always a truer one.
 
 import numpy as np
 
+from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.sirfs.reflectance import smoothness_cost
-
-from .light_objective import ReflectanceTerms
 
 BLOCK = 8  # pixels
 _SHARE = 0.1

@@ -8,71 +8,11 @@ Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 Limits: the diffuse image is taken as exact.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from isc_core.sirfs.priors.priors import Priors
-from isc_core.sirfs.reflectance import palette_cost, smoothness_cost
-from isc_core.sirfs.settings import Weights
+from isc_core.refinement.reflectance_terms import ReflectanceTerms
 
 from .light_field import LightField
-
-
-@dataclass(frozen=True)
-class ReflectanceTerms:
-    """The terms g of a diffuse image.
-
-    Attributes
-    ----------
-    log_diffuse : (H, W, 3) ndarray
-        0 outside the mask.
-    mask : (H, W) ndarray of bool
-    priors : Priors
-        For three channels.
-    weights : Weights
-    """
-
-    log_diffuse: np.ndarray
-    mask: np.ndarray
-    priors: Priors
-    weights: Weights
-
-    def log_reflectance(self, shading: np.ndarray) -> np.ndarray:
-        """Return the log reflectance under a shading.
-
-        Parameters
-        ----------
-        shading : (N, 3) ndarray
-            Of the mask's pixels, > 0.
-
-        Returns
-        -------
-        (H, W, 3) ndarray
-        """
-        result = np.zeros(self.log_diffuse.shape)
-        result[self.mask] = self.log_diffuse[self.mask] - np.log(shading)
-        return result
-
-    def cost(self, shading: np.ndarray, pixel_weight: np.ndarray) -> tuple[float, np.ndarray]:
-        """Compute g.
-
-        Parameters
-        ----------
-        shading : (N, 3) ndarray
-            Of the mask's pixels, > 0.
-        pixel_weight : (H, W) ndarray
-
-        Returns
-        -------
-        cost : float
-        gradient : (N, 3) ndarray
-            With respect to the shading.
-        """
-        values = self.log_reflectance(shading)
-        smooth, pull = smoothness_cost(values, pixel_weight, self.priors, self.weights.smoothness)
-        parsimony, absolute, more = palette_cost(values, pixel_weight, self.priors, self.weights)
-        return smooth + parsimony + absolute, -(pull + more)[self.mask] / shading
 
 
 class LightObjective:

@@ -12,24 +12,19 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.decomposition.shape import exposure_normalisation, tempered
 from isc_core.errors import InputError
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
+from isc_core.refinement.reflectance_terms import terms_of
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import environment_from_shading
 from isc_core.shading.spherical_harmonics import real_sh
-from isc_core.sirfs.priors.prior_file import shipped_priors
-from isc_core.sirfs.settings import isc_weights
 
 from ..capture.truth import fit_light
 from .held_out import explains_better, fitted_weight, held_out_blocks
 from .light_field import LightField
-from .light_objective import LightObjective, ReflectanceTerms, shading_of
+from .light_objective import LightObjective, shading_of
 from .transport import Transport, light_transport
-
-_DARKEST = 1e-4  # of the diffuse image, white being 1
-_LIKELY = ("photo", "natural", "laboratory")
 
 
 @dataclass(frozen=True)
@@ -114,7 +109,7 @@ def refine(
     transport = light_transport(d, options.rows, monitor.part(0, 0.3))
     start = environment_from_shading(d.illumination, options.rows, viewer=d.viewer)
     field = LightField.around(np.maximum(start, 1e-4 * start.mean()))
-    terms, gain = _terms(d)
+    terms, gain = terms_of(d)
     blocks = held_out_blocks(d.mask, options.seed)
     objective = LightObjective(
         terms,
@@ -147,20 +142,6 @@ def _check(d: Decomposition) -> None:
         raise InputError("the result is refined already: give the one that isc decompose wrote")
     if not (d.shading[d.mask] > 0).all():
         raise InputError("the light of the result is zero somewhere: decompose the photo again")
-
-
-def _terms(d: Decomposition) -> tuple[ReflectanceTerms, float]:
-    """The reflectance terms of the diffuse image at the exposure of photos, and the factor that
-    brings it there.
-    """
-    kind = str(d.provenance.settings.get("illumination", _LIKELY[0]))
-    kind = kind if kind in _LIKELY else _LIKELY[0]
-    gain = exposure_normalisation(d.image, d.mask)
-    light = np.maximum(gain * tempered(d.diffuse.astype(float)), _DARKEST)
-    log_diffuse = np.where(d.mask[..., None], np.log(light), 0.0)
-    return ReflectanceTerms(
-        log_diffuse, d.mask, shipped_priors(kind, 3), isc_weights(kind, 3)
-    ), gain
 
 
 def _refined(

@@ -145,3 +145,48 @@ def test_other_objects_cannot_be_relit(blender: Any) -> None:
 
     with pytest.raises(InputError, match="not an object of ISC"):
         relight(blender.data.objects.new("cube", None))
+
+
+def with_lamps(result: ResultArrays, count: int) -> ResultArrays:
+    toward = np.array([[0.0, 0.6, 0.8], [0.6, 0.0, 0.8], [-0.6, 0.0, 0.8]], np.float32)[:count]
+    return replace(result, lamp_direction=toward, lamp_strength=np.full_like(toward, 2.0))
+
+
+def lamps() -> list[Any]:
+    import bpy
+
+    return [o for o in bpy.data.objects if str(o.get("isc_role", "")).startswith("lamp")]
+
+
+def test_lamps_of_a_refined_lobe_light_highlights_alone(blender: Any, result: ResultArrays) -> None:
+    from mathutils import Vector
+
+    from blender_addon.scene.sun import relight
+
+    built = build(with_lamps(result, 2))
+    found = lamps()
+    assert len(found) == 2
+    assert all(not lamp.visible_diffuse and lamp.data.diffuse_factor == 0 for lamp in found)
+    assert all(lamp.data.energy == pytest.approx(2.0) for lamp in found)
+    toward = found[0].matrix_basis.to_quaternion() @ Vector((0, 0, 1))
+    # The camera frame's y is up, Blender's z.
+    assert tuple(toward) == pytest.approx((0.0, -0.8, 0.6), abs=1e-5)
+    relight(built.object, True)
+    assert all(lamp.hide_render for lamp in lamps()), "the sun lights highlights itself"
+    relight(built.object, False)
+    assert not any(lamp.hide_render for lamp in lamps())
+    build(with_lamps(result, 1))
+    assert len(lamps()) == 1, "a lamp that the result no longer has is removed"
+    build(result)
+    assert not lamps()
+    build(with_lamps(result, 2), specular_from="none")
+    assert not lamps()
+
+
+@pytest.mark.slow
+def test_lamps_leave_the_recovered_shading(
+    blender: Any, result: ResultArrays, tmp_path: Path
+) -> None:
+    seen, where = lit(build(with_lamps(result, 2)), result, tmp_path)
+    wanted = result.shading[where] / result.reflectance_scale
+    np.testing.assert_allclose((seen / wanted).mean(0), 1, atol=0.002)

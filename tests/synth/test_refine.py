@@ -11,6 +11,7 @@ pytest.importorskip("mitsuba")
 
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
+from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition, Provenance
 from isc_core.shading.environment_map import environment_from_shading, shading_under
@@ -20,7 +21,7 @@ from isc_core.sirfs.settings import isc_weights
 from synth.commands import refine as command_module
 from synth.refine.held_out import BLOCK, explains_better, fitted_weight, held_out_blocks
 from synth.refine.light_field import LightField
-from synth.refine.light_objective import LightObjective, ReflectanceTerms
+from synth.refine.light_objective import LightObjective
 from synth.refine.refine import RefineOptions, refine
 from synth.refine.transport import light_transport
 
@@ -160,12 +161,27 @@ def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
     start = shadowed_dome()
     save(start, tmp_path / "start", cover=start.mask * 0.7)
     for name in ("first", "second"):
-        command([str(tmp_path / "start"), "-o", str(tmp_path / name)])
+        lines = command([str(tmp_path / "start"), "--light", "-o", str(tmp_path / name)])
+        assert "no highlight" in lines[0] and "light was refined" in lines[1]
     for file in ("maps.exr", "environment.exr", "decomposition.json"):
         first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "second"))
         assert first == second
     kept = [(tmp_path / name / "mask.png").read_bytes() for name in ("start", "first")]
     assert kept[0] == kept[1], "the soft mask goes along"
+
+
+def test_gloss_needs_no_renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def absent() -> None:
+        raise InputError("Mitsuba is not installed")
+
+    monkeypatch.setattr("synth.scene.variant.load_mitsuba", absent)
+    start, output = tmp_path / "start", tmp_path / "out"
+    save(dome(), start)
+    assert "the gloss stays" in command([str(start), "-o", str(output)])[0]
+    assert np.array_equal(load(output).shading, load(start).shading)
+    with pytest.raises(InputError, match="not installed"):
+        command([str(start), "--light", "-o", str(tmp_path / "other")])
+    assert not (tmp_path / "other").exists()
 
 
 def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from ...result_files.known_inputs import read_height, read_light
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
+from ...scene.decomposition import Decomposition
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
 from ..interface.highlight_options import add_highlight_marks, mark_notes, marks_of, with_marks
@@ -83,6 +84,12 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_each(main, "DIR/1, DIR/2 and so on, from left to right")
     add_highlight_marks(main)
     add_main_settings(main)
+    main.add_argument(
+        "--refine",
+        action="store_true",
+        help="fit lamps and gloss to where the highlights are, see isc refine; kept only where it "
+        "explains the photo better",
+    )
     main.add_argument(
         "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
     )
@@ -226,8 +233,12 @@ def _decompose_photo(
         prior_set=prior_set,
         name="standard input" if path == STDIN else path.name,
         memory=options.memory,
-        monitor=monitor.part(0.0, 0.8),
+        monitor=monitor.part(0.0, 0.7 if options.refine else 0.8),
     )
+    refined = list[str]()
+    if options.refine:
+        result, line = _refined(result, settings.seed, monitor.part(0.7, 0.8))
+        refined = [line]
     writing, texture = monitor.part(0.8, 1.0), None
     if options.texture_size is not None and options.texture_size != MAPS_SIZE:
         writing.report("refining the texture", 0.0)
@@ -246,6 +257,7 @@ def _decompose_photo(
     return hints(
         options,
         *reading_note_lines(photo.original.notes),
+        *refined,
         *note_lines(result.provenance.diagnostics),
         *(f"note: {note}" for note in mark_notes(photo, result)),
         *_detail_notes(settings, max(mask_box(result.mask)[2:]), max(photo.box[2:])),
@@ -253,6 +265,15 @@ def _decompose_photo(
         *(show(preview) if options.open else ()),
         f"see {preview}",
     )
+
+
+def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomposition, str]:
+    """The result with its gloss refined where that explains more, and a line that says so."""
+    from ...refinement import GlossOptions, refine_gloss
+    from ...refinement.outcome_text import gloss_line
+
+    done = refine_gloss(result, GlossOptions(seed=seed), monitor)
+    return done.result, gloss_line(done)
 
 
 def _decompose_each(

@@ -3,11 +3,13 @@
 from isc_core.errors import InputError
 
 from .lobe import LOBE
+from .refinement import REFINEMENT
 from .separation import SEPARATION
 from .sirfs import SIRFS
 from .types import AnyStage
 
 _STAGES: tuple[AnyStage, ...] = (SEPARATION, SIRFS, LOBE)
+_BY_NAME_ONLY: tuple[AnyStage, ...] = (REFINEMENT,)
 
 
 def all_stages() -> tuple[AnyStage, ...]:
@@ -21,7 +23,7 @@ def find_stages(names: tuple[str, ...] | None) -> tuple[AnyStage, ...]:
     Parameters
     ----------
     names : tuple of str or None
-        The stages; None for all of them.
+        The stages; None for those of a default run.
 
     Returns
     -------
@@ -33,7 +35,8 @@ def find_stages(names: tuple[str, ...] | None) -> tuple[AnyStage, ...]:
     InputError
         For an unknown name.
     """
-    known = [stage.name for stage in _STAGES]
+    stages = _STAGES if names is None else _STAGES + _BY_NAME_ONLY
+    known = [stage.name for stage in stages]
     if unknown := [name for name in names or () if name not in known]:
         raise InputError(f"unknown stage {unknown[0]!r}: choose {', '.join(known)}")
-    return tuple(stage for stage in _STAGES if names is None or stage.name in names)
+    return tuple(stage for stage in stages if names is None or stage.name in names)

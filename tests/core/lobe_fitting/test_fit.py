@@ -88,6 +88,16 @@ def test_the_response_is_that_of_the_brdf_and_its_gradient_that_of_differences(m
                 rtol=1e-4,
                 atol=1e-5 * scale / alpha,
             )
+        for across in np.cross(normal, [0.8, 0, 0.6]), np.cross(normal, [0, 1, 0]):
+            turned = [normal + s * across for s in (step, -step)]
+            turned = [t / np.linalg.norm(t, axis=1, keepdims=True) for t in turned]
+            up, down = (respond(model, t, KEY, alpha).value for t in turned)  # type: ignore[arg-type]
+            np.testing.assert_allclose(
+                (answer.by_normal * across).sum(axis=1),
+                (up - down) / (2 * step),
+                rtol=1e-4,
+                atol=1e-5 * scale / alpha,
+            )
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.25, 0.45])

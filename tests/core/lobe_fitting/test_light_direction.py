@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 
 from isc_core.editing.spheres import render_sphere
-from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
+from isc_core.lobe_fitting.light_direction import (
+    explain_shading,
+    explain_specular,
+    lobe_light,
+    main_light,
+)
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
+from isc_core.scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
 from isc_core.shading.lights import DirectionalLight, toward
 from tests.core.ball_scene import ball
 
@@ -139,3 +144,23 @@ def test_specks_of_a_matt_object_tell_no_light() -> None:
     assert explain_specular(replace(diffuse_only, brdf=None)).exponent is not None, (
         "without a fit whatever there is is explained"
     )
+
+
+def test_the_main_light_is_that_of_a_lobe_which_explains_highlights_and_shading() -> None:
+    true = DirectionalLight(toward(0.4, 0.5, 0.77), np.full(3, 3.0), np.full(3, 0.1))
+    scene = lit(ball(), true)
+    shading = explain_shading(scene).light.direction
+
+    def main(direction: np.ndarray, explained: float) -> np.ndarray:
+        one = np.ones(3)
+        lamp = LobeLight(direction, 10.0, one, Interval(one, one))
+        fit = LobeFit(
+            CONVENTION["ggx"], LobeFitOutcome.DETERMINED, 0.2, Interval(0.1, 0.3), (lamp,), None,
+            None, explained, np.zeros_like(scene.specular),
+        )  # fmt: skip
+        return main_light(replace(scene, brdf=fit)).light.direction
+
+    near, far = toward(0.5, 0.5, 0.77), toward(-0.8, 0.1, 0.5)
+    assert np.array_equal(main(near, 0.9), near)
+    assert np.array_equal(main(near, 0.3), shading)  # its highlights lie elsewhere
+    assert np.array_equal(main(far, 0.9), shading)  # nor does it light the object

@@ -1,0 +1,292 @@
+"""The fit of a gloss at the working scale, without the pixels that are held out.
+
+Method: the objective F of `gloss_objective` is minimised from the light of the start's lobe and
+from the two brightest spots of the specular layer; the lowest F is taken. Further lamps begin at
+the brightest spot that is left, and stay if F falls by more than their unknowns. Of blocks of
+pixels, a quarter as wide as all that is bright, every fifth in the order of their specular light is
+held out.
+
+Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x (pixels held out).
+
+Limits: those of `gloss_objective`. What is held out is near to what is fitted.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from ..lobe_fitting.specular_level import lamp_shading
+from ..lobe_fitting.starts import light_of_half_vector
+from ..numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
+from ..progress import Monitor
+from ..scene.decomposition import Decomposition
+from ..scene.lobe_fit import LobeFit
+from ..shading.brdf.ggx import F0
+from .gloss_objective import (
+    Gloss,
+    GlossData,
+    GlossObjective,
+    normals_of,
+    rendered,
+    shown,
+    slopes_of,
+)
+from .height_bumps import HeightBumps
+from .working_scale import WorkingScale
+
+_SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: of the object's longer side
+_LEAST_SPACING = 2.0  # pixels
+_BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one of so many blocks is held out
+_BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across all that is bright
+_SPOT, _FAINT, _SPOTS = 0.4, 0.15, 2  # shares of the peak: of a spot, of the faintest spot
+_APART = 3  # pixels
+_LAMP_UNKNOWNS = 4
+
+
+@dataclass(frozen=True)
+class GlossProblem:
+    """What a gloss is fitted to.
+
+    Attributes
+    ----------
+    work : WorkingScale
+        The maps.
+    data : GlossData
+        All pixels.
+    held : (N,) ndarray of bool
+        Pixels that are held out.
+    bumps : HeightBumps or None
+        Freedom of the shape; None keeps it.
+    """
+
+    work: WorkingScale
+    data: GlossData
+    held: np.ndarray
+    bumps: HeightBumps | None
+
+    @property
+    def fitted(self) -> GlossData:
+        """The data without what is held out."""
+        return replace(self.data, weight=np.where(self.held, 0.0, 1.0))
+
+    def unpacked(self, x: np.ndarray) -> Gloss:
+        """Return the gloss of a vector of unknowns.
+
+        Parameters
+        ----------
+        x : (M,) ndarray
+            Of `Gloss.packed`.
+
+        Returns
+        -------
+        Gloss
+        """
+        return Gloss.unpacked(x, 0 if self.bumps is None else self.bumps.size)
+
+    def normal(self, gloss: Gloss) -> np.ndarray:
+        """Return the normals with the change of the shape.
+
+        Parameters
+        ----------
+        gloss : Gloss
+
+        Returns
+        -------
+        (h, w, 3) ndarray
+            Unit vectors.
+        """
+        down, right = self.data.down, self.data.right
+        if self.bumps is None:
+            return normals_of(down, right)
+        more_down, more_right = slopes_of(self.bumps.height(gloss.bumps))
+        return normals_of(down + more_down, right + more_right)
+
+
+def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int) -> GlossProblem:
+    """Pose the fit of a result's gloss.
+
+    Parameters
+    ----------
+    d : Decomposition
+    fit : LobeFit
+        Its lobe, of known roughness and with a light.
+    work : WorkingScale
+        Its maps, reduced.
+    seed : int
+        Of the choice of held-out blocks.
+
+    Returns
+    -------
+    GlossProblem
+    """
+    assert fit.alpha is not None
+    down, right = work.slopes
+    direction = np.asarray(fit.lights[0].direction, float)
+    data = GlossData(
+        work.specular[work.mask],
+        work.clipped[work.mask],
+        np.ones(int(work.mask.sum())),
+        down,
+        right,
+        work.mask,
+        fit.alpha,
+        direction,
+        np.pi * lamp_shading(d, direction),
+    )
+    return GlossProblem(
+        work, data, _held_out(work, seed), bumps_of(work) if d.camera is None else None
+    )
+
+
+def bumps_of(work: WorkingScale, step: int = 1) -> HeightBumps:
+    """Return the freedom of the shape.
+
+    Parameters
+    ----------
+    work : WorkingScale
+    step : int, optional
+        As of `HeightBumps.spaced`: the same on the result's own maps.
+
+    Returns
+    -------
+    HeightBumps
+    """
+    height, width = work.mask.shape
+    spacings = tuple(max(share * max(height, width), _LEAST_SPACING) for share in _SPACINGS)
+    return HeightBumps.spaced((height, width), spacings, _SLOPES, step)
+
+
+def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -> Gloss:
+    """Fit a gloss to what is not held out.
+
+    Parameters
+    ----------
+    problem : GlossProblem
+    lamps, steps : int
+        At most so many.
+    monitor : Monitor
+
+    Returns
+    -------
+    Gloss
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
+    data, work = problem.fitted, problem.work
+    objective, tried = GlossObjective(data, problem.bumps), list[tuple[float, np.ndarray]]()
+    for k, direction in enumerate([data.direction, *_spots(data.specular, work, _SPOTS)]):
+        x = _start(problem, direction)
+        part = monitor.part(0.2 * k, 0.2 * (k + 1))
+        tried.append((minimised(objective, x, steps, part), x))
+    loss, x = min(tried, key=lambda one: one[0])
+    for count in range(2, lamps + 1):
+        gloss = problem.unpacked(x)
+        light = rendered(gloss, problem.normal(gloss)[work.mask])
+        left = data.weight * (data.specular - shown(gloss, light, data.peak))
+        more = _spots(left, work, 1)
+        if not more:
+            break
+        found = replace(
+            gloss,
+            directions=np.vstack([gloss.units, more[0]]),
+            log_strengths=np.append(gloss.log_strengths, gloss.log_strengths.max() - 1),
+        ).packed()
+        part = monitor.part(0.6 + 0.2 * (count - 2), 0.6 + 0.2 * (count - 1))
+        lower = minimised(objective, found, steps, part)
+        if lower > loss - _LAMP_UNKNOWNS:
+            break
+        loss, x = lower, found
+    return problem.unpacked(x)
+
+
+def minimised(objective: GlossObjective, x: np.ndarray, steps: int, monitor: Monitor) -> float:
+    """Minimise F in place.
+
+    Parameters
+    ----------
+    objective : GlossObjective
+    x : (M,) ndarray
+        Changed in place.
+    steps : int
+        At most so many.
+    monitor : Monitor
+
+    Returns
+    -------
+    float
+        The loss.
+    """
+
+    def each(step: int, loss: float) -> None:
+        monitor.report("refining the gloss", min(step / steps, 1.0), f"loss {loss:.1f}")
+
+    limits = LbfgsOptions(iterations=steps, loss_tolerance=1e-4)
+    return minimise(objective, x, limits, NumpyAlgebra(), each).loss
+
+
+def explained(problem: GlossProblem, gloss: Gloss, start: np.ndarray) -> tuple[float, float]:
+    """Return the shares of the squared held-out light that the start and the new gloss explain.
+
+    Parameters
+    ----------
+    problem : GlossProblem
+    gloss : Gloss
+    start : (N,) ndarray
+        What the start's lobe predicts.
+
+    Returns
+    -------
+    before, after : float
+        Negative where the prediction is worse than none; clipped pixels do not count.
+    """
+    data, which = problem.data, problem.held & ~problem.data.clipped
+    light = rendered(gloss, problem.normal(gloss)[problem.work.mask])
+    total = max(float(np.square(data.specular[which]).sum()), 1e-30)
+    errors = (start - data.specular, light - data.specular)
+    before, after = (1 - float(np.square(error[which]).sum()) / total for error in errors)
+    return before, after
+
+
+def _start(problem: GlossProblem, direction: np.ndarray) -> np.ndarray:
+    """The unknowns at one lamp whose highlight has the peak of the specular layer."""
+    data = problem.data
+    height = float(np.log(4 * np.pi * data.alpha**2 * data.peak / F0))
+    return Gloss(
+        np.zeros(0 if problem.bumps is None else problem.bumps.size),
+        direction[None],
+        np.array([min(height, float(np.log(data.irradiance)))]),
+        float(np.log(data.alpha)),
+        data.log_level,
+    ).packed()
+
+
+def _held_out(work: WorkingScale, seed: int) -> np.ndarray:
+    rows, columns = np.nonzero(work.mask)
+    values = work.specular[work.mask]
+    bright = float(np.sqrt((values > _BRIGHT * values.max()).sum()))
+    side = int(np.clip(bright / _ACROSS, *_BLOCKS))
+    block = rows // side * (work.mask.shape[1] // side + 1) + columns // side
+    light = np.bincount(block, values)
+    first = int(np.random.default_rng(seed).integers(_SHARE))
+    return np.isin(block, np.argsort(-light, kind="stable")[first::_SHARE])
+
+
+def _spots(values: np.ndarray, work: WorkingScale, count: int) -> list[np.ndarray]:
+    """Lights (3,) that the recovered normals mirror in the brightest spots of some light (N,)."""
+    image = np.zeros(work.mask.shape)
+    image[work.mask] = np.maximum(values, 0)
+    image = ndimage.gaussian_filter(image, 1.0)
+    faintest, found = _FAINT * float(image.max()), list[np.ndarray]()
+    while len(found) < count and image.max() > faintest:
+        peak = np.unravel_index(int(np.argmax(image)), image.shape)
+        label, _ = ndimage.label(image > _SPOT * image[peak])
+        spot = label == label[peak]
+        half = (work.normal[spot] * image[spot][:, None]).sum(axis=0)
+        half[2] = max(half[2], 0.2 * float(np.linalg.norm(half)))
+        found.append(light_of_half_vector(half / np.linalg.norm(half)))
+        image = np.where(ndimage.binary_dilation(spot, iterations=_APART), 0, image)
+    return found

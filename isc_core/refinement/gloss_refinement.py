@@ -1,0 +1,296 @@
+"""`refine_gloss`: a result whose lobe lies where the photo's highlights are, or as it was.
+
+Method: lamps, lobe and a bounded change of the shape are fitted to four fifths of the specular
+layer (`gloss_fit`). They are kept if
+
+- F of `gloss_objective` and the reflectance terms of SIRFS together are lower than without gloss
+  and change of the shape, and the latter, to which the shape was fitted, rise by `_RISE` at most,
+- of the other fifth, they explain at least `_LEAST`, and more than the start's lobe does.
+
+Then all pixels are fitted. Image and layers stay. The light becomes the one whose shading on the
+new normals is nearest to the old shading; with shading = exp(SH(normal)) and reflectance = diffuse
+/ shading, every identity of a result holds.
+
+Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x; J. T. Barron, J. Malik 2015,
+doi:10.1109/TPAMI.2014.2377712 (reflectance terms).
+
+Limits: measured in docs/methods/refine.md. Before a camera the shape stays.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..decomposition.lobe import FittedLobe
+from ..errors import InputError
+from ..numerics.linear import solve_linear
+from ..progress import Monitor
+from ..scene.decomposition import Decomposition
+from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
+from ..shading.perspective import far_view_normals
+from ..shading.spherical_harmonics import real_sh
+from .gloss_fit import GlossProblem, bumps_of, explained, fit_gloss, gloss_problem, minimised
+from .gloss_objective import (
+    ROUGHNESS_SPREAD,
+    Gloss,
+    GlossObjective,
+    normals_of,
+    rendered,
+    slopes_of,
+)
+from .reflectance_terms import ReflectanceTerms, terms_of, with_diffuse
+from .working_scale import WorkingScale, slopes_of_normals, working_scale
+
+_LEAST, _RISE = 0.25, 1.0
+_STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # of `lobe_fitting.recovered`; degrees
+_LEAST_ALPHA = 0.01
+_LIGHT_RIDGE = 1e-3
+NOTE = "refine_gloss"
+
+
+@dataclass(frozen=True)
+class GlossOptions:
+    """Options of a refinement.
+
+    Attributes
+    ----------
+    lamps : int
+        At most so many, 1 to 3.
+    steps : int
+        At most so many steps of the optimiser for each start, > 0.
+    seed : int
+        Of the choice of the held-out blocks, >= 0.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
+    """
+
+    lamps: int = 3
+    steps: int = 80
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.lamps <= 3 or self.steps < 1 or self.seed < 0:
+            raise InputError("lamps has to be 1 to 3, steps at least 1, seed at least 0")
+
+
+@dataclass(frozen=True)
+class GlossRefinement:
+    """The outcome of a refinement.
+
+    Attributes
+    ----------
+    result : Decomposition
+        Refined, or the start.
+    kept : bool
+        Whether it is refined.
+    lamps : int
+        Number of lamps found; 0 where there is nothing to fit.
+    before, after : float
+        Share of the squared held-out specular light that the start's lobe and the new one explain;
+        negative where it is worse than no gloss.
+    """
+
+    result: Decomposition
+    kept: bool
+    lamps: int = 0
+    before: float = 0.0
+    after: float = 0.0
+
+
+def refine_gloss(
+    d: Decomposition, options: GlossOptions | None = None, monitor: Monitor | None = None
+) -> GlossRefinement:
+    """Refine the gloss of a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+    options : GlossOptions, optional
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    GlossRefinement
+        `kept` is False, and the result the start but for a note in its settings, where nothing was
+        separated, or the new gloss does not explain held-out pixels better.
+
+    Raises
+    ------
+    InputError
+        If the gloss of the result is refined already.
+    Cancelled
+        If the user cancels.
+    """
+    options, monitor = options or GlossOptions(), monitor or Monitor()
+    _check(d)
+    monitor.report("refining the gloss", 0.0)
+    fit = d.brdf
+    if fit is None or fit.alpha is None or not fit.lights or not d.specular[d.mask].any():
+        return _noted(GlossRefinement(d, False), options)
+    work = working_scale(d)
+    problem = gloss_problem(d, fit, work, options.seed)
+    gloss = fit_gloss(problem, options.lamps, options.steps, monitor.part(0.0, 0.7))
+    start = work.reduced(fit.predicted.mean(axis=2), d.mask)[work.mask]
+    before, after = explained(problem, gloss, start)
+    done = GlossRefinement(d, False, len(gloss.units), before, after)
+    worse = after < _LEAST or after <= before
+    if worse or not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
+        return _noted(done, options)
+    x = gloss.packed()
+    minimised(GlossObjective(problem.data, problem.bumps), x, options.steps, monitor.part(0.7, 1))
+    result = _refined(d, fit, problem, problem.unpacked(x))
+    return _noted(replace(done, result=result, kept=True), options)
+
+
+@dataclass(frozen=True)
+class _Reflectance:
+    """The reflectance terms of diffuse layers at the working scale."""
+
+    terms: ReflectanceTerms
+    gain: float
+    work: WorkingScale
+
+    @staticmethod
+    def of(d: Decomposition, work: WorkingScale) -> "_Reflectance":
+        return _Reflectance(*terms_of(d), work)
+
+    def cost(self, diffuse: np.ndarray, shading: np.ndarray) -> float:
+        """Of a diffuse layer (h, w, 3) and a shading (N, 3)."""
+        mask = self.work.mask
+        terms = with_diffuse(self.terms, diffuse, mask, self.gain)
+        return terms.cost(self.gain * np.maximum(shading, 1e-9), mask.astype(float))[0]
+
+
+def _check(d: Decomposition) -> None:
+    if d.provenance.settings.get(NOTE, {}).get("kept"):
+        raise InputError(
+            "the gloss of the result is refined already: give the one that isc decompose wrote"
+        )
+
+
+def _new_shading(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> np.ndarray:
+    """The shading (N, 3) of the changed shape at the working scale."""
+    mask, shading = problem.work.mask, problem.work.shading[problem.work.mask]
+    if problem.bumps is None:
+        return shading
+    old, new = (real_sh(normal[mask]) for normal in (problem.work.normal, problem.normal(gloss)))
+    light = _refitted(new, old, d.illumination)
+    change = np.einsum("nk,kc->nc", new, light) - np.einsum("nk,kc->nc", old, d.illumination)
+    return np.asarray(shading * np.exp(change))
+
+
+def _allowed(
+    d: Decomposition, problem: GlossProblem, gloss: Gloss, reflectance: _Reflectance
+) -> bool:
+    """Whether the reflectance terms rise by `_RISE` at most, and F falls by more."""
+    objective, x, work = GlossObjective(problem.fitted, problem.bumps), gloss.packed(), problem.work
+    before, after = (
+        reflectance.cost(work.diffuse, shading)
+        for shading in (work.shading[work.mask], _new_shading(d, problem, gloss))
+    )
+    fall = objective.without_gloss() - objective(x, np.empty_like(x))
+    return after - before < min(fall, _RISE)
+
+
+def _refined(
+    d: Decomposition,
+    fit: LobeFit,
+    problem: GlossProblem,
+    gloss: Gloss,
+) -> Decomposition:
+    d = _reshaped(d, problem, gloss)
+    inside = d.normal[d.mask].astype(float)
+    mirroring = inside if d.camera is None else far_view_normals(inside, d.view_inside)
+    light = rendered(gloss, mirroring)
+    colour = d.specular[d.mask].sum(axis=0, dtype=float)
+    colour = colour / max(float(colour.mean()), 1e-300)
+    new_reflectance = np.zeros_like(d.reflectance)
+    new_reflectance[d.mask] = d.diffuse[d.mask] / d.shading[d.mask]
+    return replace(d, reflectance=new_reflectance, brdf=_lobe(d, fit, gloss, light, colour))
+
+
+def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decomposition:
+    """The result with its changed height, normals and shading."""
+    if problem.bumps is None:
+        return d
+    box, mask = problem.work.box, d.mask
+    change = bumps_of(problem.work, problem.work.step).height(gloss.bumps)
+    height, width = mask[box].shape
+    inside = mask[box]
+    down, right = (slope[:height, :width] for slope in slopes_of(change))
+    old_down, old_right = slopes_of_normals(d.normal[box].astype(float))
+    normal, new_height = d.normal.copy(), d.height.astype(float)
+    normal[box][inside] = normals_of(old_down + down, old_right + right)[inside]
+    new_height[box] += change[:height, :width]
+    new_height = np.where(mask, new_height - new_height[mask].min(), 0)
+    shading = np.zeros_like(d.shading)
+    basis = real_sh(normal[mask].astype(float))
+    light = _refitted(basis, real_sh(d.normal[mask].astype(float)), d.illumination)
+    shading[mask] = np.exp(np.einsum("nk,kc->nc", basis, light))
+    if d.visibility is not None:
+        shading *= d.visibility
+    return replace(
+        d, normal=normal, height=new_height.astype(np.float32), shading=shading, illumination=light
+    )
+
+
+def _refitted(basis: np.ndarray, old: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """The light (9, 3) whose log shading on the new normals is nearest to that of `light` on the
+    old ones.
+    """
+    wanted = np.einsum("nk,kc->nc", old, light)
+    gram = np.einsum("nk,nl->kl", basis, basis) / len(basis)
+    right = np.einsum("nk,nc->kc", basis, wanted) / len(basis)
+    return solve_linear(gram + _LIGHT_RIDGE * np.eye(9), right + _LIGHT_RIDGE * light)
+
+
+def _lobe(
+    d: Decomposition, fit: LobeFit, gloss: Gloss, light: np.ndarray, colour: np.ndarray
+) -> LobeFit:
+    predicted = np.zeros_like(d.specular)
+    predicted[d.mask] = light[:, None] * colour
+    given = d.specular[d.mask].astype(float)
+    left = float(np.square(given - predicted[d.mask]).sum())
+    total = max(float(np.square(given).sum()), 1e-300)
+    alpha, factor = gloss.alpha, float(np.exp(_STRENGTH_SPREAD))
+    low = _LEAST_ALPHA if fit.outcome.bounded else alpha * float(np.exp(-ROUGHNESS_SPREAD))
+    high = alpha if fit.outcome.bounded else min(alpha * float(np.exp(ROUGHNESS_SPREAD)), 1.0)
+    strengths = gloss.strengths
+    lights = []
+    for k in np.argsort(-strengths, kind="stable"):
+        strength = strengths[k] * colour
+        cone = fit.lights[0].cone if k == 0 else _OTHER_CONE
+        interval = Interval(strength / factor, strength * factor)
+        lights.append(LobeLight(gloss.units[k], cone, strength, interval))
+    outcome = fit.outcome if fit.outcome.bounded else LobeFitOutcome.DETERMINED
+    return LobeFit(
+        CONVENTION["ggx"],
+        outcome,
+        alpha,
+        Interval(low, high),
+        tuple(lights),
+        None,
+        None,
+        float(np.clip(1 - left / total, 0, 1)),
+        predicted,
+    )
+
+
+def _noted(done: GlossRefinement, options: GlossOptions) -> GlossRefinement:
+    """The outcome with a note in the settings of its result, and the lobe in its status."""
+    d = done.result
+    note = {
+        "kept": done.kept,
+        "lamps": done.lamps,
+        "held_out_before": done.before,
+        "held_out_after": done.after,
+        "seed": options.seed,
+    }
+    provenance = replace(d.provenance, settings={**d.provenance.settings, NOTE: note})
+    if done.kept:
+        diagnostics = replace(d.provenance.diagnostics, lobe=FittedLobe(d.brdf).diagnostics)
+        provenance = replace(provenance, diagnostics=diagnostics)
+    return replace(done, result=replace(d, provenance=provenance))

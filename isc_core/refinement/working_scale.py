@@ -1,0 +1,143 @@
+"""A result at the scale at which its gloss is fitted: the object at most `LONGEST` pixels long.
+
+Equation: means over blocks of `step` x `step` pixels, of those inside the mask; a block counts
+where more than half of it is inside.
+
+Limits: highlights narrower than a block are blurred.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..imaging.bounding_box import mask_slices
+from ..scene.decomposition import Decomposition
+from ..shading.perspective import far_view_normals
+
+LONGEST = 192
+_CLIPPED = 0.995  # of the brightest value
+_STEEPEST = 1e-3  # of a normal's z
+
+
+@dataclass(frozen=True)
+class WorkingScale:
+    """The maps of a result over the box of its object, reduced.
+
+    Attributes
+    ----------
+    box : tuple of slice
+        Of the object in the result's maps.
+    step : int
+        Pixels of the maps to one of these.
+    mask, clipped : (h, w) ndarray of bool
+    specular : (h, w) ndarray
+        Mean of the channels.
+    normal : (h, w, 3) ndarray
+        Unit normals that mirror to a viewer along z.
+    diffuse, shading : (h, w, 3) ndarray
+    """
+
+    box: tuple[slice, slice]
+    step: int
+    mask: np.ndarray
+    clipped: np.ndarray
+    specular: np.ndarray
+    normal: np.ndarray
+    diffuse: np.ndarray
+    shading: np.ndarray
+
+    @property
+    def slopes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Slopes (h, w) of the height along rows and columns, 0 outside the mask."""
+        return slopes_of_normals(self.normal)
+
+    def reduced(self, layer: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """Reduce a layer of the result.
+
+        Parameters
+        ----------
+        layer : (H, W, ...) ndarray
+        mask : (H, W) ndarray of bool
+            Of the result.
+
+        Returns
+        -------
+        (h, w, ...) ndarray
+        """
+        return _means(layer[self.box].astype(float), mask[self.box], self.step)[1]
+
+
+def slopes_of_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the slopes of the height along rows and columns that normals have.
+
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        Unit normals, camera frame.
+
+    Returns
+    -------
+    down, right : (...) ndarray
+    """
+    facing = np.maximum(normal[..., 2], _STEEPEST)
+    return normal[..., 1] / facing, -normal[..., 0] / facing
+
+
+def mirroring_normals(d: Decomposition) -> np.ndarray:
+    """Return normals (H, W, 3) that mirror the same light to a viewer along z.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        The result's own without a camera.
+    """
+    normal = d.normal.astype(float)
+    return normal if d.camera is None else far_view_normals(normal, d.view)
+
+
+def working_scale(d: Decomposition) -> WorkingScale:
+    """Reduce a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    WorkingScale
+    """
+    box = mask_slices(d.mask)
+    mask = d.mask[box]
+    step = -(-max(mask.shape) // LONGEST)
+    image = d.image[box].max(axis=2)
+    clipped = mask & (image >= _CLIPPED * image.max())
+    share = _means(mask.astype(float), mask, step)[0]
+    inside = share > 0.5
+    normal = _means(mirroring_normals(d)[box], mask, step)[1]
+    length = np.linalg.norm(normal, axis=-1, keepdims=True)
+    normal = np.where(
+        inside[..., None] & (length > 0), normal / np.maximum(length, 1e-9), (0, 0, 1)
+    )
+    specular, diffuse, shading = (
+        np.where(inside[..., None], _means(layer[box].astype(float), mask, step)[1], 0)
+        for layer in (d.specular, d.diffuse, d.shading)
+    )
+    any_clipped = inside & (_means(clipped.astype(float), mask, step)[1] > 0)
+    return WorkingScale(
+        box, step, inside, any_clipped, specular.mean(axis=2), normal, diffuse, shading
+    )
+
+
+def _means(values: np.ndarray, mask: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
+    """Of each block: the share inside the mask, and the mean of what is inside."""
+    planes = values.reshape(*mask.shape, -1) * mask[..., None]
+    planes = np.concatenate([planes, mask[..., None].astype(float)], axis=2)
+    padded = np.pad(planes, [(0, -n % step) for n in mask.shape] + [(0, 0)])
+    rows, columns = (n // step for n in padded.shape[:2])
+    sums = padded.reshape(rows, step, columns, step, -1).sum(axis=(1, 3))
+    means = sums[..., :-1] / np.maximum(sums[..., -1:], 1)
+    return sums[..., -1] / step**2, means.reshape(rows, columns, *values.shape[2:])
