@@ -110,7 +110,7 @@ class ReliefRule:
         return 0.0 if evidence is None else self.factor * belief(self.probability(evidence))
 
 
-RULE = ReliefRule(-1.44, 2.65, 1.92, 1.3)
+RULE = ReliefRule(-1.43, 2.66, 1.91, 1.35)
 
 
 def belief(probability: float) -> float:
