@@ -17,10 +17,11 @@ The probability of relief is logistic in c and r,
 
 Relief is multiplied by
 
-    a b(p),   b(p) = log (p / (1 - p)) / log 4, at least 0 and at most 1,
+    a b(p),   b(p) = (p - .4) / .3, at least 0 and at most 1,
 
-so that nothing is added where paint is as likely, and all of it from odds of four. The four numbers
-are fitted to the choice set of rendered bodies by `benchmarks.detail.relief_rule`.
+so that nothing is added where paint is clearly more likely, and all of it where relief is. The
+numbers are fitted to the choice set of rendered bodies: the four weights by
+`benchmarks.detail.relief_rule`.
 
 Citation: the direction of the light shows in the spectrum of relief: A. Pentland, "Finding the
 illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et al., "Classifying
@@ -44,8 +45,7 @@ _SMOOTH = 2.0  # standard deviation of the average, pixels
 _DARK = 0.01  # of the object's mean light
 _LEAST_GAIN = 0.05
 _FEWEST = 30  # blocks
-_CERTAIN = 4.0  # odds
-_TINY = 1e-12
+_NOTHING, _ALL = 0.4, 0.7  # probabilities: up to the one nothing is believed, from the other all
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ class ReliefRule:
         return 0.0 if evidence is None else self.factor * belief(self.probability(evidence))
 
 
-RULE = ReliefRule(-1.43, 2.66, 1.91, 1.35)
+RULE = ReliefRule(-1.43, 2.66, 1.91, 1.25)
 
 
 def belief(probability: float) -> float:
@@ -125,8 +125,7 @@ def belief(probability: float) -> float:
     -------
     float
     """
-    odds = probability / max(1 - probability, _TINY)
-    return float(np.clip(np.log(max(odds, _TINY)) / np.log(_CERTAIN), 0, 1))
+    return float(np.clip((probability - _NOTHING) / (_ALL - _NOTHING), 0, 1))
 
 
 def evidence_of(

@@ -24,7 +24,7 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
 
 
 def test_the_factor_stops_where_too_much_is_invented() -> None:
-    shares, probability = np.array(SHARES), np.array([0.8, 2 / 3])
+    shares, probability = np.array(SHARES), np.array([0.8, 0.55])
     gained = (1 - (1 - shares / 1.5) ** 2)[:, None]
     rows = [
         {"explained": gained, "error": 0 * gained, "energy": np.ones_like(gained)},
