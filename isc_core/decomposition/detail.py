@@ -48,6 +48,7 @@ from ..shading.relief_from_shading import (
     slopes,
 )
 from ..sirfs.recover import Window
+from .settings import Illumination
 from .task import DecompositionTask, SceneEstimate
 
 MULTIPLE = 8  # sides of the frame on the coarsest level, and of tiles
@@ -126,7 +127,8 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
     Parameters
     ----------
     task : DecompositionTask
-        The photo and the settings. Where the shape is known or was measured, it stays as it is.
+        The photo and the settings. The height stays as it is where it is known or was measured, and
+        in the illuminations of MIT-Berkeley.
     estimate : SceneEstimate
         What a model recovered.
 
@@ -139,8 +141,10 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
     Cancelled
         If the monitor cancels.
     """
-    known = task.known
-    if not task.settings.detail or known.height is not None or known.depth is not None:
+    known, settings = task.known, task.settings
+    # What tells relief from paint was fitted to photos.
+    is_photo = settings.illumination == Illumination.PHOTO
+    if not (settings.detail and is_photo) or known.height is not None or known.depth is not None:
         return estimate
     with task.clock.stage("fine relief"):
         relief = fine_relief(

@@ -179,8 +179,8 @@ class Settings:
     full_size : bool
         The maps have the photo's resolution, as with a `max_size` of 0.
     detail : int
-        For `SIRFS_MODELS`: long side of the object, pixels, at which the finest relief is looked
-        for, see `decomposition.detail`; 0 for the overall shape alone.
+        For `SIRFS_MODELS` in the illumination `photo`: long side of the object, pixels, at which
+        the finest relief is looked for, see `decomposition.detail`; 0 for the overall shape alone.
     engine : str
         "auto", "numba" or "numpy", see `SolverOptions`.
     threads : int

@@ -189,8 +189,8 @@ def add_main_settings(group: Group) -> None:
         type=count,
         default=defaults.detail,
         metavar="N",
-        help="long side of the object at which the finest relief is looked for, in pixels "
-        "(default %(default)s; 0: the overall shape alone)",
+        help="long side of the object at which the finest relief is looked for, in pixels, with "
+        "--illumination photo (default %(default)s; 0: the overall shape alone)",
     )
     group.add_argument(
         "--arrays",

@@ -97,6 +97,13 @@ def test_detail_changes_normals_and_keeps_the_light_and_the_identities() -> None
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("illumination", ["natural", "laboratory"])
+def test_nothing_is_added_in_other_illuminations(illumination: str) -> None:
+    with_relief, without = (solved(96, detail=n, illumination=illumination) for n in (1024, 0))
+    assert np.array_equal(with_relief.height, without.height)
+
+
+@pytest.mark.slow
 def test_the_overall_shape_does_not_depend_on_the_size_of_the_maps() -> None:
     small, large = (solved(240, detail=0, max_size=size) for size in (96, 0))
     assert small.mask.shape[0] < large.mask.shape[0]
