@@ -35,7 +35,7 @@ from scipy import ndimage
 
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.resampling import resample_inside
-from isc_core.imaging.smoothing import masked_gaussian
+from isc_core.imaging.smoothing import masked_gaussian, masked_low_pass
 
 OCTAVES = (16, 8, 4)
 LENGTH, BASE_LENGTH = 860, 256
@@ -198,10 +198,7 @@ def at_size(normal: np.ndarray, inside: np.ndarray, shape: tuple[int, ...]) -> n
 
 def _low_passed(field: np.ndarray, mask: np.ndarray, cut: float) -> np.ndarray:
     """L_c of the module."""
-    rest = field
-    for _ in range(3):
-        rest = rest - masked_gaussian(rest, mask, _SIGMA * cut)
-    return np.asarray(field - rest)
+    return masked_low_pass(field, mask, _SIGMA * cut)
 
 
 def _turned_to_viewer(normal: np.ndarray, middle: np.ndarray) -> np.ndarray:

@@ -33,7 +33,7 @@ from isc_core.decomposition.settings import MOST_DETAIL, Settings
 from isc_core.decomposition.task import DecompositionTask, SceneEstimate, SolveOptions
 from isc_core.errors import InputError
 from isc_core.photo import read_photo
-from isc_core.shading.relief_evidence import ReliefRule, belief
+from isc_core.shading.relief_evidence import ReliefRule, added_share
 
 from .body_rows import body_rows
 from .measure import judge
@@ -149,10 +149,10 @@ def best_factor(
         np.array([row[name] for row in rows]) for name in ("explained", "error", "energy")
     )
     scale = energy[is_relief, 0].mean(axis=0)
-    believed = np.array([belief(p) for p in probability])
+    added = np.array([added_share(p) for p in probability])
     best = (0.0, np.zeros(explained.shape[2]), np.zeros(explained.shape[2]))
     for factor in np.arange(0, _MOST, 0.05):
-        shares = factor * believed
+        shares = factor * added
         known = _at(explained[is_relief], shares[is_relief]).mean(axis=0)
         false = _at(error[~is_relief], shares[~is_relief]).mean(axis=0) / scale
         if false.max() <= _INVENTED and known.mean() > best[1].mean():

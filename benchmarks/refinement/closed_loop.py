@@ -17,6 +17,7 @@ import numpy as np
 
 from benchmarks.blender.renders import RenderVariant, render
 from blender_addon.files.result_arrays import read_result
+from isc_core.evaluation.metrics import psnr
 from isc_core.refinement import refine_gloss
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition
@@ -47,8 +48,8 @@ def closed_loop(d: Decomposition, folder: Path, samples: int, *, gloss: bool = T
     variant = RenderVariant(gloss="lobe" if gloss else "none")
     found, _ = render(read_result(folder), variant, samples)
     white = float(np.percentile(d.image[d.mask], _WHITE))
-    photo, seen = (np.minimum(layer[d.mask] / white, 1) for layer in (d.image, found))
-    return float(-10 * np.log10(np.square(photo - seen).mean() + 1e-12))
+    photo, seen = (np.minimum(layer / white, 1) for layer in (d.image, found))
+    return psnr(photo, seen, d.mask)
 
 
 def main() -> None:

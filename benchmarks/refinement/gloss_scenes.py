@@ -30,6 +30,8 @@ from synth.scene.lights import DirectionalLight, EnvironmentLight, Light, panel_
 from synth.scene.materials import Material
 from synth.shapes import SHAPES, make_shape
 
+from .scenes import centred
+
 SEED, CHOSEN_ON = 31, 100
 KINDS = ("directional", "small", "point", "panel", "area", "sh")
 _PANELS = {"small": 2.0, "panel": 6.0}
@@ -106,9 +108,7 @@ def _photo(maps: dict[str, np.ndarray]) -> Photo:
 
 def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng([SEED, number])
-    mesh = make_shape(SHAPES[(number * 5 + number // 6) % len(SHAPES)], rng)
-    low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
-    mesh = replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
+    mesh = centred(make_shape(SHAPES[(number * 5 + number // 6) % len(SHAPES)], rng))
     alpha = float(np.exp(rng.uniform(*np.log(_ALPHAS))))
     strength = 0.0 if number % _MATT == _MATT - 1 else float(rng.uniform(*_STRENGTHS))
     albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)

@@ -26,6 +26,7 @@ from synth.rendering import RenderOptions
 from synth.scene import Scene
 from synth.scene.lights import Light, panel_toward_origin
 from synth.scene.materials import Material
+from synth.scene.meshes import Mesh
 from synth.shapes import make_shape
 
 SEED, CHOSEN_ON = 29, 100
@@ -92,6 +93,21 @@ def scene_of(folder: Path, number: int, size: int) -> RefinementScene:
     return RefinementScene(number, str(maps["light"]), maps, load(start), start)
 
 
+def centred(mesh: Mesh) -> Mesh:
+    """Move a mesh so that the middle of its box, seen from the front, is the origin.
+
+    Parameters
+    ----------
+    mesh : Mesh
+
+    Returns
+    -------
+    Mesh
+    """
+    low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
+    return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
+
+
 def _photo(maps: dict[str, np.ndarray], size: int) -> Photo:
     mask = maps["mask"]
     source = PhotoSource("", (size, size), 32, "linear", "file")
@@ -101,9 +117,7 @@ def _photo(maps: dict[str, np.ndarray], size: int) -> Photo:
 def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
     rng = np.random.default_rng([SEED, number])
     kind = SMOOTH if number % 3 == 2 else LAMPS[(number // 3 + number % 3) % len(LAMPS)]
-    mesh = make_shape(_SHAPES[number % len(_SHAPES)], rng)
-    low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
-    mesh = replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
+    mesh = centred(make_shape(_SHAPES[number % len(_SHAPES)], rng))
     alpha = float(np.exp(rng.uniform(*np.log(_ALPHAS))))
     strength = float(rng.uniform(0.6, 1.5))
     albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)

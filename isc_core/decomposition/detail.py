@@ -36,7 +36,7 @@ from ..imaging.blocks import block_means
 from ..imaging.bounding_box import mask_slices
 from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
-from ..imaging.smoothing import masked_gaussian
+from ..imaging.smoothing import masked_gaussian, masked_low_pass
 from ..imaging.tiles import Place, tiles_of
 from ..progress import Monitor
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
@@ -57,7 +57,7 @@ _SOLVED = 300  # pixels: the coarsest level's object is not longer
 _TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
 _MARGIN = 16
 _PERIOD = 0.026  # of the object's length: 6.7 pixels of the solve
-_SIGMA = 0.2829  # of a Gaussian over the period of which three passes keep half
+_SIGMA = 0.2829  # of the low pass over the period of which it keeps half
 _DARK = 0.01  # of the object's mean light
 
 
@@ -307,13 +307,14 @@ class Pyramid:
 
     def _from_coarsest(self) -> Iterator[tuple[Level, float, _Smooth]]:
         """Each level with the object's length and the smooth surface, the coarsest first."""
-        smooth = self._coarsest()
+        smooth = self._coarsest
         for k in range(len(self.levels) - 1, -1, -1):
             level = self.levels[k]
             yield level, self.frame.length / 2**k, smooth
             if k:
                 smooth = smooth.finer(level.mask.shape)
 
+    @cached_property
     def _coarsest(self) -> _Smooth:
         level = self.levels[-1]
         left = _log_light(level.image, level.mask, level.mean) - log_shading(self.slope, self.light)
@@ -361,10 +362,7 @@ def _log_light(image: np.ndarray, mask: np.ndarray, mean: np.float32) -> np.ndar
 
 def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:
     """Low frequencies (H, W) of a level's map inside the mask, continued a little beyond it."""
-    sigma, rest = _SIGMA * _PERIOD * length, values
-    for _ in range(3):
-        rest = rest - masked_gaussian(rest, mask, sigma)
-    low = np.where(mask, values - rest, 0)
+    low = np.where(mask, masked_low_pass(values, mask, _SIGMA * _PERIOD * length), 0)
     return np.where(mask, low, masked_gaussian(low, mask, 1.0))
 
 

@@ -32,6 +32,27 @@ def masked_gaussian(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.nda
     return weighted_gaussian(layer, mask.astype(layer.dtype), sigma, _TINY)
 
 
+def masked_low_pass(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
+    """Return the low frequencies of a layer, 1 - (1 - G)^3 of it, G being `masked_gaussian`.
+
+    Parameters
+    ----------
+    layer : (H, W) or (H, W, C) ndarray
+    mask : (H, W) bool ndarray
+    sigma : float
+        Standard deviation of G in pixels: a period of 3.535 sigma keeps half.
+
+    Returns
+    -------
+    ndarray
+        Of the layer's shape.
+    """
+    rest = layer
+    for _ in range(3):
+        rest = rest - masked_gaussian(rest, mask, sigma)
+    return np.asarray(layer - rest)
+
+
 def weighted_gaussian(
     layer: np.ndarray, weight: np.ndarray, sigma: float, floor: float
 ) -> np.ndarray:

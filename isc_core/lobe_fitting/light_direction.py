@@ -141,13 +141,9 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
     samples = _samples(d, d.shading)
     facing = np.maximum(samples.normal @ direction, 0)
     design = np.stack([facing, np.ones_like(facing)], 1)
-    fits = [nnls(design, column) for column in samples.values.T]
-    strength, ambient = np.transpose([fit[0] for fit in fits])
-    whole = float(np.square(samples.values - samples.values.mean(0)).sum())
-    rest = sum(float(fit[1]) ** 2 for fit in fits)
-    explained = (
-        float(np.clip(1 - rest / whole, 0, 1)) if whole > 1e-12 * samples.values.size else 0.0
-    )
+    strength, ambient = np.transpose([nnls(design, column)[0] for column in samples.values.T])
+    error = samples.values - (facing[:, None] * strength + ambient)
+    explained = _explained(error, np.square(samples.values - samples.values.mean(0)).sum())
     return DirectionalLight(direction, np.pi * strength, ambient), explained
 
 

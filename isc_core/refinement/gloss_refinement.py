@@ -27,7 +27,6 @@ from ..numerics.linear import solve_linear
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
-from ..shading.perspective import far_view_normals
 from ..shading.spherical_harmonics import real_sh
 from .gloss_fit import GlossProblem, bumps_of, explained, fit_gloss, gloss_problem, minimised
 from .gloss_objective import (
@@ -39,7 +38,7 @@ from .gloss_objective import (
     slopes_of,
 )
 from .reflectance_terms import ReflectanceTerms, terms_of, with_diffuse
-from .working_scale import WorkingScale, slopes_of_normals, working_scale
+from .working_scale import WorkingScale, mirroring_normals, slopes_of_normals, working_scale
 
 _LEAST, _RISE = 0.25, 1.0
 _STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # of `lobe_fitting.recovered`; degrees
@@ -202,9 +201,7 @@ def _refined(
     gloss: Gloss,
 ) -> Decomposition:
     d = _reshaped(d, problem, gloss)
-    inside = d.normal[d.mask].astype(float)
-    mirroring = inside if d.camera is None else far_view_normals(inside, d.view_inside)
-    light = rendered(gloss, mirroring)
+    light = rendered(gloss, mirroring_normals(d)[d.mask])
     colour = d.specular[d.mask].sum(axis=0, dtype=float)
     colour = colour / max(float(colour.mean()), 1e-300)
     new_reflectance = np.zeros_like(d.reflectance)

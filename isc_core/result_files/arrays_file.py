@@ -217,7 +217,7 @@ def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
 def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     gloss = built.gloss
     values = {
-        "lobe": np.zeros(d.image.shape) if d.brdf is None else d.brdf.predicted,
+        "lobe": d.lobe,
         "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
         "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
     }

@@ -174,6 +174,11 @@ class Decomposition:
         """`view` of the mask's N pixels: (3,) or (N, 3)."""
         return self.view if self.camera is None else self.view[self.mask]
 
+    @property
+    def lobe(self) -> np.ndarray:
+        """Specular image (H, W, 3) that the fitted lobe predicts; 0 without a fit."""
+        return np.zeros_like(self.specular) if self.brdf is None else self.brdf.predicted
+
     def identity_errors(self) -> IdentityErrors:
         """Measure how well the maps satisfy the identities inside the mask.
 

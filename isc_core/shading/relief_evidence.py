@@ -45,7 +45,7 @@ _SMOOTH = 2.0  # standard deviation of the average, pixels
 _DARK = 0.01  # of the object's mean light
 _LEAST_GAIN = 0.05
 _FEWEST = 30  # blocks
-_NOTHING, _ALL = 0.4, 0.7  # probabilities: up to the one nothing is believed, from the other all
+_NOTHING, _ALL = 0.4, 0.7  # probabilities: up to the one nothing is added, from the other all
 
 
 @dataclass(frozen=True)
@@ -107,14 +107,14 @@ class ReliefRule:
         float
             0 without evidence, so that nothing is made up.
         """
-        return 0.0 if evidence is None else self.factor * belief(self.probability(evidence))
+        return 0.0 if evidence is None else self.factor * added_share(self.probability(evidence))
 
 
 RULE = ReliefRule(-1.43, 2.66, 1.91, 1.25)
 
 
-def belief(probability: float) -> float:
-    """Return which part of a relief is believed, b of the module.
+def added_share(probability: float) -> float:
+    """Return which share of a relief is added, b of the module.
 
     Parameters
     ----------

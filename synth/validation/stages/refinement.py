@@ -136,7 +136,7 @@ def _errors(
     truth: GroundTruth, start: Decomposition, d: Decomposition
 ) -> tuple[float | None, float | None, float | None, float | None]:
     mask, shown = start.mask, start.specular.mean(axis=2)
-    lobe = np.zeros_like(d.specular) if d.brdf is None else d.brdf.predicted
+    lobe = d.lobe
     photo = np.square(d.image - d.diffuse - lobe)[mask].mean(dtype=float)
     glossy = truth.specular[mask].any()
     gloss = np.square(truth.specular - lobe)[mask].mean(dtype=float) if glossy else None
@@ -165,8 +165,7 @@ def show_refinement(truth: GroundTruth, answer: Refined) -> tuple[StagePicture, 
     gain = exposure(truth.image, truth.mask)
     pairs = [("photo", truth.image)]
     for caption, d in (("start, rendered", answer.start), ("refined", answer.done.result)):
-        lobe = np.zeros_like(d.specular) if d.brdf is None else d.brdf.predicted
-        pairs.append((caption, d.diffuse + lobe))
+        pairs.append((caption, d.diffuse + d.lobe))
     return tuple(StagePicture(caption, lit(gain * values, truth.mask)) for caption, values in pairs)
 
 
@@ -185,7 +184,7 @@ def refinement_maps(answer: Refined) -> dict[str, np.ndarray]:
     """
     layers = {"specular": answer.start.specular}
     for name, d in (("start", answer.start), ("refined", answer.done.result)):
-        layers[name] = np.zeros_like(d.specular) if d.brdf is None else d.brdf.predicted
+        layers[name] = d.lobe
     return {
         f"{name}.{letter}": values[..., k]
         for name, values in layers.items()
