@@ -8,13 +8,13 @@ stored in a row for each body, so that an interrupted run continues; with `--kin
 made.
 
 Equation: weights w minimise the logistic loss + l |w|^2 / 2 over bodies, l = 1 (the offset is
-free). The share of a body's relief that is added is a b(p), p its probability by the weights of the
-others. The factor a is that of a grid that explains most of the relief, mean over bodies and
-octaves, where what is invented on print is at most .05 of the relief's energy in every octave.
+free). The share of a body's relief that is added is b(p), p its probability by the weights of the
+others. Printed are the relief that is then explained and what is invented on print, over the
+relief's energy, means over bodies in every octave.
 
 Citation: see `isc_core.shading.relief_evidence`.
 
-Limits: sixty bodies decide four numbers; others have to judge them.
+Limits: sixty bodies decide three numbers; others have to judge them.
 """
 
 import argparse
@@ -40,10 +40,8 @@ from .measure import judge
 from .rendering import SetKind
 from .sets import PHOTO, read_truth
 
-SHARES = (0.0, 0.7, 1.4)  # the figures are nearly quadratic in the share
-_MOST = 2.0
+SHARES = (0.0, 0.5, 1.0)  # the figures are nearly quadratic in the share
 _RIDGE = 1.0
-_INVENTED = 0.05
 _STEPS = 50
 
 
@@ -127,10 +125,10 @@ def left_out(features: np.ndarray, is_relief: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
-def best_factor(
+def figures(
     rows: Sequence[Mapping[str, Any]], probability: np.ndarray, is_relief: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Choose the factor of the probability.
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is explained and what is invented.
 
     Parameters
     ----------
@@ -142,22 +140,15 @@ def best_factor(
 
     Returns
     -------
-    factor : float
     explained, invented : (octaves,) ndarray
     """
     explained, error, energy = (
         np.array([row[name] for row in rows]) for name in ("explained", "error", "energy")
     )
-    scale = energy[is_relief, 0].mean(axis=0)
     added = np.array([added_share(p) for p in probability])
-    best = (0.0, np.zeros(explained.shape[2]), np.zeros(explained.shape[2]))
-    for factor in np.arange(0, _MOST, 0.05):
-        shares = factor * added
-        known = _at(explained[is_relief], shares[is_relief]).mean(axis=0)
-        false = _at(error[~is_relief], shares[~is_relief]).mean(axis=0) / scale
-        if false.max() <= _INVENTED and known.mean() > best[1].mean():
-            best = (float(factor), known, false)
-    return best
+    known = _at(explained[is_relief], added[is_relief]).mean(axis=0)
+    false = _at(error[~is_relief], added[~is_relief]).mean(axis=0)
+    return known, false / energy[is_relief, 0].mean(axis=0)
 
 
 def _at(values: np.ndarray, shares: np.ndarray) -> np.ndarray:
@@ -199,11 +190,10 @@ def _print_rule(rows: Sequence[Mapping[str, Any]]) -> None:
     features = np.array([row["evidence"] for row in rows])
     probability = left_out(features, is_relief)
     weights = logistic_weights(features, is_relief)
-    factor, explained, invented = best_factor(rows, probability, is_relief)
+    explained, invented = figures(rows, probability, is_relief)
     print(f"{np.mean((probability > 0.5) == is_relief):.0%} of bodies told, each left out")
     print("explained", np.round(explained, 3), "invented", np.round(invented, 4))
-    offset, correlation, along = (round(float(weight), 2) for weight in weights)
-    print(ReliefRule(offset, correlation, along, round(factor, 2)))
+    print(ReliefRule(*(round(float(weight), 2) for weight in weights)))
 
 
 if __name__ == "__main__":

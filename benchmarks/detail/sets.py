@@ -1,10 +1,11 @@
 """Write the measured sets: photos of bodies with relief, and of smooth bodies with print.
 
-  python -m benchmarks.detail.sets FOLDER --panoramas DIR --part choice|report [--count N]
+  python -m benchmarks.detail.sets FOLDER --panoramas DIR --part choice|lights|report [--count N]
 
 FOLDER gets `relief_NN` and `print_NN`, each with `photo.png` (the mask in alpha) and `truth.npz`.
-What is there already is kept. Half of the panoramas kept from learning light the bodies of one
-part, half those of the other: methods are chosen on `choice`, figures reported on `report`.
+What is there already is kept. Methods are chosen on `choice` and `lights`, figures reported on
+`report`. Half of the panoramas kept from learning light the bodies of `choice`, half those of
+`report`; all others light the bodies of `choice` once more in `lights`.
 """
 
 import argparse
@@ -33,7 +34,11 @@ class Part(StrEnum):
     """What a set is for."""
 
     CHOICE = "choice"
+    LIGHTS = "lights"
     REPORT = "report"
+
+
+_SEEDS = {Part.CHOICE: 0, Part.LIGHTS: 0, Part.REPORT: 1}
 
 
 @dataclass(frozen=True)
@@ -145,14 +150,15 @@ def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> 
     InputError
         If the panoramas cannot be used or the folder cannot be written.
     """
-    kept = [one.radiance for one in read_panoramas(panoramas, 0) if one.judged]
-    rooms = kept[part == Part.REPORT :: 2]
-    seed = list(Part).index(part)
+    kept = part != Part.LIGHTS
+    rooms = [one.radiance for one in read_panoramas(panoramas, 0) if one.judged == kept]
+    if kept:
+        rooms = rooms[part == Part.REPORT :: 2]
     for number in range(count):
         for kind in SetKind:
             if (folder / f"{kind}_{number:02d}" / TRUTH).exists():
                 continue
-            scene = render(kind, seed, number, rooms)
+            scene = render(kind, _SEEDS[part], number, rooms)
             write_scene(folder, scene)
             yield scene.name
 

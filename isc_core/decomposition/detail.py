@@ -11,7 +11,7 @@ of the photo's mean channel, the fine changes on a level are
 L being the low frequencies of I - S on the coarsest level (periods above `_PERIOD` of the object's
 length), and U linear interpolation. From the coarsest level on, the relief R of a level is that
 which explains d (`shading.relief_from_shading`), found from 2 U R of the level before. The height
-is that of the solve plus a R of the finest level; a, which is 0 for paint, is what the whole object
+is that of the solve plus b R of the finest level; b, which is 0 for paint, is what the whole object
 says (`shading.relief_evidence`). On the coarsest level R loses its low frequencies
 too, so that no level moves the overall shape; the light stays as it is.
 

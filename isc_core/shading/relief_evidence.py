@@ -17,11 +17,10 @@ The probability of relief is logistic in c and r,
 
 Relief is multiplied by
 
-    a b(p),   b(p) = (p - .4) / .3, at least 0 and at most 1,
+    b(p) = (p - .4) / .3, at least 0 and at most 1,
 
 so that nothing is added where paint is clearly more likely, and all of it where relief is. The
-numbers are fitted to the choice set of rendered bodies: the four weights by
-`benchmarks.detail.relief_rule`.
+weights are fitted to the choice set of rendered bodies by `benchmarks.detail.relief_rule`.
 
 Citation: the direction of the light shows in the spectrum of relief: A. Pentland, "Finding the
 illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et al., "Classifying
@@ -72,14 +71,11 @@ class ReliefRule:
     ----------
     offset, correlation, along : float
         Weights of the logistic regression.
-    factor : float
-        Of what shading explains; SIRFS' light is rather too even.
     """
 
     offset: float
     correlation: float
     along: float
-    factor: float
 
     def probability(self, evidence: Evidence) -> float:
         """Return the probability of relief.
@@ -107,10 +103,10 @@ class ReliefRule:
         float
             0 without evidence, so that nothing is made up.
         """
-        return 0.0 if evidence is None else self.factor * added_share(self.probability(evidence))
+        return 0.0 if evidence is None else added_share(self.probability(evidence))
 
 
-RULE = ReliefRule(-1.43, 2.66, 1.91, 1.25)
+RULE = ReliefRule(-1.43, 2.66, 1.91)
 
 
 def added_share(probability: float) -> float:

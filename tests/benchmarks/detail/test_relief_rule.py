@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
-from benchmarks.detail.relief_rule import SHARES, best_factor, left_out, logistic_weights
+from benchmarks.detail.relief_rule import SHARES, figures, left_out, logistic_weights
 
 
 def test_weights_of_a_known_boundary() -> None:
@@ -23,16 +23,13 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
     assert left_out(features, is_relief)[4] < 0.5
 
 
-def test_the_factor_stops_where_too_much_is_invented() -> None:
-    shares, probability = np.array(SHARES), np.array([0.8, 0.55])
-    gained = (1 - (1 - shares / 1.5) ** 2)[:, None]
-    rows = [
-        {"explained": gained, "error": 0 * gained, "energy": np.ones_like(gained)},
-        {"explained": gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained},
-    ]
-    is_relief = np.array([True, False])
-    factor, explained, invented = best_factor(rows, probability, is_relief)
-    assert np.isclose(factor, 1.0) and 0.88 < explained[0] < 0.90 and invented[0] <= 0.0501
-    rows[1]["error"] = 0 * gained
-    factor, explained, invented = best_factor(rows, probability, is_relief)
-    assert np.isclose(factor, 1.5) and explained[0] > 0.999 and invented[0] == 0
+def test_what_is_explained_and_invented_follows_from_the_added_shares() -> None:
+    shares, probability = np.array(SHARES), np.array([0.55, 0.4, 0.7, 0.55])
+    gained = (1 - (1 - shares) ** 2)[:, None]
+    relief = {"explained": gained, "error": 0 * gained, "energy": 2 + 0 * gained}
+    paint = {"explained": 0 * gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained}
+    rows = [relief, relief, paint, paint]
+    is_relief = np.array([True, True, False, False])
+    explained, invented = figures(rows, probability, is_relief)
+    assert np.allclose(explained, (0.75 + 0) / 2)
+    assert np.allclose(invented, (0.2 + 0.05) / 2 / 2)
