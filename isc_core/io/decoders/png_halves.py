@@ -11,6 +11,7 @@ import io
 import struct
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from PIL import PngImagePlugin
@@ -55,8 +56,13 @@ def deep_codes(header: bytes, packed: bytes) -> np.ndarray:
     if len(lines) != length:
         raise ValueError("pixels are missing")
     start = header[:8] + b"\x08" + header[9:]
-    high, low = (_decoded(start, lines, sizes, pixel, half) for half in (0, 1))
-    return (high.astype(np.uint16) << 8) | low
+    with ThreadPoolExecutor(1) as aside:
+        other = aside.submit(_decoded, start, lines, sizes, pixel, 1)
+        high, low = _decoded(start, lines, sizes, pixel, 0), other.result()
+    codes = high.astype(np.uint16)
+    codes <<= 8
+    codes |= low
+    return codes
 
 
 def _sizes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
@@ -71,15 +77,15 @@ def _decoded(
     header: bytes, lines: np.ndarray, sizes: list[tuple[int, int]], pixel: int, half: int
 ) -> np.ndarray:
     """The high bytes (half 0) or low bytes (1) of all codes."""
-    kept, at = [], 0
+    kept = np.empty(sum(rows * (1 + columns * pixel // 2) for rows, columns in sizes), np.uint8)
+    at = start = 0
     for rows, columns in sizes:
-        line = 1 + columns * pixel
+        line, short = 1 + columns * pixel, 1 + columns * pixel // 2
         whole = lines[at : at + rows * line].reshape(rows, line)
-        part = np.empty((rows, 1 + columns * pixel // 2), np.uint8)
+        part = kept[start : start + rows * short].reshape(rows, short)
         part[:, 0], part[:, 1:] = whole[:, 0], whole[:, 1 + half :: 2]
-        kept.append(part.ravel())
-        at += rows * line
-    pixels = zlib.compress(np.concatenate(kept).data, 0)
+        at, start = at + rows * line, start + rows * short
+    pixels = zlib.compress(kept.data, 0)
     chunks = ((b"IHDR", header), (b"IDAT", pixels), (b"IEND", b""))
     file = SIGNATURE + b"".join(png_chunk(*chunk) for chunk in chunks)
     image = PngImagePlugin.PngImageFile(io.BytesIO(file))
