@@ -55,9 +55,9 @@ def deep_codes(header: bytes, packed: bytes) -> np.ndarray:
         raise ValueError("pixels are missing")
 
     def decoded(half: int) -> np.ndarray:
-        packed = zlib.compress(_halved(lines, sizes, pixel, half).data, 0)
+        stored = zlib.compress(_halved(lines, sizes, pixel, half).data, 0)
         size = width, height
-        return np.asarray(Image.frombytes(mode, size, packed, "zip", mode, interlaced))
+        return np.asarray(Image.frombytes(mode, size, stored, "zip", mode, interlaced))
 
     with ThreadPoolExecutor(1) as aside:
         other = aside.submit(decoded, 1)
