@@ -18,6 +18,7 @@ noticed, see `illuminant.gamut`; the confidence is then lower.
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -63,15 +64,22 @@ def under_light(
     checked = task.options.check_assumptions and settings.model in SEPARATING_MODELS
     if not (wanted or checked):
         return solver(task)
-    with task.clock.stage("estimate light colour"):
-        light = estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
-    used = light.determined and wanted
-    estimate = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
+    with ThreadPoolExecutor(1) as aside:
+        asked = aside.submit(_estimated, task)
+        used = wanted and asked.result().determined  # a model waits only for a colour that it uses
+        colour = asked.result().colour if used else np.ones(3)
+        estimate = _back(solver(_whitened(task, colour)), colour) if used else solver(task)
+        light = asked.result()
     split = scale_confidence(estimate.split) if light.too_strong else estimate.split
     diagnostics = replace(
         estimate.diagnostics, light_colour=_diagnostics(light, settings.light_colour, used)
     )
     return replace(estimate, split=split, diagnostics=diagnostics)
+
+
+def _estimated(task: DecompositionTask) -> Illuminant:
+    with task.clock.stage("estimate light colour"):
+        return estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
 
 
 def under_given_light(

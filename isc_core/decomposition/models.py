@@ -8,7 +8,8 @@ light are given what a network sees in the photo (`predictions`), and `assumptio
 confidence of photos that violate what the models assume.
 
 The network, the separation by colour and the loading of kernels do not wait for each other: they
-run on threads. Results are those of the same functions, whenever they run.
+run on threads; `load` begins while the photo is read. Results are those of the same functions,
+whenever they run.
 
 Limits: where the light's colour is to be estimated, it changes the photo that is separated, which
 then waits. Python interprets one thread at a time: what overlaps are array operations.
@@ -21,9 +22,11 @@ from functools import partial
 from types import TracebackType
 
 from ..io.memory import LARGE, give_back_memory
+from ..networks.scene_network import SceneNetwork
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..sirfs.kernel_cache import load_kernels
+from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import with_warnings
 from .detail import with_fine_relief
 from .layers import separated
@@ -61,6 +64,25 @@ def solve(task: DecompositionTask) -> SceneEstimate:
         return solver(task)
     lit = partial(under_given_light, solver=partial(_solved, solver=solver))
     return under_tone(task, lit)
+
+
+def load(settings: Settings, prior_set: PriorSet | None = None) -> None:
+    """Load what a model needs beside the photo, which `solve` does otherwise: a program can do it
+    on a thread while it reads the photo.
+
+    Parameters
+    ----------
+    settings : Settings
+        That name the model.
+    prior_set : PriorSet, optional
+        As for `decompose`: the shipped priors are not loaded if it is given.
+    """
+    _solver(settings.model)
+    if settings.model not in SIRFS_MODELS:
+        return
+    SceneNetwork.shipped()
+    if settings.engine != "numpy" and prior_set is None:
+        load_kernels(settings.illumination)
 
 
 def _solved(
@@ -166,4 +188,4 @@ def _solver(model: str) -> Callable[[DecompositionTask], SceneEstimate]:
             return baseline
 
 
-__all__ = ["DecompositionTask", "SceneEstimate", "Settings", "SolveOptions", "solve"]
+__all__ = ["DecompositionTask", "SceneEstimate", "Settings", "SolveOptions", "load", "solve"]

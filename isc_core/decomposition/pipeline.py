@@ -106,7 +106,8 @@ def decompose(
     with clock.stage("prepare"):
         maps = photo.resized_to_object(settings.maps_size)
         own_scale = known_shape or settings.model not in SIRFS_MODELS
-        working = maps if own_scale else _working(photo, maps)
+        of_maps = own_scale or settings.maps_size == WORKING_SIZE
+        working = maps if of_maps else _working(photo, maps)
         constraints = _at_scale(inputs, photo, working)
         if not share_in_blocks(maps.mask):
             raise InputError(

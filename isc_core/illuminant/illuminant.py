@@ -113,6 +113,10 @@ class _Changes:
     change: np.ndarray
     block: np.ndarray
 
+    def at(self, chosen: np.ndarray) -> "_Changes":
+        """The changes where `chosen` (N,) bool is set."""
+        return _Changes(self.colour[chosen], self.change[chosen], self.block[chosen])
+
 
 def estimate_illuminant(
     image: np.ndarray,
@@ -160,13 +164,15 @@ def estimate_illuminant(
     changes = _changes(image, mask if clipped is None else mask & ~clipped)
     if without_white(changes.colour, changes.change):
         return _white(IlluminantOutcome.STRONG_OBJECT_COLOUR)
+    here, turn, rising = turns(changes.colour, changes.change)
+    rises, here, turn = changes.at(rising), here[rising], turn[rising]
     shift = np.zeros(2)
     precision = np.zeros((2, 2))
     for _ in range(_GATES):
-        flanks = _flanks(changes, _colour(shift))
-        if flanks.sum() < _FEW:
+        flanks = rises.at(leads_to(_colour(shift), here, turn))
+        if len(flanks.block) < _FEW:
             return _white(IlluminantOutcome.NO_FLANKS)
-        shift, precision = _planes(changes, flanks, shift, options)
+        shift, precision = _planes(flanks, shift, options)
     weakest = float(np.linalg.eigvalsh(precision)[0])
     confidence = weakest / (weakest + 1 / options.prior_deviation**2)
     if np.abs(PLANE @ shift).max() > _FARTHEST:
@@ -269,21 +275,17 @@ def _slices(axis: int, start: int, length: int) -> tuple[slice, ...]:
     return (part,) if axis == 0 else (slice(None), part)
 
 
-def _flanks(changes: _Changes, light: np.ndarray) -> np.ndarray:
-    """Which changes (N,) may be highlights of that light."""
-    here, turn, rising = turns(changes.colour, changes.change)
-    return rising & leads_to(light, here, turn)
-
-
 def _planes(
-    changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: IlluminantOptions
+    flanks: _Changes, shift: np.ndarray, options: IlluminantOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (2,) along `PLANE` and the planes' precision (2, 2) of it."""
-    normals = np.cross(changes.colour[flanks], changes.change[flanks])
+    """The shift (2,) along `PLANE` and the planes' precision (2, 2) of it, from changes that may
+    be highlights of that light.
+    """
+    normals = np.cross(flanks.colour, flanks.change)
     length = np.linalg.norm(normals, axis=1)
     units = normals / length[:, None]
     along, offset = units @ PLANE, units.sum(axis=1)
-    blocks = np.unique(changes.block[flanks], return_inverse=True)[1]
+    blocks = np.unique(flanks.block, return_inverse=True)[1]
     prior = np.eye(2) / options.prior_deviation**2
     precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
     for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):

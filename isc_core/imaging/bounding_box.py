@@ -3,20 +3,25 @@
 import numpy as np
 
 
-def mask_slices(mask: np.ndarray) -> tuple[slice, slice]:
+def mask_slices(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice]:
     """Return the rows and columns of the smallest box around a mask.
 
     Parameters
     ----------
     mask : (H, W) bool ndarray
         At least one pixel is set.
+    margin : int, optional
+        Pixels around the box, as far as the mask has them.
 
     Returns
     -------
     rows, columns : slice
     """
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    along = ((np.flatnonzero(mask.any(axis=1 - k)), mask.shape[k]) for k in (0, 1))
+    rows, columns = (
+        slice(max(set_[0] - margin, 0), min(set_[-1] + 1 + margin, size)) for set_, size in along
+    )
+    return rows, columns
 
 
 def mask_box(mask: np.ndarray) -> tuple[int, int, int, int]:

@@ -23,6 +23,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
 from ..progress import Monitor
 from .coherency_sensitive_hashing import (
     CshOptions,
@@ -118,16 +119,18 @@ def _filled(
     if not len(source):
         return current
     search = CshSearch(source, options.matching)
-    depth = ndimage.distance_transform_edt(~known)
+    near = mask_slices(wanted, PATCH - 1)  # all patches with a wanted pixel lie there
+    depth = ndimage.distance_transform_edt(~known)[near]
+    filled, unknown = current[near], ~known[near]
     count = min(options.iterations + level, options.most_iterations)
     matches = None
     for turn in range(count):
         # A level has a quarter of the pixels of the one below it.
         monitor.report("filling holes", 0.25**level * (0.25 + 0.75 * turn / count))
-        target = patches_touching(current, wanted)
+        target = patches_touching(filled, wanted[near])
         matches = search.match(target, None if matches is None else matches.source)
         means, has_votes = vote(current, target, source, matches, _depth_penalty(target, depth))
-        current = np.where((has_votes & ~known)[..., None], means, current).astype(np.float32)
+        np.copyto(filled, means, where=(has_votes & unknown)[..., None], casting="same_kind")
     return current
 
 

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.luminance import luminance, white_of
+from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.blinn_phong import BlinnPhong
@@ -136,12 +137,12 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
     explained : float
         Share of the shading that it explains, in [0, 1].
     """
-    from scipy.optimize import nnls
-
     samples = _samples(d, d.shading)
     facing = np.maximum(samples.normal @ direction, 0)
-    design = np.stack([facing, np.ones_like(facing)], 1)
-    strength, ambient = np.transpose([nnls(design, column)[0] for column in samples.values.T])
+    even = np.ones_like(facing)
+    strength, ambient = np.transpose(
+        [nonnegative_pair(facing, even, column) for column in samples.values.T]
+    )
     error = samples.values - (facing[:, None] * strength + ambient)
     explained = _explained(error, np.square(samples.values - samples.values.mean(0)).sum())
     return DirectionalLight(direction, np.pi * strength, ambient), explained

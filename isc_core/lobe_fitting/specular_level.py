@@ -29,6 +29,7 @@ from enum import StrEnum
 import numpy as np
 from scipy import ndimage
 
+from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.ggx import F0
@@ -171,11 +172,9 @@ def lamp_shading(d: Decomposition, direction: np.ndarray) -> float:
     float
         a above; the brightest shading where the lamp is not visible in it.
     """
-    from scipy.optimize import nnls
-
     facing = np.maximum(d.normal[d.mask].astype(float) @ direction, 0)
     shading = d.shading[d.mask].mean(-1, dtype=float)
-    lamp, _ = nnls(np.stack([facing, np.ones_like(facing)], 1), shading)[0]
+    lamp, _ = nonnegative_pair(facing, np.ones_like(facing), shading)
     brightest = float(np.percentile(shading, _BRIGHTEST_SHADING))
     return float(lamp) if lamp > _LEAST_LAMP * brightest else brightest
 

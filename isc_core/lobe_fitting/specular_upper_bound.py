@@ -75,16 +75,16 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
         1 is plastic; infinite under a black environment map.
     """
     from ..shading.environment_map import resampled
-    from ..shading.lobe_rendering import Lobe, lobe_in_environment
+    from ..shading.lobe_rendering import Lobe, MirroredEnvironment
 
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
-    radiance, view = resampled(environment, _ROWS), d.view
+    mirrored, view = MirroredEnvironment(lobe, resampled(environment, _ROWS)), d.view
     room = list[np.ndarray]()
     for block in row_blocks(d.mask.shape):
         inside = d.mask[block.rows]
         seen, normal = d.image[block.rows][inside], d.normal[block.rows][inside].astype(float)
         toward = view if view.ndim == 1 else view[block.rows][inside]
-        layer = lobe_in_environment(lobe, normal, radiance, toward)
+        layer = mirrored.toward(normal, toward)
         # A channel of zero carries no information: cameras clip colours outside their gamut there.
         lit = (layer > 1e-9) & (seen > 0)
         room.append(np.divide(seen, layer, out=np.full(layer.shape, np.inf), where=lit).min(-1))

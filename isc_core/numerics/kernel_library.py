@@ -30,7 +30,7 @@ from typing import Any
 
 import numpy as np
 
-from .kernel_types import Array, Scalar, Signature
+from .kernel_types import Array, Group, Scalar, Signature
 
 FOLDER = Path(__file__).with_name("compiled")
 """Where libraries lie, also those for other machines; the preferred one is the last by name."""
@@ -127,22 +127,6 @@ class _Whole:
         return ctypes.c_int64(operator.index(value))
 
 
-class _Single:
-    """Converts a number to float32."""
-
-    @staticmethod
-    def from_param(value: Any) -> ctypes.c_float:
-        return ctypes.c_float(value)
-
-
-class _Double:
-    """Converts a number to float64."""
-
-    @staticmethod
-    def from_param(value: Any) -> ctypes.c_double:
-        return ctypes.c_double(value)
-
-
 class _Truth:
     """Converts a Boolean, also NumPy's."""
 
@@ -151,7 +135,7 @@ class _Truth:
         return ctypes.c_uint8(bool(value))
 
 
-_SCALARS = {"i8": _Whole, "f4": _Single, "f8": _Double, "b1": _Truth}
+_SCALARS = {"i8": _Whole, "f4": ctypes.c_float, "f8": ctypes.c_double, "b1": _Truth}
 _RESULTS: dict[str, Any] = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
 
 
@@ -189,9 +173,10 @@ class KernelLibrary:
             had.
         """
         entries = self.entries(function, signatures)
+        grouped = any(isinstance(one, Group) for one in signatures[0].arguments)
 
         def call(*values: Any) -> Any:
-            flat = flattened(values)
+            flat = flattened(values) if grouped else values
             for entry in entries:
                 fits, result = entry(flat)
                 if fits:

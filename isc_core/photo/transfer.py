@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..io.decoders.colour.space import ColourSpace
 from ..io.decoders.colour.table_profile import table_to_srgb
@@ -28,6 +29,7 @@ from .primaries import in_rec709, to_rec709
 PROFILE = "profile"
 _CODES = np.arange(256) / 255
 _HALF_A_CODE = 0.5 / 255
+_TOGETHER = 1 << 15  # pixels that are looked up at once: NumPy makes an index of 8 bytes of each
 
 
 def resolve_transfer(transfer: str, raster: Raster) -> str:
@@ -98,9 +100,15 @@ def _decoded(raster: Raster, transfer: str) -> np.ndarray:
         return np.asarray(curves[0](raster.values), np.float32)
     codes = np.arange(np.iinfo(raster.values.dtype).max + 1) / raster.peak
     tables = [curve(codes).astype(np.float32) for curve in curves]
-    if len(tables) == 1:
-        return tables[0][raster.values]
-    return np.stack([table[raster.values[..., c]] for c, table in enumerate(tables)], axis=2)
+    linear = np.empty(raster.values.shape, np.float32)
+    for block in row_blocks(linear.shape, pixels=_TOGETHER):
+        stored, light = raster.values[block.rows], linear[block.rows]
+        if len(tables) == 1:
+            np.take(tables[0], stored, out=light, mode="clip")
+        else:
+            for c, table in enumerate(tables):
+                light[..., c] = table[stored[..., c]]
+    return linear
 
 
 def curves_of(raster: Raster, transfer: str) -> tuple[Callable[[np.ndarray], np.ndarray], ...]:

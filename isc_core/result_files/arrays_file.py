@@ -52,6 +52,8 @@ Citation: NumPy's file format, NEP 1, https://numpy.org/neps/nep-0001-npy-format
 Limits: `sky` is as accurate as `shading.environment_map` states.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,9 +124,11 @@ def mesh_of(
     InputError
         If the mask is too small for a mesh.
     """
-    gloss = bounded_specular(d)
     maps = d.height, d.normal, d.mask, d.reflectance
-    return build_mesh(*maps, options, gloss, d.camera, cover)
+    with ThreadPoolExecutor(1) as aside:  # half of the work
+        gloss = aside.submit(bounded_specular, d)
+        built = build_mesh(*maps, options, camera=d.camera, cover=cover)
+        return replace(built, gloss=gloss.result())
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:

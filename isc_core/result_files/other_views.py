@@ -15,6 +15,7 @@ interreflection. Without a fitted lobe there are no highlights.
 """
 
 from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -69,21 +70,22 @@ def turned_panels(
         empty = np.zeros((SIDE, SIDE))
         return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
     body, vertices = found
-    texture_places = (body.texture[:, ::-1] + 0.5) * _STEP - 0.5
-    panels = []
-    for name, yaw in zip(names, (ANGLE, -ANGLE), strict=True):
+    places = (body.texture[:, ::-1] + 0.5) * _STEP - 0.5
+
+    def panel(name: str, yaw: float) -> Panel:
         texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
-        view = turned_view(
-            vertices, body.faces, texture_places, yaw, SIDE, 1.0, 1 - 2 * MARGIN, closed=True
-        )
+        room = 1 - 2 * MARGIN
+        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, closed=True)
         covered = view.coverage > 0
         color, (column, row) = np.zeros((SIDE, SIDE, 3)), view.values[covered].T
         for channel in range(3):
             color[covered, channel] = ndimage.map_coordinates(
                 texture[..., channel], (row, column), order=1, mode="nearest"
             )
-        panels.append(Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess"))
-    return panels
+        return Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
+
+    with ThreadPoolExecutor(2) as pool:
+        return list(pool.map(panel, names, (ANGLE, -ANGLE)))
 
 
 def _coarse_body(

@@ -131,24 +131,17 @@ def save(
         channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
     if broken := sorted(_broken(channels)):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
-    # The pool inside the folder: the preview is done, or has failed, before the folder is removed.
-    with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(1) as pool:
+    # The pool inside the folder: its files are done, or have failed, before the folder is removed.
+    with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(2) as pool:
         monitor.report("writing maps", 0.0)
-        preview = pool.submit(_write_preview, decomposition, partial / "preview.png")
-        write_channels(partial / "maps.exr", channels)
-        if decomposition.environment is not None:
-            planes = _planes(decomposition.environment, list("RGB"))
-            write_channels(partial / ENVIRONMENT, planes)
-        (partial / "maps").mkdir()
-        for name, letters in SINGLE.items():
-            values = getattr(decomposition, name)
-            whole = name in COLOR_MAPS
-            planes = {letters: values} if whole else _planes(values, list(letters))
-            write_channels(partial / "maps" / f"{name}.exr", planes)
-        monitor.report("building the mesh", 0.4)
         d = decomposition
+        (partial / "maps").mkdir()
+        maps = pool.submit(_write_maps, d, channels, partial)
+        preview = pool.submit(_write_preview, d, partial / "preview.png")
         if d.mask.size > LARGE:
+            maps.result()
             give_back_memory()
+        monitor.report("building the mesh", 0.4)
         built = mesh_of(d, mesh)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
@@ -160,6 +153,7 @@ def save(
             (partial / MASK).write_bytes(encoded_mask(cover))
         _write_description(d, built, partial / "decomposition.json")
         monitor.report("drawing the preview", 0.7)
+        maps.result()
         preview.result()
         monitor.report("writing maps", 1.0)
 
@@ -171,6 +165,18 @@ def _broken(channels: Mapping[str, np.ndarray]) -> Iterator[str]:
         if values.ndim == 3:
             planes = _planes(values, [f"{name}.{letter}" for letter in "RGB"])
         yield from (plane for plane in planes if not np.isfinite(planes[plane]).all())
+
+
+def _write_maps(d: Decomposition, channels: Mapping[str, np.ndarray], folder: Path) -> None:
+    """The EXR files of a result; `channels` are those of maps.exr."""
+    write_channels(folder / "maps.exr", channels)
+    if d.environment is not None:
+        write_channels(folder / ENVIRONMENT, _planes(d.environment, list("RGB")))
+    for name, letters in SINGLE.items():
+        values = getattr(d, name)
+        whole = name in COLOR_MAPS
+        planes = {letters: values} if whole else _planes(values, list(letters))
+        write_channels(folder / "maps" / f"{name}.exr", planes)
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:

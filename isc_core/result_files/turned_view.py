@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """A triangle mesh seen from another side, drawn in software.
 
 Problem: a contact sheet is to show what a mesh looks like from the left and from the right, on any
@@ -6,9 +7,9 @@ machine, without a graphics library, the same bytes everywhere.
 Equation: the vertices are turned about the vertical axis and projected in parallel. A triangle
 (a, b, c) covers the pixel centres p whose barycentric coordinates, u = [p, b, c] / [a, b, c] and so
 on, [.] being the signed area, are not negative. Depth and values are sums of those of the vertices
-weighted by them, and of all triangles at a pixel the nearest is seen. Triangles whose boxes have
-about one size are tested together, at all pixel centres of their boxes. The picture is drawn twice
-as fine and averaged.
+weighted by them, and of all triangles at a pixel the nearest is seen, of equally near ones the
+first. Each is tested at all pixel centres of its box. The picture is drawn twice as fine and
+averaged.
 
 Citation: J. Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988,
 doi:10.1145/54852.378457; the depth buffer: E. Catmull, "A subdivision algorithm for computer
@@ -18,17 +19,16 @@ Limits: no perspective; values are interpolated linearly, without textures. Made
 few pixels: a triangle costs as much as its box.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from ..numerics.jit import jit
 from ..shading.lights import turn
 
 _FINE = 2  # subpixels along a pixel's side
 _EDGE = -1e-9  # barycentric coordinates from which a pixel centre lies inside
 _FEWEST = 1e-12  # twice the area of a triangle that can be seen, subpixels
-_TOGETHER = 1 << 18  # pixel centres that are tested at once
 
 
 @dataclass(frozen=True)
@@ -107,62 +107,42 @@ def _nearest(points: np.ndarray, faces: np.ndarray, values: np.ndarray, side: in
 
     `points` (V, 3): column and row in pixels, the first pixel from 0 to 1, and nearness.
     """
-    carried = np.concatenate([values, np.ones((len(values), 1))], axis=1)
-    picture = np.zeros((side * side, carried.shape[1]))
-    nearest = np.full(side * side, -np.inf)
-    for pixel, depth, triangle, weights in _fragments(points, faces, side):
-        before = nearest[pixel]
-        np.maximum.at(nearest, pixel, depth)
-        seen = (depth == nearest[pixel]) & (depth > before)
-        corners = carried[faces[triangle[seen]]]
-        picture[pixel[seen]] = np.einsum("nk,nkc->nc", weights[seen], corners)
-    return picture.reshape(side, side, -1)
+    carried = np.concatenate([values, np.ones((len(values), 1))], axis=1, dtype=np.float64)
+    picture, nearest = np.zeros((side, side, carried.shape[1])), np.full((side, side), -np.inf)
+    corners = np.ascontiguousarray(faces, np.int64)
+    _draw(np.ascontiguousarray(points), corners, carried, nearest, picture)
+    return picture
 
 
-def _fragments(
-    points: np.ndarray, faces: np.ndarray, side: int
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Pixels that triangles cover, some at a time: flat pixel, nearness, triangle, and its corners'
-    weights, (N,), (N,), (N,), (N, 3).
+@jit(types="f8[2] i8[2] f8[2] f8[2] f8[3]")
+def _draw(points, faces, carried, nearest, picture):
+    """Draw each triangle where it is nearer than those before: its corners' `carried` (V, C) into
+    `picture` (N, N, C), its nearness into `nearest` (N, N).
     """
-    corners = points[faces]
-    plane = corners[..., :2]
-    a, b, c = plane[:, 0], plane[:, 1], plane[:, 2]  # faster than reductions along three numbers
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    area = _cross(b - a, c - a)
-    first = np.ceil(low - 0.5).clip(0, side).astype(np.int64)
-    last = np.floor(high - 0.5).clip(-1, side - 1).astype(np.int64)
-    size = last - first + 1
-    shown = (np.abs(area) > _FEWEST) & (size > 0).all(axis=1)
-    boxes = np.where(size <= 4, size, 2 ** np.ceil(np.log2(size.clip(1)))).astype(np.int64)
-    kind = np.where(shown, boxes[:, 0] * (4 * side) + boxes[:, 1], 0)
-    for code in np.flatnonzero(np.bincount(kind))[1 if (kind == 0).any() else 0 :]:
-        width, height = divmod(int(code), 4 * side)
-        column, row = (part.reshape(-1) for part in np.meshgrid(range(width), range(height)))
-        chosen = np.flatnonzero(kind == code)
-        for start in range(0, len(chosen), max(1, _TOGETHER // (width * height))):
-            some = chosen[start : start + max(1, _TOGETHER // (width * height))]
-            x, y = first[some, :1] + column, first[some, 1:] + row
-            u, v = _barycentric(plane[some], area[some], x + 0.5, y + 0.5)
-            w = 1 - u - v
-            inside = (u >= _EDGE) & (v >= _EDGE) & (w >= _EDGE) & (x < side) & (y < side)
-            triangle = np.broadcast_to(some[:, None], inside.shape)[inside]
-            weights = np.stack([u[inside], v[inside], w[inside]], axis=1)
-            nearness = np.einsum("nk,nk->n", weights, corners[triangle, :, 2])
-            yield (y * side + x)[inside], nearness, triangle, weights
-
-
-def _barycentric(
-    plane: np.ndarray, area: np.ndarray, x: np.ndarray, y: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """The first two coordinates (F, P) of the places x, y (F, P) in the triangles `plane`
-    (F, 3, 2).
-    """
-    found = []
-    for k in (1, 2):
-        start, along = plane[:, k], (plane[:, (k + 1) % 3] - plane[:, k]) / area[:, None]
-        found.append(along[:, :1] * (y - start[:, 1:]) - along[:, 1:] * (x - start[:, :1]))
-    return found[0], found[1]
+    side = nearest.shape[0]
+    for face in range(faces.shape[0]):
+        i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
+        ax, ay, bx, by = points[i, 0], points[i, 1], points[j, 0], points[j, 1]
+        cx, cy = points[k, 0], points[k, 1]
+        area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
+        if abs(area) <= _FEWEST:
+            continue
+        left, right = max(min(ax, bx, cx) - 0.5, 0.0), min(max(ax, bx, cx) - 0.5, side - 1.0)
+        top, bottom = max(min(ay, by, cy) - 0.5, 0.0), min(max(ay, by, cy) - 0.5, side - 1.0)
+        for row in range(int(np.ceil(top)), int(np.floor(bottom)) + 1):
+            for column in range(int(np.ceil(left)), int(np.floor(right)) + 1):
+                x, y = column + 0.5, row + 0.5
+                u = ((cx - bx) * (y - by) - (cy - by) * (x - bx)) / area
+                v = ((ax - cx) * (y - cy) - (ay - cy) * (x - cx)) / area
+                w = 1 - u - v
+                near = u * points[i, 2] + v * points[j, 2] + w * points[k, 2]
+                if min(u, v, w) < _EDGE or near <= nearest[row, column]:
+                    continue
+                nearest[row, column] = near
+                for c in range(carried.shape[1]):
+                    picture[row, column, c] = (
+                        u * carried[i, c] + v * carried[j, c] + w * carried[k, c]
+                    )
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -96,6 +96,65 @@ def lobe_under(
     return radiance(lobe.model, _unit(normal), view, directional(light.direction, light.irradiance))
 
 
+class MirroredEnvironment:
+    """An environment map as a lobe mirrors it toward the viewer: evaluated once, looked up often.
+
+    Parameters
+    ----------
+    lobe : Lobe
+    environment : (rows, 2 rows, 3) ndarray
+        Linear radiance, see `environment_map`.
+    """
+
+    def __init__(self, lobe: Lobe, environment: np.ndarray) -> None:
+        rows = len(environment)
+        lit = (environment > 0).any(-1).reshape(-1)
+        self._table = np.zeros((_TABLE, _TABLE, 3))
+        if lit.any():
+            lights = DistantLights(
+                directions(rows).reshape(-1, 3)[lit],
+                (solid_angles(rows)[..., None] * environment).reshape(-1, 3)[lit],
+            )
+            self._table = radiance(lobe.model, _table_normals(), VIEW, lights)
+
+    def toward(self, normal: np.ndarray, view: np.ndarray = VIEW) -> np.ndarray:
+        """Look up the radiance of the lobe toward the viewer.
+
+        Parameters
+        ----------
+        normal : (N, 3) ndarray
+            Unit normals, camera frame.
+        view : (3,) or (N, 3) ndarray, optional
+            Unit vectors toward the viewer.
+
+        Returns
+        -------
+        (N, 3) ndarray
+        """
+        if view.ndim > 1:
+            normal = far_view_normals(normal, view)
+        places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
+        return np.stack(
+            [
+                ndimage.map_coordinates(self._table[..., c], places.T, order=1, mode="nearest")
+                for c in range(3)
+            ],
+            -1,
+        )
+
+
+def _table_normals() -> np.ndarray:
+    """The unit normals (N, N, 3) of the table's places."""
+    axis = np.linspace(-1.0, 1.0, _TABLE)
+    u, v = np.meshgrid(axis, axis, indexing="ij")
+    # The corners lie behind the horizon, where no normal is looked up.
+    square = np.minimum(u * u + v * v, 1)
+    shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
+    normals = np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]
+    normals[_TABLE // 2, _TABLE // 2] = VIEW
+    return _unit(normals)
+
+
 def lobe_in_environment(
     lobe: Lobe, normal: np.ndarray, environment: np.ndarray, view: np.ndarray = VIEW
 ) -> np.ndarray:
@@ -115,34 +174,7 @@ def lobe_in_environment(
     -------
     (N, 3) ndarray
     """
-    rows = len(environment)
-    lit = (environment > 0).any(-1).reshape(-1)
-    if not lit.any():
-        return np.zeros((len(normal), 3))
-    lights = DistantLights(
-        directions(rows).reshape(-1, 3)[lit],
-        (solid_angles(rows)[..., None] * environment).reshape(-1, 3)[lit],
-    )
-    axis = np.linspace(-1.0, 1.0, _TABLE)
-    u, v = np.meshgrid(axis, axis, indexing="ij")
-    # The corners lie behind the horizon, where no normal is looked up.
-    square = np.minimum(u * u + v * v, 1)
-    shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
-    table_normals = (
-        np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]
-    )
-    table_normals[_TABLE // 2, _TABLE // 2] = VIEW
-    table = radiance(lobe.model, _unit(table_normals), VIEW, lights)
-    if view.ndim > 1:
-        normal = far_view_normals(normal, view)
-    places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
-    return np.stack(
-        [
-            ndimage.map_coordinates(table[..., c], places.T, order=1, mode="nearest")
-            for c in range(3)
-        ],
-        -1,
-    )
+    return MirroredEnvironment(lobe, environment).toward(normal, view)
 
 
 def _unit(normal: np.ndarray) -> np.ndarray:

@@ -1,8 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, and SIRFS in both precisions on a ball
-of a few pixels call each version of each kernel. The first calls of each are kept, with what the
-arrays held before and after. They run on one thread: others would write to these arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, and SIRFS in both
+precisions on a ball of a few pixels call each version of each kernel. The first calls of each are
+kept, with what the arrays held before and after. They run on one thread: others would write to
+these arrays meanwhile.
 """
 
 from collections import Counter
@@ -20,6 +21,7 @@ from isc_core.numerics.kernel_check import mix, outcome
 from isc_core.numerics.kernel_library import KernelLibrary, flattened
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.prior_fitting.roughness import roughness
+from isc_core.result_files.turned_view import turned_view
 from isc_core.scene.normal_estimate import NormalEstimate
 from isc_core.scene.shading_estimate import ShadingEstimate
 from isc_core.separation import separate
@@ -170,6 +172,8 @@ def _run_programs() -> None:
     alone = PatchFillOptions(matching=CshOptions(tables=3, candidates=3, threads=1))
     fill_patches(diffuse, gloss < 0.1, gloss >= 0.1, alone)
     roughness(rng.random((9, 10, 11)).astype(np.float32))
+    corners = np.array([(-9, -7, 0), (8, -6, 2), (1, 9, 5), (0, 0, 9.0)])
+    turned_view(corners, np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)]), corners, 20.0, _SIDE, 2.0)
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
 

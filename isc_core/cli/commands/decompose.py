@@ -2,10 +2,12 @@
 
 import argparse
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from pathlib import Path
 
 from ...batch.names import safe_name
+from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError, Rejected
 from ...imaging.bounding_box import mask_box
@@ -206,10 +208,12 @@ def _decompose_one(
     """Decompose a photo, and return the lines to print."""
     finder = MaskSearch(hints_of(options))
     require_writable_result(output, inputs=(path, options.mask))
-    with photo_file(path, options) as file:
+    with photo_file(path, options) as file, ThreadPoolExecutor(1) as aside:
+        loaded = aside.submit(load, settings, prior_set)
         photo = read_photo(
             file, options.mask, options.transfer, limits=limits_of(options), finder=finder
         )
+        loaded.result()
     lines = [f"note: {note}" for note in mask_notes(photo)]
     return lines + _decompose_photo(photo, path, output, options, settings, prior_set, monitor)
 

@@ -20,7 +20,8 @@ from .raster import Raster, as_rgb, check_size, raster_of_codes
 _CHUNKS, _CHUNK_BYTES = 1000, 512
 _HEADER = 33  # bytes of the signature and of IHDR, behind which a profile stands
 _GREY = (0, 4)  # colour types
-_KEPT = (b"IHDR", b"PLTE", b"tRNS", b"eXIf", b"IDAT", b"IEND")
+_ABOUT = (b"IHDR", b"eXIf", b"IEND")
+_KEPT = (*_ABOUT, b"PLTE", b"tRNS", b"IDAT")
 
 
 def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
@@ -47,38 +48,39 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """
     width, height, bits, kind = struct.unpack(">IIBB", data[16:26])
     check_size(path, limits, width, height)
-    plain, chunks = _plain_png(data)
+    deep = bits == 16  # Pillow opens it for its EXIF alone, and does not unpack the pixels
+    plain, chunks = _plain_png(data, _ABOUT if deep else _KEPT)
     image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
     space, notes = space_of_chunks(chunks, 1 if kind in _GREY else 3, path)
-    if bits == 16:
+    if deep:
         codes = _with_alpha(deep_codes(data[16:29], chunks[b"IDAT"]), chunks.get(b"tRNS", b""))
         raster = raster_of_codes(codes, 65535, exif_orientation(image), space=space, notes=notes)
         return with_focal_length(raster, image)
     return decode_pillow(image, path, limits, space=space, notes=notes)
 
 
-def _plain_png(data: bytes) -> tuple[bytes, dict[bytes, bytes]]:
-    """The PNG reduced to pixels, transparency and EXIF, and what its chunks hold, those of pixels
-    as one.
+def _plain_png(data: bytes, kinds: tuple[bytes, ...]) -> tuple[bytes, dict[bytes, bytes]]:
+    """The PNG reduced to some kinds of chunks, and what its chunks hold, those of pixels as one.
 
     Raises ValueError for a wrong checksum, a missing end, or far more chunks than pixels take.
     """
-    kept, pixels, held, at = [data[:8]], list[bytes](), dict[bytes, bytes](), 8
+    whole, at = memoryview(data), 8
+    kept, pixels, held = [whole[:at]], list[memoryview](), dict[bytes, bytes]()
     for _ in range(_CHUNKS + len(data) // _CHUNK_BYTES):
-        (length,) = struct.unpack(">I", data[at : at + 4])
-        chunk = data[at : at + 12 + length]
-        kind = chunk[4:8]
+        (length,) = struct.unpack(">I", whole[at : at + 4])
+        chunk = whole[at : at + 12 + length]
+        kind = bytes(chunk[4:8])
         if (
             len(chunk) < 12 + length
             or zlib.crc32(chunk[4:-4]) != struct.unpack(">I", chunk[-4:])[0]
         ):
             raise ValueError("a PNG chunk is damaged")
-        if kind in _KEPT:
+        if kind in kinds:
             kept.append(chunk)
         if kind == b"IDAT":
             pixels.append(chunk[8:-4])
         elif kind in _KEPT or kind in COLOUR_CHUNKS:
-            held[kind] = chunk[8:-4]
+            held[kind] = bytes(chunk[8:-4])
         if kind == b"IEND":
             return b"".join(kept), held | {b"IDAT": b"".join(pixels)}
         at += 12 + length

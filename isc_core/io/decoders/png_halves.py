@@ -7,17 +7,15 @@ bytes those of another; Pillow decodes both.
 Citation: W3C Recommendation "Portable Network Graphics" (2003), sections 8.2 and 9.
 """
 
-import io
 import struct
 import zlib
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from PIL import PngImagePlugin
+from PIL import Image
 
-from ..png import SIGNATURE, png_chunk
-
-CHANNELS = {0: 1, 2: 3, 4: 2, 6: 4}  # by colour type
+_MODES = {0: "L", 2: "RGB", 4: "LA", 6: "RGBA"}  # of Pillow, a letter a channel, by colour type
 # First column and row, and steps, of the seven passes of an interlaced picture.
 _PASSES = (
     *((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4)),
@@ -45,18 +43,29 @@ def deep_codes(header: bytes, packed: bytes) -> np.ndarray:
         If the pixels are damaged or incomplete, or of an unknown kind.
     """
     width, height, _, kind, method, filters, interlaced = struct.unpack(">IIBBBBB", header)
-    if kind not in CHANNELS or method or filters or interlaced > 1:
+    if kind not in _MODES or method or filters or interlaced > 1:
         raise ValueError("a PNG of an unknown kind")
     sizes = list(_sizes(width, height, bool(interlaced)))
-    pixel = 2 * CHANNELS[kind]
+    mode = _MODES[kind]
+    pixel = 2 * len(mode)
     length = sum(rows * (1 + columns * pixel) for rows, columns in sizes)
     unpacker = zlib.decompressobj()
     lines = np.frombuffer(unpacker.decompress(packed, length), np.uint8)
     if len(lines) != length:
         raise ValueError("pixels are missing")
-    start = header[:8] + b"\x08" + header[9:]
-    high, low = (_decoded(start, lines, sizes, pixel, half) for half in (0, 1))
-    return (high.astype(np.uint16) << 8) | low
+
+    def decoded(half: int) -> np.ndarray:
+        stored = zlib.compress(_halved(lines, sizes, pixel, half).data, 0)
+        size = width, height
+        return np.asarray(Image.frombytes(mode, size, stored, "zip", mode, interlaced))
+
+    with ThreadPoolExecutor(1) as aside:
+        other = aside.submit(decoded, 1)
+        high, low = decoded(0), other.result()
+    codes = high.astype(np.uint16)
+    codes <<= 8
+    codes |= low
+    return codes
 
 
 def _sizes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int]]:
@@ -67,21 +76,14 @@ def _sizes(width: int, height: int, interlaced: bool) -> Iterator[tuple[int, int
             yield rows, columns
 
 
-def _decoded(
-    header: bytes, lines: np.ndarray, sizes: list[tuple[int, int]], pixel: int, half: int
-) -> np.ndarray:
-    """The high bytes (half 0) or low bytes (1) of all codes."""
-    kept, at = [], 0
+def _halved(lines: np.ndarray, sizes: list[tuple[int, int]], pixel: int, half: int) -> np.ndarray:
+    """The high bytes (half 0) or low bytes (1) of all codes, with the filters of their rows."""
+    kept = np.empty(sum(rows * (1 + columns * pixel // 2) for rows, columns in sizes), np.uint8)
+    at = start = 0
     for rows, columns in sizes:
-        line = 1 + columns * pixel
+        line, short = 1 + columns * pixel, 1 + columns * pixel // 2
         whole = lines[at : at + rows * line].reshape(rows, line)
-        part = np.empty((rows, 1 + columns * pixel // 2), np.uint8)
+        part = kept[start : start + rows * short].reshape(rows, short)
         part[:, 0], part[:, 1:] = whole[:, 0], whole[:, 1 + half :: 2]
-        kept.append(part.ravel())
-        at += rows * line
-    pixels = zlib.compress(np.concatenate(kept).data, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", pixels), (b"IEND", b""))
-    file = SIGNATURE + b"".join(png_chunk(*chunk) for chunk in chunks)
-    image = PngImagePlugin.PngImageFile(io.BytesIO(file))
-    image.load()
-    return np.asarray(image)
+        at, start = at + rows * line, start + rows * short
+    return kept

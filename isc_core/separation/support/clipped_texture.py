@@ -24,6 +24,7 @@ around it is filled smoothly.
 """
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from scipy import ndimage
@@ -121,15 +122,12 @@ def _continued(
     rest = known & ~ring
     if not ring.any() or not rest.any():
         return smooth
-    copied = np.exp(fill_patches(albedo, known, holes) + shading)
+    with ThreadPoolExecutor(1) as aside:
+        tried = aside.submit(fill_patches, albedo, rest, holes | ring)
+        copied = np.exp(fill_patches(albedo, known, holes) + shading)
+        both = np.log(np.maximum(fill(diffuse, rest), dark)), tried.result() + shading
     truth = albedo + shading
-    errors = [
-        np.square(one - truth).sum(axis=2)
-        for one in (
-            np.log(np.maximum(fill(diffuse, rest), dark)),
-            fill_patches(albedo, rest, holes | ring) + shading,
-        )
-    ]
+    errors = [np.square(one - truth).sum(axis=2) for one in both]
     labels, count = ndimage.label(holes, _TOUCHING)
     near = np.where(ring, ndimage.grey_dilation(labels, size=2 * _RING + 1), 0)
     of_smooth, of_copied = (

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from isc_core.errors import InputError
 from isc_core.io.decoders import read_raster
@@ -71,6 +72,24 @@ def test_a_png_whose_pixels_end_early_is_damaged(tmp_path: Path) -> None:
     longer = struct.pack(">IIBBBBB", 17, 21, 16, 2, 0, 0, 0)
     path = tmp_path / "a.png"
     path.write_bytes(data[:8] + png_chunk(b"IHDR", longer) + data[33:])
+    with pytest.raises(InputError, match="PNG file is damaged"):
+        read_raster(path)
+
+
+@pytest.mark.parametrize("before", [33, -12])  # behind IHDR, or between the pixels and IEND
+def test_a_png_of_16_bits_is_turned_upright(tmp_path: Path, before: int) -> None:
+    exif, stored = Image.Exif(), samples(20, 17, 3)
+    exif[0x0112] = 6  # turned by a quarter
+    chunk = png_chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))
+    data, path = png(stored, 2, False), tmp_path / "a.png"
+    path.write_bytes(data[:before] + chunk + data[before:])
+    assert (read_raster(path).values == np.rot90(stored, -1)).all()
+
+
+def test_a_png_with_an_unknown_filter_is_damaged(tmp_path: Path) -> None:
+    data, lines = png(samples(20, 17, 3), 2, False), np.full((20, 1 + 6 * 17), 5, np.uint8)
+    path = tmp_path / "a.png"
+    path.write_bytes(data[:33] + png_chunk(b"IDAT", zlib.compress(lines.tobytes())) + data[-12:])
     with pytest.raises(InputError, match="PNG file is damaged"):
         read_raster(path)
 

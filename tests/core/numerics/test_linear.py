@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import nnls
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from isc_core.numerics.linear import solve_linear
+from isc_core.numerics.linear import nonnegative_pair, solve_linear
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
 SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
@@ -24,6 +25,23 @@ def test_a_zero_in_the_way_is_walked_around_and_a_singular_matrix_refused() -> N
     np.testing.assert_array_equal(solve_linear(swap, np.eye(2)), [[0, 0.25], [0.5, 0]])
     with pytest.raises(ValueError, match="no inverse"):
         solve_linear(np.ones((3, 3)), np.eye(3))
+
+
+def test_two_unknowns_that_are_not_negative_are_those_of_scipy() -> None:
+    random, zeros = np.random.default_rng(5), np.zeros(2)
+    for shares in random.normal(size=(60, 2)):
+        columns = np.abs(random.normal(size=(40, 2)))
+        values = columns @ shares + 0.1 * random.normal(size=40)
+        found = nonnegative_pair(columns[:, 0], columns[:, 1], values)
+        np.testing.assert_allclose(found, nnls(columns, values)[0], rtol=1e-9, atol=1e-12)
+        zeros += found == 0
+    assert (zeros > 5).all(), "each of both has been 0 somewhere"
+
+
+def test_columns_that_are_alike_share_what_one_explains() -> None:
+    column = np.linspace(1.0, 2.0, 7)
+    first, second = nonnegative_pair(column, 2 * column, 6 * column)
+    assert first + 2 * second == pytest.approx(6)
 
 
 @pytest.mark.slow
