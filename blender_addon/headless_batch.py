@@ -174,6 +174,7 @@ def _make_result(
         camera=options.camera,
         texture_size=options.texture_size,
         each=_each(source, options),
+        refine=options.refine,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -237,6 +238,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.samples,
         options.camera,
         options.texture_size,
+        refine=options.refine,
     )
     build = BuildOptions(
         size_metres=options.size,

@@ -196,6 +196,11 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         ),
     )
     add(
+        "--refine",
+        action="store_true",
+        help="fit lamps and gloss to where the highlights are, as isc decompose --refine",
+    )
+    add(
         "--threads",
         type=count,
         default=0,

@@ -177,7 +177,7 @@ def test_gloss_needs_no_renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("synth.scene.variant.load_mitsuba", absent)
     start, output = tmp_path / "start", tmp_path / "out"
     save(dome(), start)
-    assert "the gloss stays" in command([str(start), "-o", str(output)])[0]
+    assert "gloss not refined" in command([str(start), "-o", str(output)])[0]
     assert np.array_equal(load(output).shading, load(start).shading)
     with pytest.raises(InputError, match="not installed"):
         command([str(start), "--light", "-o", str(tmp_path / "other")])
