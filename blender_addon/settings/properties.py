@@ -286,7 +286,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description=(
             "Fit lamps, roughness and a little of the relief to the highlights that are taken off, "
             "so that they lie where the photo has them, kept only where that explains the photo "
-            "better, takes about 15 seconds more"
+            "better, takes about 10 seconds more"
         ),
         default=False,
     )

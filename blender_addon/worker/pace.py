@@ -26,7 +26,7 @@ _SECONDS = {
     1024: (2.3, 3.0, 3.5, 6.2, 6.0),
     2048: (2.3, 4.5, 5.0, 7.0, 17.5),
 }
-_REFINING_SECONDS = 15.0  # at any size; next to nothing where there are no highlights
+_REFINING_SECONDS = 8.0  # at any size; next to nothing where there are no highlights
 _UNSURE_SECONDS = 2.0
 _MOST_UNREPORTED = 0.8  # share of a stage's rest
 
