@@ -24,7 +24,8 @@ from isc_core.result_files.panels import Frame, Panel, exposure
 from isc_core.result_files.result_folder import load
 from isc_core.scene.decomposition import Decomposition
 
-_SIDE, _GAP, _QUALITY = 80, 2, 80
+_SIDE, _QUALITY = 72, 68
+_EDGE = ((1, 1), (1, 1), (0, 0))  # of each picture, black
 _MAPS = ("image", "diffuse", "specular", "reflectance", "shading", "normal", "height")
 
 
@@ -39,16 +40,14 @@ def row_of(start: Decomposition, refined: Decomposition, side: int) -> np.ndarra
 
     Returns
     -------
-    (side, ..., 3) uint8 ndarray
+    (side + 2, ..., 3) uint8 ndarray
         Seven pictures.
     """
     frame, gain = Frame.around(start.mask), exposure(start.image[start.mask])
     pictures = [Panel(gain * frame.scaled(start.image), frame.coverage, "")]
     views = [_views(d, frame, gain) for d in (start, refined)]
     pictures += [panel for pair in zip(*views, strict=True) for panel in pair]
-    gap = np.full((side, _GAP, 3), 255, np.uint8)
-    codes = [_codes(picture, side) for picture in pictures]
-    return np.hstack([part for picture in codes for part in (picture, gap)][:-1])
+    return np.hstack([np.pad(_codes(one, side), _EDGE) for one in pictures])
 
 
 def _views(d: Decomposition, frame: Frame, gain: float) -> tuple[Panel, Panel, Panel]:
@@ -81,10 +80,9 @@ def main() -> None:
                 rows.append(row_of(start, done.result, given.side))
         if not rows:
             raise InputError("no gloss was refined: give other results")
-        gap = np.full((_GAP, rows[0].shape[1], 3), 255, np.uint8)
-        sheet = np.vstack([part for row in rows for part in (row, gap)][:-1])
+        picture = Image.fromarray(np.vstack(rows))
         with new_file(given.output) as partial:
-            Image.fromarray(sheet).save(partial, "JPEG", quality=_QUALITY)
+            picture.save(partial, "JPEG", quality=_QUALITY, optimize=True, progressive=True)
     except InputError as error:
         parser.error(str(error))
 
