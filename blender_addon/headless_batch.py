@@ -173,6 +173,7 @@ def _make_result(
         transfer=options.transfer,
         camera=options.camera,
         texture_size=options.texture_size,
+        highlight_odds=options.highlight_odds,
         each=_each(source, options),
         refine=options.refine,
     )
@@ -238,6 +239,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.samples,
         options.camera,
         options.texture_size,
+        options.highlight_odds,
         refine=options.refine,
     )
     build = BuildOptions(

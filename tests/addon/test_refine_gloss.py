@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -19,14 +20,20 @@ from blender_addon.worker.pace import Pace  # noqa: E402
 from blender_addon.worker.process import WorkerState, WorkerUpdate  # noqa: E402
 from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
+from tests.addon.test_headless import run  # noqa: E402
 from tests.core.refinement.test_gloss import glossy  # noqa: E402
 
 
-def dome_photo() -> Any:
-    """A red dome with the highlight of one lamp, clipped in its middle, on black; 8 bits."""
+def dome_values() -> np.ndarray:
+    """A red dome with the highlight of one lamp, clipped in its middle, on black; sRGB."""
     d = glossy(96, lean=0.0)
-    values = d.diffuse * np.array([1.4, 0.5, 0.3], np.float32) + 4 * d.specular
-    values = linear_to_srgb(np.minimum(values, 1))
+    light = d.diffuse * np.array([1.4, 0.5, 0.3], np.float32) + 4 * d.specular
+    return linear_to_srgb(np.minimum(light, 1))
+
+
+def dome_photo() -> Any:
+    """The dome as an image of 8 bits."""
+    values = dome_values()
     image = bpy.data.images.new("dome.png", 96, 96)
     opaque = np.concatenate([values, np.ones_like(values[..., :1])], axis=2)
     image.pixels.foreach_set(opaque[::-1].astype(np.float32).ravel())
@@ -113,7 +120,18 @@ def test_the_choice_reaches_the_job_and_the_outcome_the_message(
     assert run.status.message == "dome created in the scene dome" + reason * refine
 
 
-def test_the_script_has_the_choice() -> None:
+@pytest.mark.slow
+def test_the_script_refines_and_says_so(tmp_path: Path) -> None:
+    picture = np.rint(255 * dome_values()).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "dome.png"), picture[..., ::-1])
+    words = [tmp_path / "dome.png", "--refine", "--highlight-odds", "0", "--max-size", "96"]
+    done = run(*words, "-o", tmp_path / "dome.blend", "--results", tmp_path / "kept")
+    assert done.returncode == 0, done.stderr
+    assert "gloss refined: 1 lamp explains " in done.stdout
+    assert "lamp_direction" in np.load(tmp_path / "kept" / "dome" / "arrays.npz").files
+
+
+def test_the_script_refines_on_request() -> None:
     assert _parser().parse_args(["a.png", "--refine"]).refine
     assert not _parser().parse_args(["a.png"]).refine
 
