@@ -173,7 +173,9 @@ def _make_result(
         transfer=options.transfer,
         camera=options.camera,
         texture_size=options.texture_size,
+        highlight_odds=options.highlight_odds,
         each=_each(source, options),
+        refine=options.refine,
     )
     _wait(start_decompose(job, environment), monitor)
     return folder
@@ -237,6 +239,8 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.samples,
         options.camera,
         options.texture_size,
+        options.highlight_odds,
+        refine=options.refine,
     )
     build = BuildOptions(
         size_metres=options.size,

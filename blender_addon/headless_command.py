@@ -196,6 +196,18 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         ),
     )
     add(
+        "--highlight-odds",
+        default="3",
+        choices=("3", "1", "0"),
+        help="highlights to take off: certain ones, likely ones, all, as isc decompose "
+        "(default: %(default)s)",
+    )
+    add(
+        "--refine",
+        action="store_true",
+        help="fit lamps and gloss to where the highlights are, as isc decompose --refine",
+    )
+    add(
         "--threads",
         type=count,
         default=0,

@@ -124,6 +124,8 @@ class _Highlights(_Panel):
         column.prop(settings, "not_highlights")
         if settings.highlights or settings.not_highlights:
             layout.operator("isc.clear_highlights", icon="X")
+        column = self.property_column()
+        column.prop(settings, "refine")
 
 
 class _Method(_Panel):

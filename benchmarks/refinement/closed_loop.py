@@ -5,12 +5,14 @@ photo.
 
 Each is a result folder of `isc decompose`. The scene is that of `isc-blender import` with the
 fitted gloss and without the photo's specular image; PSNR in dB against the photo, white being its
-99.8th percentile, clipped there: without gloss, the start, the refined result. Folders with nothing
-to refine, or whose start stays, are named and left out.
+99.8th percentile, clipped there: without gloss, the start, the refined result, and the refined one
+whose gloss shows the lamps alone and not the recovered environment. Folders with nothing to refine,
+or whose start stays, are named and left out.
 """
 
 import argparse
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +25,10 @@ from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition
 
 _WHITE = 99.8  # percentile
+_GLOSSY = RenderVariant(gloss="lobe")
 
 
-def closed_loop(d: Decomposition, folder: Path, samples: int, *, gloss: bool = True) -> float:
+def closed_loop(d: Decomposition, folder: Path, samples: int, variant: RenderVariant) -> float:
     """Render a result under its own light and compare it with the photo.
 
     Parameters
@@ -36,8 +39,8 @@ def closed_loop(d: Decomposition, folder: Path, samples: int, *, gloss: bool = T
         Where it is written; replaced.
     samples : int
         Samples per pixel.
-    gloss : bool, optional
-        Whether to render the fitted gloss.
+    variant : RenderVariant
+        What to show.
 
     Returns
     -------
@@ -45,7 +48,6 @@ def closed_loop(d: Decomposition, folder: Path, samples: int, *, gloss: bool = T
         PSNR in dB.
     """
     save(d, folder, arrays=True)
-    variant = RenderVariant(gloss="lobe" if gloss else "none")
     found, _ = render(read_result(folder), variant, samples)
     white = float(np.percentile(d.image[d.mask], _WHITE))
     photo, seen = (np.minimum(layer / white, 1) for layer in (d.image, found))
@@ -67,12 +69,19 @@ def main() -> None:
             if not done.kept:
                 print(f"{place.name:12s} {'start stays' if done.lamps else 'nothing to fit'}")
                 continue
-            none = closed_loop(start, folder, options.samples, gloss=False)
-            before = closed_loop(start, folder, options.samples)
-            after = closed_loop(done.result, folder, options.samples)
+            none, before, after, alone = (
+                closed_loop(d, folder, options.samples, variant)
+                for d, variant in (
+                    (start, RenderVariant()),
+                    (start, _GLOSSY),
+                    (done.result, _GLOSSY),
+                    (done.result, replace(_GLOSSY, mirrors_world=False)),
+                )
+            )
             rows.append((none, before, after))
             print(
-                f"{place.name:12s} no gloss {none:.1f}  start {before:.1f}  refined {after:.1f}",
+                f"{place.name:12s} no gloss {none:.1f}  start {before:.1f}  refined {after:.1f}  "
+                f"lamps alone {alone:.1f}",
                 flush=True,
             )
     if rows:

@@ -67,6 +67,8 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
 
     def finish(context: Any, output: RunOutput) -> ImportSteps:
         message = yield from build_in_steps(context, output, request, view)
+        if output.remark:
+            message = f"{message}; {output.remark}"
         if output.path.is_relative_to(folder):
             # By far the largest files; the scene holds their content now.
             for result in (output.path, *things_in(output.path)):

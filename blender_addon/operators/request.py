@@ -44,6 +44,8 @@ class MethodSettings:
         Value of `--highlight-odds`.
     highlights, not_highlights : str
         Pixels that are marked, such as "120,80 64,200".
+    refine : bool
+        Whether the gloss is refined.
     """
 
     model: str = "joint"
@@ -56,6 +58,7 @@ class MethodSettings:
     highlight_odds: str = "3"
     highlights: str = ""
     not_highlights: str = ""
+    refine: bool = False
 
 
 @dataclass(frozen=True)

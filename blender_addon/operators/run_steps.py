@@ -10,9 +10,10 @@ from contextlib import suppress
 from dataclasses import astuple, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from isc_core.errors import InputError
+from isc_core.refinement.gloss_note import gloss_line
 from isc_core.result_files.diagnostics_text import status_lines
 from isc_core.result_files.reading_notes_text import stored_note_lines
 
@@ -136,6 +137,7 @@ def decompose_steps(
         highlights=highlights,
         not_highlights=not_highlights,
         each=place.build.each,
+        refine=method.refine,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     if job.each:
@@ -143,7 +145,7 @@ def decompose_steps(
     else:
         prepared = yield from _cached_result(job, place, names, environment)
         result = prepared.result.folder
-        output = RunOutput(result, _notes(result), (prepared,))
+        output = RunOutput(result, _notes(result), (prepared,), _remark(result))
     for exported in (photo_path, mask_path):
         # Exported copies are no longer needed; the user's own files are not in the run's folder.
         if exported is not None and exported.parent == folder:
@@ -181,8 +183,10 @@ def _things(
             yield from _in_thread(partial(_copy_result, folder, job.output), _READING)
             folder = job.output
             prepared = tuple(_moved(one, folder) for one in prepared)
-    notes = dict.fromkeys(note for thing in things_in(folder) for note in _notes(thing))
-    return RunOutput(folder, tuple(notes), prepared)
+    things = things_in(folder)
+    notes = dict.fromkeys(note for thing in things for note in _notes(thing))
+    remarks = set(map(_remark, things))
+    return RunOutput(folder, tuple(notes), prepared, remarks.pop() if len(remarks) == 1 else "")
 
 
 def _moved(prepared: PreparedObject, folder: Path) -> PreparedObject:
@@ -206,7 +210,7 @@ def _cached_result(
         result = yield from _in_thread(partial(cache.read, key), _LOOKING)
     if result is None:
         worker = _run_worker(lambda: start_decompose(job, environment), names)
-        yield from _in_time(worker, Pace(job.max_size))
+        yield from _in_time(worker, Pace(job.max_size, job.refine))
         result = yield from _in_thread(partial(read_result, job.output), _READING)
     prepared = yield from _in_thread(
         partial(prepare, result, place.build, with_photo=place.with_photo), _READING
@@ -385,6 +389,15 @@ def _notes(result: Path) -> tuple[str, ...]:
     return tuple(translate_message(note, {}) for note in result_notes(result))
 
 
+def _remark(result: Path) -> str:
+    return _refinement_line(read_description(result / DESCRIPTION))
+
+
+def _refinement_line(description: dict[str, Any]) -> str:
+    settings = description.get("settings")
+    return gloss_line(settings) if isinstance(settings, dict) else ""
+
+
 def result_notes(result: Path) -> list[str]:
     """Return the notes on a result.
 
@@ -396,8 +409,8 @@ def result_notes(result: Path) -> list[str]:
     Returns
     -------
     list of str
-        For example why the solver stopped early, or which assumptions do not hold. Those that
-        advise something begin with "note: ".
+        For example why the solver stopped early, which assumptions do not hold, or what became of
+        the gloss. Those that advise something begin with "note: ".
 
     Raises
     ------
@@ -407,7 +420,8 @@ def result_notes(result: Path) -> list[str]:
     description = read_description(result / DESCRIPTION)
     source = description.get("input")
     stored = source.get("reading_notes") if isinstance(source, dict) else None
-    return [*stored_note_lines(stored), *status_lines(description.get("status", {}))]
+    lines = [*stored_note_lines(stored), *status_lines(description.get("status", {}))]
+    return [*lines, *filter(None, [_refinement_line(description)])]
 
 
 def _run_worker(

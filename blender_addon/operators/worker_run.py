@@ -37,11 +37,14 @@ class RunOutput:
         Notes on the result; those that advise something begin with "note: ".
     prepared : tuple of PreparedObject
         What is built of the folder, if it was read: one object, or one for each thing.
+    remark : str
+        What the message on the outcome says besides; "" for nothing.
     """
 
     path: Path
     notes: tuple[str, ...] = ()
     prepared: tuple[PreparedObject, ...] = ()
+    remark: str = ""
 
 
 RunSteps = Generator[WorkerUpdate, None, RunOutput]

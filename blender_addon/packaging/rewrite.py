@@ -32,6 +32,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.photo.camera",
         "isc_core.photo.names",
         "isc_core.progress",
+        "isc_core.refinement.gloss_note",
         "isc_core.result_files.diagnostics_json",
         "isc_core.result_files.diagnostics_text",
         "isc_core.result_files.exports.targets",

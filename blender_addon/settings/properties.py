@@ -281,6 +281,15 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         items=HIGHLIGHT_ODDS,
         default="3",
     )
+    refine: BoolProperty(
+        name="Refine Gloss",
+        description=(
+            "Fit lamps, roughness and a little of the relief to the highlights that are taken off, "
+            "so that they lie where the photo has them, kept only where that explains the photo "
+            "better, takes about 10 seconds more"
+        ),
+        default=False,
+    )
     illumination: EnumProperty(
         name="Light",
         description="Prior of the light",

@@ -74,6 +74,8 @@ class DecomposeJob:
         Values of `--highlight` and `--not-highlight`.
     each : bool
         Whether each thing is decomposed, into the folders 1, 2 and so on of `output`.
+    refine : bool
+        Whether the gloss is refined.
     """
 
     photo: Path
@@ -91,6 +93,7 @@ class DecomposeJob:
     highlights: tuple[tuple[int, int], ...] = ()
     not_highlights: tuple[tuple[int, int], ...] = ()
     each: bool = False
+    refine: bool = False
 
 
 @dataclass(frozen=True)
@@ -169,7 +172,7 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]
-    words += ["--each"] * job.each
+    words += ["--each"] * job.each + ["--refine"] * job.refine
     words += [f"--highlight={x},{y}" for x, y in job.highlights]
     words += [f"--not-highlight={x},{y}" for x, y in job.not_highlights]
     return _start(words, job.output, environment, job.threads)

@@ -15,8 +15,10 @@ from dataclasses import dataclass, field, replace
 
 from .process import WorkerUpdate
 
-# Fractions at which loading, separation, solver, relief and writing begin, and the end.
+# Fractions at which loading, separation, solver, relief and writing begin, and the end; and where
+# the gloss is refined after the relief.
 _FRACTIONS = (0.0, 0.024, 0.064, 0.736, 0.8, 1.0)
+_REFINED_FRACTIONS = (0.0, 0.021, 0.056, 0.644, 0.7, 0.8, 1.0)
 # Seconds of these stages by the longer side of the maps.
 _SECONDS = {
     256: (2.0, 1.5, 3.5, 0.4, 1.5),
@@ -24,6 +26,7 @@ _SECONDS = {
     1024: (2.3, 3.0, 3.5, 6.2, 6.0),
     2048: (2.3, 4.5, 5.0, 7.0, 17.5),
 }
+_REFINING_SECONDS = 8.0  # at any size; next to nothing where there are no highlights
 _UNSURE_SECONDS = 2.0
 _MOST_UNREPORTED = 0.8  # share of a stage's rest
 
@@ -36,11 +39,14 @@ class Pace:
     ----------
     size : int
         Longer side of the maps; 0 is that of the photo.
+    refine : bool
+        Whether the gloss is refined.
     share : float
         Share of the time that is over, in [0, 1]; never falls.
     """
 
     size: int
+    refine: bool = False
     share: float = field(default=0.0, init=False)
     _fraction: float = field(default=-1.0, init=False)
     _since: float = field(default=0.0, init=False)
@@ -72,9 +78,13 @@ class Pace:
 
     def _seconds(self, fraction: float) -> tuple[float, float, float]:
         """Measured seconds until a fraction of the worker's, until its stage ends, in total."""
-        stages = _SECONDS[min(_SECONDS, key=lambda size: abs(size - (self.size or max(_SECONDS))))]
-        stage = min(bisect_right(_FRACTIONS, max(fraction, 0.0)), len(stages)) - 1
-        start, end = _FRACTIONS[stage : stage + 2]
+        size = min(_SECONDS, key=lambda size: abs(size - (self.size or max(_SECONDS))))
+        stages: tuple[float, ...] = _SECONDS[size]
+        fractions: tuple[float, ...] = _FRACTIONS
+        if self.refine:
+            stages, fractions = (*stages[:4], _REFINING_SECONDS, stages[4]), _REFINED_FRACTIONS
+        stage = min(bisect_right(fractions, max(fraction, 0.0)), len(stages)) - 1
+        start, end = fractions[stage : stage + 2]
         part = min((fraction - start) / (end - start), 1.0)
         before = sum(stages[:stage])
         return before + part * stages[stage], before + stages[stage], sum(stages)

@@ -32,7 +32,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from ..imaging.blocks import block_means
+from ..imaging.blocks import block_means, means_inside
 from ..imaging.bounding_box import mask_slices
 from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
@@ -86,10 +86,7 @@ class Level:
         image, mask = np.empty((rows, columns, 3), np.float32), np.empty((rows, columns), bool)
         for block in row_blocks((rows, 4 * columns)):
             here = slice(2 * block.rows.start, 2 * block.rows.stop)
-            inside = self.mask[here]
-            share = block_means(inside.astype(np.float32), 2)
-            light = block_means(np.where(inside[..., None], self.image[here], 0), 2)
-            image[block.rows] = light / np.maximum(share, 1e-9)[..., None]
+            image[block.rows], share = means_inside(self.image[here], self.mask[here], 2)
             mask[block.rows] = share >= 0.5
         return Level(image, mask)
 

@@ -33,6 +33,7 @@ from .gloss_objective import (
     slopes_of,
 )
 from .height_bumps import HeightBumps
+from .held_out import held_out_blocks, pixels_of
 from .working_scale import WorkingScale
 
 _SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: of the object's longer side
@@ -265,14 +266,11 @@ def _start(problem: GlossProblem, direction: np.ndarray) -> np.ndarray:
 
 
 def _held_out(work: WorkingScale, seed: int) -> np.ndarray:
-    rows, columns = np.nonzero(work.mask)
     values = work.specular[work.mask]
     bright = float(np.sqrt((values > _BRIGHT * values.max()).sum()))
     side = int(np.clip(bright / _ACROSS, *_BLOCKS))
-    block = rows // side * (work.mask.shape[1] // side + 1) + columns // side
-    light = np.bincount(block, values)
-    first = int(np.random.default_rng(seed).integers(_SHARE))
-    return np.isin(block, np.argsort(-light, kind="stable")[first::_SHARE])
+    blocks = held_out_blocks(np.where(work.mask, work.specular, 0), side, _SHARE, seed)
+    return pixels_of(blocks, side, work.mask.shape)[work.mask]
 
 
 def _spots(values: np.ndarray, work: WorkingScale, count: int) -> list[np.ndarray]:

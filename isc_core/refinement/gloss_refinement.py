@@ -29,6 +29,7 @@ from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
 from ..shading.spherical_harmonics import real_sh
 from .gloss_fit import GlossProblem, bumps_of, explained, fit_gloss, gloss_problem, minimised
+from .gloss_note import NOTE, GlossOutcome, was_refined
 from .gloss_objective import (
     ROUGHNESS_SPREAD,
     Gloss,
@@ -44,7 +45,6 @@ _LEAST, _RISE = 0.25, 1.0
 _STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # of `lobe_fitting.recovered`; degrees
 _LEAST_ALPHA = 0.01
 _LIGHT_RIDGE = 1e-3
-NOTE = "refine_gloss"
 
 
 @dataclass(frozen=True)
@@ -83,8 +83,8 @@ class GlossRefinement:
     ----------
     result : Decomposition
         Refined, or the start.
-    kept : bool
-        Whether it is refined.
+    outcome : GlossOutcome
+        Whether it is refined, or why not.
     lamps : int
         Number of lamps found; 0 where there is nothing to fit.
     before, after : float
@@ -93,10 +93,15 @@ class GlossRefinement:
     """
 
     result: Decomposition
-    kept: bool
+    outcome: GlossOutcome
     lamps: int = 0
     before: float = 0.0
     after: float = 0.0
+
+    @property
+    def kept(self) -> bool:
+        """Whether the result is refined."""
+        return self.outcome is GlossOutcome.REFINED
 
 
 def refine_gloss(
@@ -128,20 +133,21 @@ def refine_gloss(
     monitor.report("refining the gloss", 0.0)
     fit = d.brdf
     if fit is None or fit.alpha is None or not fit.lights or not d.specular[d.mask].any():
-        return _noted(GlossRefinement(d, False), options)
+        return _noted(GlossRefinement(d, GlossOutcome.NO_HIGHLIGHT), options)
     work = working_scale(d)
     problem = gloss_problem(d, fit, work, options.seed)
     gloss = fit_gloss(problem, options.lamps, options.steps, monitor.part(0.0, 0.7))
     start = work.reduced(fit.predicted.mean(axis=2), d.mask)[work.mask]
     before, after = explained(problem, gloss, start)
-    done = GlossRefinement(d, False, len(gloss.units), before, after)
-    worse = after < _LEAST or after <= before
-    if worse or not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
+    done = GlossRefinement(d, GlossOutcome.NOT_BETTER, len(gloss.units), before, after)
+    if after < _LEAST or after <= before:
         return _noted(done, options)
+    if not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
+        return _noted(replace(done, outcome=GlossOutcome.UNLIKELY_REFLECTANCE), options)
     x = gloss.packed()
     minimised(GlossObjective(problem.data, problem.bumps), x, options.steps, monitor.part(0.7, 1))
     result = _refined(d, fit, problem, problem.unpacked(x))
-    return _noted(replace(done, result=result, kept=True), options)
+    return _noted(replace(done, result=result, outcome=GlossOutcome.REFINED), options)
 
 
 @dataclass(frozen=True)
@@ -164,7 +170,7 @@ class _Reflectance:
 
 
 def _check(d: Decomposition) -> None:
-    if d.provenance.settings.get(NOTE, {}).get("kept"):
+    if was_refined(d.provenance.settings):
         raise InputError(
             "the gloss of the result is refined already: give the one that isc decompose wrote"
         )
@@ -280,7 +286,7 @@ def _noted(done: GlossRefinement, options: GlossOptions) -> GlossRefinement:
     """The outcome with a note in the settings of its result, and the lobe in its status."""
     d = done.result
     note = {
-        "kept": done.kept,
+        "outcome": str(done.outcome),
         "lamps": done.lamps,
         "held_out_before": done.before,
         "held_out_after": done.after,

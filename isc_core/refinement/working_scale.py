@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..imaging.blocks import means_inside
 from ..imaging.bounding_box import mask_slices
 from ..scene.decomposition import Decomposition
 from ..shading.perspective import far_view_normals
@@ -64,7 +65,7 @@ class WorkingScale:
         -------
         (h, w, ...) ndarray
         """
-        return _means(layer[self.box].astype(float), mask[self.box], self.step)[1]
+        return _means(layer[self.box].astype(float), mask[self.box], self.step)[0]
 
 
 def slopes_of_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -115,29 +116,24 @@ def working_scale(d: Decomposition) -> WorkingScale:
     step = -(-max(mask.shape) // LONGEST)
     image = d.image[box].max(axis=2)
     clipped = mask & (image >= _CLIPPED * image.max())
-    share = _means(mask.astype(float), mask, step)[0]
+    normal, share = _means(mirroring_normals(d)[box], mask, step)
     inside = share > 0.5
-    normal = _means(mirroring_normals(d)[box], mask, step)[1]
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     normal = np.where(
         inside[..., None] & (length > 0), normal / np.maximum(length, 1e-9), (0, 0, 1)
     )
     specular, diffuse, shading = (
-        np.where(inside[..., None], _means(layer[box].astype(float), mask, step)[1], 0)
+        np.where(inside[..., None], _means(layer[box].astype(float), mask, step)[0], 0)
         for layer in (d.specular, d.diffuse, d.shading)
     )
-    any_clipped = inside & (_means(clipped.astype(float), mask, step)[1] > 0)
+    any_clipped = inside & (_means(clipped.astype(float), mask, step)[0] > 0)
     return WorkingScale(
         box, step, inside, any_clipped, specular.mean(axis=2), normal, diffuse, shading
     )
 
 
 def _means(values: np.ndarray, mask: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """Of each block: the share inside the mask, and the mean of what is inside."""
-    planes = values.reshape(*mask.shape, -1) * mask[..., None]
-    planes = np.concatenate([planes, mask[..., None].astype(float)], axis=2)
-    padded = np.pad(planes, [(0, -n % step) for n in mask.shape] + [(0, 0)])
-    rows, columns = (n // step for n in padded.shape[:2])
-    sums = padded.reshape(rows, step, columns, step, -1).sum(axis=(1, 3))
-    means = sums[..., :-1] / np.maximum(sums[..., -1:], 1)
-    return sums[..., -1] / step**2, means.reshape(rows, columns, *values.shape[2:])
+    """`means_inside` of maps of any size."""
+    more = [(0, -n % step) for n in mask.shape]
+    rest = [(0, 0)] * (values.ndim - 2)
+    return means_inside(np.pad(values, [*more, *rest]), np.pad(mask, more), step)

@@ -74,7 +74,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         If the user cancels.
     """
     from isc_core.refinement import GlossOptions, refine_gloss
-    from isc_core.refinement.outcome_text import gloss_line
+    from isc_core.refinement.gloss_note import gloss_line
     from isc_core.result_files.object_cover import read_cover
     from isc_core.result_files.result_folder import MASK, load, require_writable_result, save
 
@@ -90,7 +90,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         _require_same(options.photo, start)
     end = 0.5 if options.light else 0.9
     gloss = refine_gloss(start, GlossOptions(seed=options.seed), monitor.part(0, end))
-    result, lines = gloss.result, [gloss_line(gloss)]
+    result, lines = gloss.result, [gloss_line(gloss.result.provenance.settings)]
     if options.light:
         from ..refine.refine import RefineOptions, refine
 

@@ -15,13 +15,14 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
+from isc_core.refinement.held_out import held_out_blocks, pixels_of
 from isc_core.refinement.reflectance_terms import terms_of
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import environment_from_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
 from ..capture.truth import fit_light
-from .held_out import explains_better, fitted_weight, held_out_blocks
+from .held_out import BLOCK, EVERY, explains_better
 from .light_field import LightField
 from .light_objective import LightObjective, shading_of
 from .transport import Transport, light_transport
@@ -110,16 +111,17 @@ def refine(
     start = environment_from_shading(d.illumination, options.rows, viewer=d.viewer)
     field = LightField.around(np.maximum(start, 1e-4 * start.mean()))
     terms, gain = terms_of(d)
-    blocks = held_out_blocks(d.mask, options.seed)
+    blocks = held_out_blocks(d.shading.mean(axis=2), BLOCK, EVERY, options.seed, d.mask)
+    weight = (d.mask & ~pixels_of(blocks, BLOCK, d.mask.shape)).astype(float)
     objective = LightObjective(
         terms,
         field,
         gain * transport.shadowed,
-        fitted_weight(d.mask, blocks),
+        weight,
         options.strictness,
     )
     x = np.zeros(field.size)
-    before = terms.cost(gain * d.shading[d.mask].astype(float), fitted_weight(d.mask, blocks))[0]
+    before = terms.cost(gain * d.shading[d.mask].astype(float), weight)[0]
     fitting = monitor.part(0.3, 1.0)
 
     def each(step: int, loss: float) -> None:

@@ -109,3 +109,5 @@ def test_a_second_run_starts_no_worker(
     assert not keep or (outputs[1].path / "decomposition.json").is_file()
     run(2, MethodSettings(separator="none"))
     assert len(jobs) == 2, "another separator is another result"
+    run(3, MethodSettings(separator="none", refine=True))
+    assert len(jobs) == 3, "and so is refined gloss"

@@ -336,6 +336,7 @@ def test_the_job_reaches_the_command_line(
         highlight_odds="1",
         highlights=((40, 20), (1, 2)),
         not_highlights=((3, 4),),
+        refine=True,
     )
     *words, last = ended(start_decompose(asked, environment)).message.split("\n")
     assert last == "--cancel-at-eof"
@@ -343,6 +344,7 @@ def test_the_job_reaches_the_command_line(
     assert words[:5] == ["decompose", str(here / "-a.png"), "--arrays", "-o", str(here / "out")]
     marks = [word for word in words if "highlight=" in word]
     assert marks == ["--highlight=40,20", "--highlight=1,2", "--not-highlight=3,4"]
+    words.remove("--refine")
     words = [word for word in words if word not in marks]
     pairs = dict(zip(words[5::2], words[6::2], strict=True))
     assert pairs == {

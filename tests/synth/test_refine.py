@@ -11,6 +11,7 @@ pytest.importorskip("mitsuba")
 
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
+from isc_core.refinement.held_out import held_out_blocks
 from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition, Provenance
@@ -19,7 +20,7 @@ from isc_core.shading.spherical_harmonics import real_sh
 from isc_core.sirfs.priors.prior_file import shipped_priors
 from isc_core.sirfs.settings import isc_weights
 from synth.commands import refine as command_module
-from synth.refine.held_out import BLOCK, explains_better, fitted_weight, held_out_blocks
+from synth.refine.held_out import BLOCK, explains_better
 from synth.refine.light_field import LightField
 from synth.refine.light_objective import LightObjective
 from synth.refine.refine import RefineOptions, refine
@@ -89,15 +90,6 @@ def test_the_gradient_is_that_of_finite_differences() -> None:
     assert along == pytest.approx(float(gradient @ step), rel=1e-3)
 
 
-def test_held_out_blocks_lie_inside_and_do_not_count() -> None:
-    mask = dome().mask
-    blocks = held_out_blocks(mask, 0)
-    weight = fitted_weight(mask, blocks)
-    assert len(blocks) and (mask & (weight == 0)).sum() == len(blocks) * BLOCK**2
-    assert np.array_equal(blocks, held_out_blocks(mask, 0))
-    assert not np.array_equal(blocks, held_out_blocks(mask, 1))
-
-
 def test_the_shading_that_the_image_is_made_of_explains_it_better() -> None:
     d = dome(128)
     n = d.normal[d.mask].astype(float)
@@ -105,7 +97,7 @@ def test_the_shading_that_the_image_is_made_of_explains_it_better() -> None:
     light = np.zeros(d.diffuse.shape)
     light[d.mask] = np.log(true)
     terms = ReflectanceTerms(light, d.mask, shipped_priors("photo", 3), isc_weights("photo", 3))
-    blocks, flat = held_out_blocks(d.mask, 0), np.ones_like(true)
+    blocks, flat = held_out_blocks(light[..., 0], BLOCK, 10, 0, d.mask), np.ones_like(true)
     assert explains_better(terms, blocks, flat, true)
     assert not explains_better(terms, blocks, true, flat)
     assert not explains_better(terms, blocks, true, true)
@@ -177,7 +169,7 @@ def test_gloss_needs_no_renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr("synth.scene.variant.load_mitsuba", absent)
     start, output = tmp_path / "start", tmp_path / "out"
     save(dome(), start)
-    assert "the gloss stays" in command([str(start), "-o", str(output)])[0]
+    assert "gloss not refined" in command([str(start), "-o", str(output)])[0]
     assert np.array_equal(load(output).shading, load(start).shading)
     with pytest.raises(InputError, match="not installed"):
         command([str(start), "--light", "-o", str(tmp_path / "other")])

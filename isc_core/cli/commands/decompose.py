@@ -274,10 +274,10 @@ def _decompose_photo(
 def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomposition, str]:
     """The result with its gloss refined where that explains more, and a line that says so."""
     from ...refinement import GlossOptions, refine_gloss
-    from ...refinement.outcome_text import gloss_line
+    from ...refinement.gloss_note import gloss_line
 
     done = refine_gloss(result, GlossOptions(seed=seed), monitor)
-    return done.result, gloss_line(done)
+    return done.result, gloss_line(done.result.provenance.settings)
 
 
 def _decompose_each(

@@ -9,9 +9,9 @@ import pytest
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.refinement import GlossOptions, refine_gloss
+from isc_core.refinement.gloss_note import GlossOutcome, gloss_line
 from isc_core.refinement.gloss_objective import Gloss, GlossData, GlossObjective, slopes_of
 from isc_core.refinement.height_bumps import HeightBumps
-from isc_core.refinement.outcome_text import gloss_line
 from isc_core.refinement.working_scale import working_scale
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition, Provenance
@@ -132,7 +132,7 @@ def test_the_highlight_comes_to_lie_where_the_photo_shows_it() -> None:
     turn = np.degrees(np.arccos(d.brdf.direction @ LAMP))
     assert turn < np.degrees(np.arccos(TURNED @ LAMP))
     assert 1 / 1.3 < d.brdf.alpha / ALPHA < 1.3  # type: ignore[operator]
-    assert "was refined" in gloss_line(done)
+    assert gloss_line(d.provenance.settings).startswith("gloss refined: 1 lamp explains")
     with pytest.raises(InputError, match="refined already"):
         refine_gloss(d)
 
@@ -156,7 +156,7 @@ def test_print_that_was_taken_for_light_keeps_the_start(share: float) -> None:
     done = refine_gloss(start)
     assert not done.kept
     assert done.result.brdf is start.brdf and done.result.normal is start.normal
-    assert "stays" in gloss_line(done)
+    assert gloss_line(done.result.provenance.settings).startswith("gloss not refined: ")
 
 
 def test_without_highlights_there_is_nothing_to_fit() -> None:
@@ -165,8 +165,8 @@ def test_without_highlights_there_is_nothing_to_fit() -> None:
     for d in (matt, replace(start, brdf=None)):
         done = refine_gloss(d)
         assert not done.kept and done.lamps == 0 and done.result.specular is d.specular
-        assert done.result.provenance.settings["refine_gloss"]["kept"] is False
-        assert "no highlight" in gloss_line(done)
+        assert done.outcome is GlossOutcome.NO_HIGHLIGHT
+        assert "no highlight" in gloss_line(done.result.provenance.settings)
 
 
 def test_large_maps_are_reduced_and_a_fit_can_be_cancelled() -> None:
@@ -194,3 +194,20 @@ def test_large_maps_are_reduced_and_a_fit_can_be_cancelled() -> None:
 def test_options_out_of_range_are_refused(wrong: dict[str, int]) -> None:
     with pytest.raises(InputError, match="lamps has to be 1 to 3"):
         GlossOptions(**wrong)
+
+
+@pytest.mark.parametrize(
+    ("note", "line"),
+    [
+        (None, ""),
+        (7, ""),
+        ({"outcome": []}, ""),
+        ({"outcome": "no_highlight"}, "no highlight"),
+        ({"outcome": "unlikely_reflectance"}, "less likely"),
+        ({"outcome": "refined", "lamps": "x"}, "gloss refined"),
+        ({"outcome": "refined", "lamps": 2, "held_out_after": 0.84}, "2 lamps explain 84 %"),
+    ],
+)
+def test_the_note_of_anybodys_file_becomes_a_line_or_none(note: object, line: str) -> None:
+    said = gloss_line({} if note is None else {"refine_gloss": note})
+    assert line in said if line else not said
