@@ -99,7 +99,7 @@ class JsonReporter:
         """
         self._write("failed", message=message, code=code)
 
-    def rejected(self, lines: Sequence[str], code: int) -> None:
+    def rejected(self, lines: Sequence[str], code: int, done: Sequence[str] = ()) -> None:
         """Report the violated bounds of a result.
 
         Parameters
@@ -108,7 +108,10 @@ class JsonReporter:
             One for each bound.
         code : int
             Exit code.
+        done : sequence of str, optional
+            Lines of what is done; not reported, they stand in the results, too.
         """
+        del done
         self._write("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:
