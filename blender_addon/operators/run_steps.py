@@ -41,7 +41,7 @@ from ..worker.commands import (
 )
 from ..worker.pace import Pace
 from ..worker.process import WorkerProcess, WorkerUpdate
-from .messages import translate_message
+from .messages import NOTE, translate_message
 from .request import MethodSettings, parse_points
 from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
 
@@ -157,13 +157,22 @@ def _things(
     names: Mapping[str, str],
     environment: WorkerEnvironment,
 ) -> RunSteps:
-    """What is built of each thing: of earlier results of the same content, or a worker's."""
+    """What is built of each thing: of earlier results of the same content, or a worker's.
+
+    Of things that fail there are notes; the next run tries all again.
+    """
     cache, key, folder = place.cache, "", job.output
+    failures: tuple[str, ...] = ()
     if cache is not None:
         key = yield from _in_thread(partial(_job_key, job, environment), _LOOKING)
     if cache is None or not key or not cache.place(key).is_dir():
-        # How long that takes is not known before the things are found.
-        yield from _run_worker(lambda: start_decompose(job, environment), names)
+        worker = _run_worker(lambda: start_decompose(job, environment), names)
+        try:
+            yield from _in_time(worker, Pace(job.max_size, several=True))
+        except WorkerFailed as failure:
+            if not things_in(folder):
+                raise
+            failures, cache = (f"{NOTE}{failure}",), None
         if cache is not None and key:
             yield from _in_thread(partial(cache.take, key, folder), _READING)
     if cache is not None and key:
@@ -182,7 +191,7 @@ def _things(
             folder = job.output
             prepared = tuple(_moved(one, folder) for one in prepared)
     notes = dict.fromkeys(note for thing in things_in(folder) for note in _notes(thing))
-    return RunOutput(folder, tuple(notes), prepared)
+    return RunOutput(folder, (*failures, *notes), prepared)
 
 
 def _moved(prepared: PreparedObject, folder: Path) -> PreparedObject:

@@ -291,10 +291,11 @@ def _decompose_each(
     if len(options.photo) > 1:
         raise InputError("--each takes the things of one photo: give one")
     path: Path = options.photo[0]
+    monitor.report("looking for the things", 0.0)
     with photo_file(path, options) as file:
         photos = read_each(file, options.mask, options.transfer, limits_of(options))
     works = {
-        f"thing {number}": partial(
+        f"thing {number} of {len(photos)}": partial(
             _decompose_thing,
             photo,
             path,

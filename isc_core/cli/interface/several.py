@@ -1,6 +1,7 @@
 """Several photos, or several things of one: a failure stops no other."""
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 from ...errors import InputError, Rejected
 from ...io.memory import memory_message
@@ -53,24 +54,24 @@ def do_all(kind: str, works: Mapping[str, Work], monitor: Monitor) -> list[str]:
     """
     lines, failures = list[str](), list[str]()
     for index, (name, work) in enumerate(works.items()):
-        part = _named(monitor.part(index / len(works), (index + 1) / len(works)), name)
+        part = monitor.part(index / len(works), (index + 1) / len(works))
         try:
-            lines += work(part)
+            lines += work(_named(part, name, (index + 1, len(works))))
         except BrokenPipeError:  # nobody reads what is reported
             raise
         except (InputError, MemoryError, OSError) as error:
             problem = problem_of(error)
             failures.append(problem if name in problem else f"{name}: {problem}")
     if failures:
-        done = f"{len(failures)} of {len(works)} {kind} failed, see above"
+        done = f"{len(failures)} of {len(works)} {kind} failed"
         raise Rejected("\n".join([*failures, done]), lines)
     return lines
 
 
-def _named(monitor: Monitor, name: str) -> Monitor:
+def _named(monitor: Monitor, name: str, part: tuple[int, int]) -> Monitor:
     """A monitor whose stages begin with a name."""
 
     def report(event: ProgressEvent) -> None:
-        monitor.progress(ProgressEvent(f"{name}: {event.stage}", event.fraction, event.detail))
+        monitor.progress(replace(event, stage=f"{name}: {event.stage}", part=part))
 
     return Monitor(report, monitor.cancelled)

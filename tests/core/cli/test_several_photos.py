@@ -55,7 +55,7 @@ def test_a_photo_that_fails_does_not_stop_the_others(
     broken.write_bytes(first.read_bytes()[:200])
     assert isc("decompose", first, broken, second, *NAIVE, "-q", "-o", tmp_path / "out") == 1
     errors = capsys.readouterr().err.splitlines()
-    assert "broken.png" in errors[0] and errors[1].endswith("1 of 3 photos failed, see above")
+    assert "broken.png" in errors[0] and errors[1].endswith("1 of 3 photos failed")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["ball", "other_ball"]
 
 
@@ -76,8 +76,8 @@ def test_a_thing_that_fails_stops_no_other(
     assert isc(*words) == 1
     printed = capsys.readouterr()
     errors = [line for line in printed.err.splitlines() if "rejected" in line]
-    assert "thing 1: " in errors[0] and str(out / "1") in errors[0]
-    assert errors[1].endswith("1 of 2 things failed, see above") and len(errors) == 2
+    assert "thing 1 of 2: " in errors[0] and str(out / "1") in errors[0]
+    assert errors[1].endswith("1 of 2 things failed") and len(errors) == 2
     assert f"see {out / '2' / 'preview.png'}" in printed.out, "what is done is told"
     assert [path.name for path in (out / "1").iterdir()] == ["diary.txt"]
     assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "all") == 0
@@ -85,7 +85,7 @@ def test_a_thing_that_fails_stops_no_other(
     assert np.array_equal(kept.reflectance, alone.reflectance)
     assert isc(*words, "--progress", "json") == 1
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert last["event"] == "failed" and last["code"] == 1 and "thing 1: " in last["message"]
+    assert last["event"] == "failed" and last["code"] == 1 and "thing 1 of 2: " in last["message"]
 
 
 def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
@@ -116,7 +116,7 @@ def test_want_of_memory_or_room_stops_no_other() -> None:
     lines = str(rejected.value).splitlines()
     assert lines[0].startswith("thing 0: not enough memory") and rejected.value.lines == ["done"]
     assert lines[1:3] == ["thing 2: a\\nb: No space left on device", "thing 3 cannot be used"]
-    assert lines[3] == "3 of 4 things failed, see above"
+    assert lines[3] == "3 of 4 things failed"
     assert [event.stage for event in events] == [f"thing {i}: half" for i in range(4)]
     np.testing.assert_allclose([event.fraction for event in events], np.arange(1, 8, 2) / 8)
     for stopping in (Cancelled("now"), BrokenPipeError(), KeyboardInterrupt()):
