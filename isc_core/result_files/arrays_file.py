@@ -56,6 +56,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
 from .mesh import MeshResult, build_mesh
@@ -111,7 +112,7 @@ def mesh_of(
     d : Decomposition
     options : MeshOptions, optional
     cover : ObjectCover, optional
-        Whose outline it follows.
+        Whose outline it follows, unless the object is too thin to have one: smoothed, it vanishes.
 
     Returns
     -------
@@ -124,7 +125,12 @@ def mesh_of(
     """
     gloss = bounded_specular(d)
     maps = d.height, d.normal, d.mask, d.reflectance
-    return build_mesh(*maps, options, gloss, d.camera, cover)
+    try:
+        return build_mesh(*maps, options, gloss, d.camera, cover)
+    except InputError:
+        if cover is None:
+            raise
+        return build_mesh(*maps, options, gloss, d.camera)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
