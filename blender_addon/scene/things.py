@@ -190,7 +190,8 @@ def place_things(
         for one in others:
             beside = place @ Matrix.Translation(one.prepared.offset)
             built.append(place_object(one, scene=built[0].scene, photo=photo, place=beside))
-        if others and first.prepared.options.own_scene:
+        options = first.prepared.options
+        if options.each and options.own_scene:
             _name_scene(built[0])
         return built
     finally:
