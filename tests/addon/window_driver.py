@@ -203,7 +203,7 @@ def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
 def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
     """The two things of a photo: progress of both, Esc in the second one, one undo step."""
     settings, before = bpy.context.scene.isc, objects()
-    settings.image, settings.mask = picture(acc, "pair", balls()), None
+    settings.image, settings.mask_source = picture(acc, "pair", balls()), "ALPHA"
     settings.each, settings.max_size, settings.own_scene = True, 256, False
     calm(acc)
     yield from begin(acc)
@@ -244,7 +244,7 @@ def at_thing(number: int) -> bool:
 def soft_rim(acc: Any, measured: list[str]) -> Iterator[float]:
     """A furry ball from a soft alpha channel: its material has an opacity."""
     settings = bpy.context.scene.isc
-    settings.image, settings.mask = picture(acc, "fur", furry_ball()), None
+    settings.image, settings.mask_source = picture(acc, "fur", furry_ball()), "ALPHA"
     settings.each, settings.max_size, settings.own_scene = False, 512, False
     calm(acc)
     yield from begin(acc)
