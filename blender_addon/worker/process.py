@@ -99,7 +99,8 @@ class WorkerProcess:
 
     def __init__(self, command: Sequence[str], output: Path, variables: Mapping[str, str]) -> None:
         self._output = output
-        self._present = unfinished(output)
+        # Results of several things lie in the output, each with unfinished files beside it.
+        self._present = unfinished(output) | frozenset(output.resolve().glob(".*"))
         self._created = [parent for parent in output.parents if not parent.exists()]
         self._update = WorkerUpdate("starting")
         self._cancelled = False
@@ -198,7 +199,7 @@ class WorkerProcess:
         """Remove what a killed worker could not."""
         with contextlib.suppress(OSError):
             remove_unfinished(self._output, self._present)
-            remove_unfinished_in(self._output)  # where it holds a result for each thing
+            remove_unfinished_in(self._output, self._present)
         # Innermost folder first; one that another program has filled meanwhile stays.
         for parent in self._created:
             with contextlib.suppress(OSError):
