@@ -50,8 +50,8 @@ def test_of_several_things_the_share_is_that_of_all() -> None:
     assert shares[39] == 0 and told[39][1] is None, "how many there are is not known"
     assert all(a <= b for a, b in zip(shares, shares[1:], strict=False))
     assert shares[-1] == pytest.approx(1)
-    for share, left, true in told[80:]:
-        assert left is not None and abs(left - true) < 0.4 * max(true, 20), (share, left, true)
+    for _, guess, true in told[80:]:
+        assert guess is not None and abs(guess - true) < 0.4 * max(true, 20), (guess, true)
 
 
 def test_nothing_is_said_at_the_start() -> None:
