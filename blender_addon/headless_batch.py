@@ -104,7 +104,9 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
         for number, plan in enumerate(plans):
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
             try:
-                folder = _make_result(plan.source, results, options, part.part(0.0, 0.9))
+                folder, problem = _make_result(plan.source, results, options, part.part(0.0, 0.9))
+                if problem:
+                    report.failures.append(f"{plan.source.path}: {problem}")
                 of_things = things_in(folder) if _each(plan.source, options) else [folder]
                 lines = [note for result in of_things for note in result_notes(result)]
                 if notes := join_notes(dict.fromkeys(lines)):
@@ -153,13 +155,13 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
 
 def _make_result(
     source: Source, results: Path, options: argparse.Namespace, monitor: Monitor
-) -> Path:
-    """The result folder of a source, with arrays."""
+) -> tuple[Path, str]:
+    """The result folder of a source, with arrays; and what failed if some of its things did."""
     environment = worker_environment(read_preferences(bpy.context))
     if source.is_result:
         if not (source.path / ARRAYS).is_file():
             _wait(start_arrays(source.path.resolve(), environment), monitor)
-        return source.path
+        return source.path, ""
     folder = results / source.name
     job = DecomposeJob(
         photo=source.path.resolve(),
@@ -177,8 +179,13 @@ def _make_result(
         each=_each(source, options),
         refine=options.refine,
     )
-    _wait(start_decompose(job, environment), monitor)
-    return folder
+    try:
+        _wait(start_decompose(job, environment), monitor)
+    except InputError as error:
+        if not job.each or not things_in(folder):
+            raise
+        return folder, str(error)
+    return folder, ""
 
 
 def _wait(worker: WorkerProcess, monitor: Monitor) -> None:
@@ -212,7 +219,7 @@ def _write_outputs(
     empty_scenes = open_empty_file() if new_file_needed else []
     request = _create_request(plan.source, options)
     build_as_undo_step(bpy.context, RunOutput(folder), request)
-    first = f"{name} 1" if request.build.each else name
+    first = f"{name} {things_in(folder)[0].name}" if request.build.each else name
     scene = find_tagged(bpy.data.objects, first, OBJECT).users_scene[0]
     for other in empty_scenes:
         bpy.data.scenes.remove(other)

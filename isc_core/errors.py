@@ -1,5 +1,7 @@
 """The ways in which ISC ends on purpose other than by success."""
 
+from collections.abc import Sequence
+
 
 class InputError(ValueError):
     """Something the user gave cannot be used.
@@ -20,5 +22,16 @@ class Cancelled(Exception):
 class Rejected(Exception):
     """The work was done and its result is written, but what was measured breaks a bound.
 
-    The message says which, a line each. The command line prints it and exits with 1.
+    The message says which, a line each. The command line prints it and exits with 1. Also where
+    some of several inputs failed, and the others are done.
+
+    Parameters
+    ----------
+    message : str
+    lines : sequence of str, optional
+        What is printed of that which is done.
     """
+
+    def __init__(self, message: str, lines: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.lines = lines

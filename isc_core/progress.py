@@ -22,11 +22,14 @@ class ProgressEvent:
         Completed share of the whole job, in [0, 1].
     detail : str
         What changes within the stage, such as the loss or the time left; may be empty.
+    part : (int, int) or None
+        Which of several photos or things this is about, from 1 on, and of how many.
     """
 
     stage: str
     fraction: float
     detail: str = ""
+    part: tuple[int, int] | None = None
 
     def __str__(self) -> str:
         return f"{self.stage}, {self.detail}" if self.detail else self.stage

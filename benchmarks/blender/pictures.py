@@ -76,11 +76,11 @@ class WindowPicture:
     width: int
 
 
-_PANEL, _OBJECT, _FLOOR = (764, 82, 1050, 520), (370, 90, 740, 640), (150, 55, 850, 700)
+_PANEL, _OBJECT, _FLOOR = (764, 82, 1050, 545), (370, 90, 740, 640), (150, 55, 850, 700)
 _EDITS = ("06_orbit", "07_lamp_0", "07_lamp_1", "08_recolored")
 WINDOW: Mapping[str, WindowPicture] = {
     "window_rendered": WindowPicture((Crop("05_created", (0, 0, 1280, 722)),), 1, 1040),
-    "window_mask": WindowPicture((Crop("03_mask", _PANEL), Crop("04_running", _PANEL)), 2, 600),
+    "window_mask": WindowPicture((Crop("03_mask", _PANEL), Crop("04_running", _PANEL)), 2, 580),
     "window_edits": WindowPicture(tuple(Crop(shot, _OBJECT) for shot in _EDITS), 4, 1000),
     "window_export": WindowPicture((Crop("08_export", (230, 100, 764, 460)),), 1, 480),
     "window_asset": WindowPicture(

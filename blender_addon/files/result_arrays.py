@@ -264,12 +264,10 @@ def things_in(folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Its folders 1, 2 and so on.
+        Those of its folders 1, 2 and so on that are there.
     """
-    things: list[Path] = []
-    while ((thing := folder / str(len(things) + 1)) / DESCRIPTION).is_file():
-        things.append(thing)
-    return things
+    found = (path.parent for path in folder.glob(f"*/{DESCRIPTION}"))
+    return sorted((one for one in found if one.name.isdecimal()), key=lambda one: int(one.name))
 
 
 def read_description(path: Path) -> dict[str, Any]:

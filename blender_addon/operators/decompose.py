@@ -3,7 +3,6 @@
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from collections.abc import Iterator
-from itertools import count, takewhile
 from typing import Any
 
 import bpy
@@ -11,7 +10,7 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..datablocks.provenance import find_tagged
+from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS, things_in
 from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
@@ -178,10 +177,13 @@ def _edited_object(request: DecomposeRequest) -> Any:
 
 
 def _updated_objects(request: DecomposeRequest) -> Iterator[Any]:
-    name = request.build.name
-    names = (f"{name} {number}" for number in count(1)) if request.build.each else iter((name,))
-    found = (find_tagged(bpy.data.objects, one, OBJECT) for one in names)
-    return takewhile(lambda obj: obj is not None, found)
+    keys = [request.build.name]
+    if request.build.each:
+        start = f"{request.build.name} "
+        made = {str(obj.get(KEY, "")) for obj in bpy.data.objects}
+        keys = sorted(key for key in made if key.removeprefix(start).isdecimal())
+    found = (find_tagged(bpy.data.objects, key, OBJECT) for key in keys)
+    return (obj for obj in found if obj is not None)
 
 
 class ISC_OT_confirm_overwrite(bpy.types.Operator):

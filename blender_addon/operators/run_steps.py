@@ -42,7 +42,7 @@ from ..worker.commands import (
 )
 from ..worker.pace import Pace
 from ..worker.process import WorkerProcess, WorkerUpdate
-from .messages import translate_message
+from .messages import NOTE, translate_message
 from .request import MethodSettings, parse_points
 from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
 
@@ -159,13 +159,22 @@ def _things(
     names: Mapping[str, str],
     environment: WorkerEnvironment,
 ) -> RunSteps:
-    """What is built of each thing: of earlier results of the same content, or a worker's."""
+    """What is built of each thing: of earlier results of the same content, or a worker's.
+
+    Of things that fail there are notes; the next run tries all again.
+    """
     cache, key, folder = place.cache, "", job.output
+    failures: tuple[str, ...] = ()
     if cache is not None:
         key = yield from _in_thread(partial(_job_key, job, environment), _LOOKING)
     if cache is None or not key or not cache.place(key).is_dir():
-        # How long that takes is not known before the things are found.
-        yield from _run_worker(lambda: start_decompose(job, environment), names)
+        worker = _run_worker(lambda: start_decompose(job, environment), names)
+        try:
+            yield from _in_time(worker, Pace(job.max_size, job.refine, several=True))
+        except WorkerFailed as failure:
+            if not things_in(folder):
+                raise
+            failures, cache = (f"{NOTE}{failure}",), None
         if cache is not None and key:
             yield from _in_thread(partial(cache.take, key, folder), _READING)
     if cache is not None and key:
@@ -186,7 +195,12 @@ def _things(
     things = things_in(folder)
     notes = dict.fromkeys(note for thing in things for note in _notes(thing))
     remarks = set(map(_remark, things))
-    return RunOutput(folder, tuple(notes), prepared, remarks.pop() if len(remarks) == 1 else "")
+    return RunOutput(
+        folder,
+        (*failures, *notes),
+        prepared,
+        remarks.pop() if len(remarks) == 1 else "",
+    )
 
 
 def _moved(prepared: PreparedObject, folder: Path) -> PreparedObject:

@@ -55,7 +55,7 @@ def prepare_things(
     Parameters
     ----------
     results : sequence of ResultArrays
-        From left to right.
+        From left to right, in folders 1, 2 and so on, which number the objects.
     options : BuildOptions
         What will be built; the size is that of the largest thing, the name that of the photo.
     with_photo : bool, optional
@@ -74,7 +74,8 @@ def prepare_things(
         shadows = False
     lit, made = _under_one_light(results, first), []
     for index in sorted(range(len(lit)), key=lambda index: index != first):
-        own = replace(options, size_metres=step * lengths[index], name=f"{name} {index + 1}")
+        numbered = f"{name} {results[index].folder.name}"
+        own = replace(options, size_metres=step * lengths[index], name=numbered)
         if index != first:
             none: dict[str, Any] = dict.fromkeys(_SHARED, False)
             own = replace(own, own_shadows=shadows, **none)
@@ -189,7 +190,8 @@ def place_things(
         for one in others:
             beside = place @ Matrix.Translation(one.prepared.offset)
             built.append(place_object(one, scene=built[0].scene, photo=photo, place=beside))
-        if others and first.prepared.options.own_scene:
+        options = first.prepared.options
+        if options.each and options.own_scene:
             _name_scene(built[0])
         return built
     finally:

@@ -6,8 +6,14 @@ took when they were measured (two cores, photos of 2,400 pixels). With t(f) thos
 fraction f, T their sum, and e the seconds since the start, the share is t(f) / T, and e (T - t) / t
 are left. While a stage reports nothing, t grows with the time, to at most four fifths of the stage.
 
-Limits: the time of the solver depends on the photo, by a factor of three either way; the estimate
-corrects itself once the solver is done. Nothing is said about the first two seconds.
+Several things of a photo are first found, and their number n is known a time b after the start. The
+k-th one has a fraction f of its own: t = (k - 1) T + t(f) of n T are over, and (n T - t) (e - b +
+c) / (t + c) are left, with c two seconds at the usual speed. The share is that of e in the sum of
+both.
+
+Limits: things count alike, whatever their size. The time of the solver depends on the photo, by a
+factor of three either way; the estimate corrects itself once the solver is done. Nothing is said
+about the first two seconds.
 """
 
 from bisect import bisect_right
@@ -41,15 +47,19 @@ class Pace:
         Longer side of the maps; 0 is that of the photo.
     refine : bool
         Whether the gloss is refined.
+    several : bool
+        Whether the worker looks for several things.
     share : float
         Share of the time that is over, in [0, 1]; never falls.
     """
 
     size: int
     refine: bool = False
+    several: bool = False
     share: float = field(default=0.0, init=False)
     _fraction: float = field(default=-1.0, init=False)
     _since: float = field(default=0.0, init=False)
+    _begun: float | None = field(default=None, init=False)
 
     def at(self, update: WorkerUpdate, elapsed: float) -> WorkerUpdate:
         """Put an update in time.
@@ -66,18 +76,34 @@ class Pace:
         WorkerUpdate
             The update with the share of the time for its fraction, and the seconds left.
         """
-        done, end, total = self._seconds(update.fraction)
+        if self.several and update.part is None:  # how many things there are is not yet known
+            return replace(update, fraction=self.share)
+        if self._begun is None:
+            self._begun = elapsed if self.several else 0.0
+        spent, usual = elapsed - self._begun, _UNSURE_SECONDS if self.several else 0.0
+        done, end, total = self._seconds(update)
         if update.fraction != self._fraction:
             self._fraction, self._since = update.fraction, elapsed
-        slowness = max(1.0, elapsed / done) if done > 0 else 1.0
+        slowness = max(1.0, spent / done) if done > 0 else 1.0
         waited = min((elapsed - self._since) / slowness, _MOST_UNREPORTED * (end - done))
-        self.share = max(self.share, (done + waited) / total)
+        if (over := done + waited) > 0 or usual:
+            left = (total - over) * (spent + usual) / (over + usual)
+            self.share = max(self.share, elapsed / (elapsed + left))
         left = elapsed * (1 - self.share) / self.share if self.share > 0 else 0.0
-        sure = min(elapsed, done) >= _UNSURE_SECONDS
+        sure = min(spent, done) >= _UNSURE_SECONDS
         return replace(update, fraction=self.share, seconds_left=left if sure else None)
 
-    def _seconds(self, fraction: float) -> tuple[float, float, float]:
+    def _seconds(self, update: WorkerUpdate) -> tuple[float, float, float]:
         """Measured seconds until a fraction of the worker's, until its stage ends, in total."""
+        if update.part is None:
+            return self._seconds_of_one(update.fraction)
+        number, count = update.part
+        fraction = min(max(update.fraction * count - (number - 1), 0.0), 1.0)
+        done, end, total = self._seconds_of_one(fraction)
+        before = (number - 1) * total
+        return before + done, before + end, count * total
+
+    def _seconds_of_one(self, fraction: float) -> tuple[float, float, float]:
         size = min(_SECONDS, key=lambda size: abs(size - (self.size or max(_SECONDS))))
         stages: tuple[float, ...] = _SECONDS[size]
         fractions: tuple[float, ...] = _FRACTIONS

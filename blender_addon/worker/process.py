@@ -28,7 +28,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import IO, Any
 
-from isc_core.io.atomic import remove_unfinished, unfinished
+from isc_core.io.atomic import remove_unfinished, remove_unfinished_in, unfinished
 
 _CANCEL_SECONDS = 2.0  # from the request to cancel to the kill
 # How long Blender's own exit waits for the files of a killed worker to be removed.
@@ -64,6 +64,8 @@ class WorkerUpdate:
         Last part of the worker's standard error, once it has ended.
     seconds_left : float or None
         Estimate of the time until the end; None if unknown.
+    part : (int, int) or None
+        Which of several things the worker is at, from 1 on, and how many there are.
     """
 
     stage: str = ""
@@ -72,6 +74,7 @@ class WorkerUpdate:
     message: str = ""
     log: str = ""
     seconds_left: float | None = None
+    part: tuple[int, int] | None = None
 
 
 class WorkerProcess:
@@ -96,7 +99,8 @@ class WorkerProcess:
 
     def __init__(self, command: Sequence[str], output: Path, variables: Mapping[str, str]) -> None:
         self._output = output
-        self._present = unfinished(output)
+        # Results of several things lie in the output, each with unfinished files beside it.
+        self._present = unfinished(output) | frozenset(output.resolve().glob(".*"))
         self._created = [parent for parent in output.parents if not parent.exists()]
         self._update = WorkerUpdate("starting")
         self._cancelled = False
@@ -169,9 +173,7 @@ class WorkerProcess:
             for line in process.stdout:
                 event = _parse_event(line)
                 if event.get("event") == "progress":
-                    self._update = WorkerUpdate(
-                        str(event.get("stage", "")), float(event.get("fraction", 0.0))
-                    )
+                    self._update = _progress(event)
                 elif event:
                     last = event
         final = self._final_update(last, process.returncode)
@@ -197,6 +199,7 @@ class WorkerProcess:
         """Remove what a killed worker could not."""
         with contextlib.suppress(OSError):
             remove_unfinished(self._output, self._present)
+            remove_unfinished_in(self._output, self._present)
         # Innermost folder first; one that another program has filled meanwhile stays.
         for parent in self._created:
             with contextlib.suppress(OSError):
@@ -243,6 +246,15 @@ def _parse_event(line: str) -> dict[str, Any]:
     except ValueError:
         return {}
     return event if isinstance(event, dict) else {}
+
+
+def _progress(event: Mapping[str, Any]) -> WorkerUpdate:
+    part = event.get("part")
+    return WorkerUpdate(
+        str(event.get("stage", "")),
+        float(event.get("fraction", 0.0)),
+        part=None if part is None else (int(part[0]), int(part[1])),
+    )
 
 
 def _read_tail(log: IO[bytes]) -> str:

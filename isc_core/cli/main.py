@@ -1,10 +1,10 @@
 """The command `isc`: runs a sub-command and maps its end to an exit code and at most one line.
 
-0: done. 1: done, but a measurement violates a bound, or some of several inputs failed; stderr names
-them. 2: an input cannot be used, or the machine has no room for it; one line on stderr says what to
-do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second stops it at
-once). Nothing half-written remains in any case. With `--progress json` the output is for a program
-instead of a person, see `interface.json_progress`.
+0: done. 1: done, but a measurement violates a bound, or some of several photos or things failed;
+stderr names them. 2: an input cannot be used, or the machine has no room for it; one line on stderr
+says what to do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second
+stops it at once). Nothing half-written remains in any case. With `--progress json` the output is
+for a program instead of a person, see `interface.json_progress`.
 """
 
 import argparse
@@ -15,9 +15,9 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from ..errors import Cancelled, InputError, Rejected
-from ..io.memory import memory_message
 from .interface.interrupts import Interrupts
 from .interface.json_progress import JsonReporter
+from .interface.several import problem_of
 from .interface.terminal import TerminalReporter, Verbosity, discard_output
 
 SUCCESS, BROKEN_PIPE, REJECTED, REFUSED, CANCELLED = 0, 1, 1, 2, 130
@@ -57,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         return _report_failure(reporter, str(error))
     except Rejected as rejection:
-        reporter.rejected(str(rejection).splitlines(), REJECTED)
+        reporter.rejected(str(rejection).splitlines(), REJECTED, rejection.lines)
         return REJECTED
     except (Cancelled, KeyboardInterrupt):
         reporter.cancelled()
@@ -65,12 +65,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         discard_output()
         return BROKEN_PIPE
-    except MemoryError as error:
-        remedy = "use a smaller image or a smaller --max-size"
-        return _report_failure(reporter, memory_message(error, remedy))
-    except OSError as error:
-        location = f"{error.filename}: " if error.filename else ""
-        return _report_failure(reporter, f"{location}{error.strerror or error}")
+    except (MemoryError, OSError) as error:
+        return _report_failure(reporter, problem_of(error))
 
 
 def _run(

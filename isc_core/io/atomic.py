@@ -221,19 +221,21 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
             _tidy(leftover, target)
 
 
-def remove_unfinished_in(folder: Path) -> None:
+def remove_unfinished_in(folder: Path, spared: Set[Path] = frozenset()) -> None:
     """Apply `remove_unfinished` to everything in a folder.
 
     Parameters
     ----------
     folder : Path
         Need not exist.
+    spared : set of Path
+        As of `remove_unfinished`.
     """
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for name in {
             origin for entry in folder.iterdir() if (origin := _origin(entry)) is not None
         }:
-            remove_unfinished(folder / name)
+            remove_unfinished(folder / name, spared)
 
 
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:

@@ -58,6 +58,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
+from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
 from .mesh import MeshResult, build_mesh
@@ -104,7 +106,10 @@ def write_arrays(
 
 
 def mesh_of(
-    d: Decomposition, options: MeshOptions | None = None, cover: ObjectCover | None = None
+    d: Decomposition,
+    options: MeshOptions | None = None,
+    cover: ObjectCover | None = None,
+    gloss: SpecularFit | None = None,
 ) -> MeshResult:
     """Build the mesh of a result.
 
@@ -113,7 +118,9 @@ def mesh_of(
     d : Decomposition
     options : MeshOptions, optional
     cover : ObjectCover, optional
-        Whose outline it follows.
+        Whose outline it follows, unless the object is too thin to have one: smoothed, it vanishes.
+    gloss : SpecularFit, optional
+        That of another mesh of this result.
 
     Returns
     -------
@@ -124,11 +131,23 @@ def mesh_of(
     InputError
         If the mask is too small for a mesh.
     """
-    maps = d.height, d.normal, d.mask, d.reflectance
+    if gloss is not None:
+        return replace(_surface_of(d, options, cover), gloss=gloss)
     with ThreadPoolExecutor(1) as aside:  # half of the work
-        gloss = aside.submit(bounded_specular, d)
-        built = build_mesh(*maps, options, camera=d.camera, cover=cover)
-        return replace(built, gloss=gloss.result())
+        found = aside.submit(bounded_specular, d)
+        return replace(_surface_of(d, options, cover), gloss=found.result())
+
+
+def _surface_of(
+    d: Decomposition, options: MeshOptions | None, cover: ObjectCover | None
+) -> MeshResult:
+    maps = d.height, d.normal, d.mask, d.reflectance
+    try:
+        return build_mesh(*maps, options, camera=d.camera, cover=cover)
+    except InputError:
+        if cover is None:
+            raise
+        return build_mesh(*maps, options, camera=d.camera)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:

@@ -142,11 +142,14 @@ def save(
             maps.result()
             give_back_memory()
         monitor.report("building the mesh", 0.4)
-        built = mesh_of(d, mesh)
+        edge = object_cover(d, cover)
+        built = mesh_of(d, mesh, edge)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
-            write_arrays(d, partial / ARRAYS, built, texture, object_cover(d, cover))
+            # Their vertices are pixels, which an outline between the pixels has not.
+            plain = built if edge is None else mesh_of(d, mesh, gloss=built.gloss)
+            write_arrays(d, partial / ARRAYS, plain, texture, edge)
         if png:
             write_layer_pngs(d, partial)
         if cover is not None:

@@ -161,6 +161,20 @@ def test_each_thing_of_a_photo_becomes_an_object_of_one_scene(tmp_path: Path) ->
 
 
 @pytest.mark.slow
+def test_a_thing_that_fails_leaves_the_others(tmp_path: Path) -> None:
+    single = cv2.imread(str(photo(tmp_path)), cv2.IMREAD_UNCHANGED)
+    cv2.imwrite(str(tmp_path / "pair.png"), np.concatenate([single, single], axis=1))
+    blend, kept = tmp_path / "pair.blend", tmp_path / "kept"
+    (kept / "pair" / "1").mkdir(parents=True)
+    (kept / "pair" / "1" / "diary.txt").write_text("mine")
+    words = ["--each", "--model", "retinex", "--max-size", "32", "--threads", "1"]
+    done = run(tmp_path / "pair.png", "-o", blend, "--results", kept, *words)
+    assert done.returncode == 2 and "thing 1 of 2: " in done.stderr, done.stdout + done.stderr
+    assert scenes_of(blend)[0]["pair"][-1] == 2, "one object and its camera"
+    assert [path.name for path in (kept / "pair" / "1").iterdir()] == ["diary.txt"]
+
+
+@pytest.mark.slow
 def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree(
     tmp_path: Path,
 ) -> None:

@@ -35,6 +35,25 @@ def test_the_bar_moves_while_a_stage_reports_nothing() -> None:
     assert shares[-1] < pace.at(WorkerUpdate("x", 0.736), 64.0).fraction, "never past the stage"
 
 
+def test_of_several_things_the_share_is_that_of_all() -> None:
+    """A worker that takes 20 s to find three things and for each of them."""
+    pace, told = Pace(512, several=True), []
+    for step in range(161):
+        elapsed, left = step / 2, 80 - step / 2
+        update = WorkerUpdate("looking")
+        if elapsed >= 20:
+            number = min(int((elapsed - 20) / 20), 2) + 1
+            update = WorkerUpdate("x", (elapsed - 20) / 60, part=(number, 3))
+        shown = pace.at(update, elapsed)
+        told.append((shown.fraction, shown.seconds_left, left))
+    shares = [share for share, _, _ in told]
+    assert shares[39] == 0 and told[39][1] is None, "how many there are is not known"
+    assert all(a <= b for a, b in zip(shares, shares[1:], strict=False))
+    assert shares[-1] == pytest.approx(1)
+    for _, guess, true in told[80:]:
+        assert guess is not None and abs(guess - true) < 0.4 * max(true, 20), (guess, true)
+
+
 def test_nothing_is_said_at_the_start() -> None:
     assert Pace(512).at(WorkerUpdate("x", 0.0), 5.0).seconds_left is None
     assert Pace(512).at(WorkerUpdate("x", 0.5), 0.5).seconds_left is None
@@ -51,3 +70,4 @@ def test_nothing_is_said_at_the_start() -> None:
 )
 def test_the_time_left_is_written_in_round_numbers(seconds: float | None, text: str) -> None:
     assert stage_text("shape", seconds) == text
+    assert stage_text("thing 2 of 3: shape", seconds) == f"2/3: {text}"

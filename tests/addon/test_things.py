@@ -1,6 +1,9 @@
 """Each thing of a photo becomes an object: a photo of rendered things, and the scene it becomes."""
 
+import contextlib
 import json
+import os
+import time
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +28,7 @@ from isc_core.result_files.result_folder import save  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 from tests.addon.test_operators import census  # noqa: E402
+from tests.addon.test_operators_run import until  # noqa: E402
 from tests.addon.test_scene_perspective import evaluated_vertices, seen_pixels  # noqa: E402
 from tests.core import perspective_scene  # noqa: E402
 
@@ -78,7 +82,7 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def use(addon: Any, path: Path, **options: Any) -> Any:
     settings = addon.context.scene.isc
-    settings.image = addon.data.images.load(str(path))
+    settings.image = addon.data.images.load(str(path), check_existing=True)
     for name, value in {"each": True, "max_size": 48, "model": "mdr", **options}.items():
         setattr(settings, name, value)
     return settings
@@ -162,6 +166,82 @@ def test_cancel_leaves_nothing_half_made(addon: Any, shelf: Path) -> None:
         importing.close()
         run.cancel()
         assert census(addon) == before and not run.folder.exists()
+
+
+def started(addon: Any, shelf: Path, size: int) -> Any:
+    use(addon, shelf, own_scene=False, max_size=size)
+    request = request_from_settings(addon.context.scene)
+    return begin_run(operators.create_decompose_run(addon.context, request))
+
+
+@pytest.mark.slow
+def test_progress_and_time_left_are_those_of_all_things(addon: Any, shelf: Path) -> None:
+    run, seen = started(addon, shelf, 26), []
+    while run.step().state == "running":
+        seen.append(run.status)
+        time.sleep(0.02)
+    run.cancel()
+    shares = [status.fraction for status in seen]
+    assert shares == sorted(shares) and shares[-1] == 1
+    for number in (1, 2, 3):
+        of = [one for one in seen if one.stage.startswith(f"thing {number} of 3: ")]
+        assert (number - 1) / 3 < of[0].fraction < of[-1].fraction < (number + 1) / 4 + 0.01
+        assert number == 1 or all(one.seconds_left is not None for one in of)
+    lefts = [one.seconds_left for one in seen if one.seconds_left is not None]
+    assert lefts[-1] < 0.2 * max(lefts), "nothing is left in the end"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("when", ["looking for the things", "thing 1", "between", "thing 3"])
+def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: str) -> None:
+    """In a thing, between two, and before the first: the worker ends, scene and disk are as before,
+    and a later run makes all of them.
+    """
+    use(addon, shelf)
+    before, there = census(addon), workers()
+    run = started(addon, shelf, 27)
+
+    def is_now() -> bool:
+        first = run.folder / "result" / "1" / "decomposition.json"
+        return first.is_file() if when == "between" else run.status.stage.startswith(when)
+
+    until(lambda: run.step().state != "running" or is_now(), 100)
+    assert run.status.state == "running" and workers() > there
+    run.cancel()
+    assert run.status.state == "cancelled"
+    until(lambda: workers() == there and not run.folder.exists())
+    assert census(addon) == before
+    again = started(addon, shelf, 27)
+    until(lambda: again.step().state != "running" or "thing 1" in again.status.stage, 100)
+    assert again.status.state == "running", "nothing was kept for it"
+    again.cancel()
+    until(lambda: workers() == there)
+
+
+@pytest.mark.slow
+def test_a_thing_that_fails_leaves_the_others(addon: Any, shelf: Path) -> None:
+    run = started(addon, shelf, 25)
+    (run.folder / "result" / "2").mkdir(parents=True)
+    (run.folder / "result" / "2" / "diary.txt").write_text("mine")
+    while not advance_run(addon.context, run):
+        time.sleep(0.02)
+    assert run.status.message == "2 objects created at the 3D cursor"
+    assert run.status.notes[0].startswith("note: thing 2 of 3: ")
+    assert run.status.notes[0].endswith("1 of 3 things failed")
+    assert {one.name for one in addon.data.objects if one.type == "MESH"} == {"shelf 1", "shelf 3"}
+    assert addon.ops.isc.decompose() == {"FINISHED"}
+    assert addon.data.objects["shelf 2"].type == "MESH", "the next run tries it again"
+
+
+def workers() -> set[int]:
+    """Processes that this one has started and that go on."""
+    found = set()
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):
+            fields = path.read_text().rpartition(")")[2].split()
+            if int(fields[1]) == os.getpid() and fields[0] != "Z":
+                found.add(int(path.parent.name))
+    return found
 
 
 @pytest.mark.slow

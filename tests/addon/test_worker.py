@@ -388,6 +388,19 @@ def test_an_unresponsive_worker_is_killed_with_its_children(
     assert others(tmp_path) == []
 
 
+def test_a_killed_worker_leaves_the_things_that_are_done(tmp_path: Path, fake_core: Maker) -> None:
+    out = tmp_path / "out"
+    (out / ".3.11111111.partial").mkdir(parents=True)
+    things = "(output / '1').mkdir()\n(output / '.2.0a1b2c3d.partial').mkdir()\n"
+    worker = start_decompose(job(tmp_path / "a.png", out), fake_core(things + STUBBORN))
+    at_stage(worker, "asleep")
+    assert (out / ".2.0a1b2c3d.partial").is_dir()
+    worker.kill()
+    assert ended(worker, 20).state == "cancelled"
+    left = sorted(path.name for path in out.iterdir())
+    assert left == [".3.11111111.partial", "1"], "another process may be at work there"
+
+
 @posix
 def test_a_worker_killed_from_outside_has_failed(tmp_path: Path, fake_core: Maker) -> None:
     earlier = tmp_path / ".out.11111111.partial"

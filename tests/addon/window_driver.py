@@ -1,13 +1,16 @@
 """Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
 automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color,
 glTF and USD, a second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a
-run, a new scene, the asset dragged into another file.
+run, a new scene, two things of one photo, a furry ball, a refined result with its lamps, the asset
+dragged into another file.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
     blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
     PHOTOS/photo.png --size 1280x800 \\
-        --timeout 700 --driver tests/addon/window_driver.py --out OUT
-then `window_reopened.py` looks at what this has written.
+        --timeout 1300 --driver tests/addon/window_driver.py --out OUT
+then `window_reopened.py` looks at what this has written. `--in FOLDER/refined`, a result of `isc
+decompose --refine --arrays` whose lamps were kept, adds their step; without it, it is left out.
+`-- each_object soft_rim` at the end runs these steps alone.
 `acc` is that script's helper: `find` moves the mouse until the button under it runs the operator,
 `shot` saves the screen, a number that is yielded is waited for. Exit code 1 where a check fails;
 OUT/measured.txt holds the longest calls.
@@ -20,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import bpy
+import numpy as np
 
 NAME = "photo"
 _SHADERS = 75.0  # seconds until a software renderer has compiled the shaders of a new material
@@ -30,6 +34,18 @@ def main(acc: Any) -> Iterator[float]:
     measured: list[str] = []
     yield 1.5
     yield acc.shot("01_start")
+    if not acc.args:
+        yield from first_steps(acc, measured)
+    for step in (each_object, soft_rim, refined):
+        if not acc.args or step.__name__ in acc.args:
+            yield from step(acc, measured)
+    if not acc.args:
+        yield from another_file(acc)
+    Path(acc.out, "measured.txt").write_text("\n".join(measured) + "\n")
+
+
+def first_steps(acc: Any, measured: list[str]) -> Iterator[float]:
+    """With one photo."""
     yield from mask(acc, measured)
     yield from create(acc, measured)
     yield from look_around(acc)
@@ -48,8 +64,6 @@ def main(acc: Any) -> Iterator[float]:
     yield from load_during_a_run(acc, measured)
     yield from load_while_drawing(acc)
     yield from new_scene(acc, measured)
-    yield from another_file(acc)
-    Path(acc.out, "measured.txt").write_text("\n".join(measured) + "\n")
 
 
 def mask(acc: Any, measured: list[str]) -> Iterator[float]:
@@ -184,6 +198,141 @@ def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
     yield 1.5
     acc.check(bpy.context.scene.name == "Scene", "and leads back")
     bpy.context.scene.isc.own_scene = False
+
+
+def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
+    """The two things of a photo: progress of both, Esc in the second one, one undo step."""
+    settings, before = bpy.context.scene.isc, objects()
+    settings.image, settings.mask_source = picture(acc, "pair", balls()), "ALPHA"
+    settings.each, settings.max_size, settings.own_scene = True, 256, False
+    calm(acc)
+    yield from begin(acc)
+    told: list[tuple[float, str]] = []
+
+    def told_of_second() -> bool:
+        told.append((shown().fraction, shown().stage))
+        return at_thing(2)
+
+    yield from until(told_of_second, 300)
+    acc.check(at_thing(2), f"the second thing is at work: {shown().stage}, {shown().message}")
+    yield acc.shot("16_each_running")
+    shares, stages = [share for share, _ in told], [stage for _, stage in told]
+    acc.check(shares == sorted(shares) and shares[-1] < 0.9, f"progress of both: {shares[-1]:.2f}")
+    acc.check(any("1/2: " in stage and "left" in stage for stage in stages), "time left")
+    yield from escape(acc)
+    yield from until(lambda: shown().state == "cancelled" and not workers(), 8)
+    acc.check(shown().state == "cancelled" and objects() == before, "Esc leaves none of both")
+    began = time.monotonic()
+    yield from begin(acc)
+    yield from ended(400)
+    note(acc, measured, f"two things in {time.monotonic() - began:.0f} s")
+    acc.check(set(objects()) == {*before, "pair 1", "pair 2"}, f"both: {shown().message}")
+    yield _SHADERS
+    yield acc.shot("16_each_created")
+    yield keys(acc, "ctrl+z", 3)
+    acc.check(objects() == before, f"one undo step takes both away: {objects()}")
+    yield keys(acc, "ctrl+shift+z", 3)
+    acc.check({"pair 1", "pair 2"} <= set(objects()), "one step brings both back")
+    bpy.context.scene.isc.each = False
+
+
+def at_thing(number: int) -> bool:
+    """Whether this thing of two is at work, or the run is over."""
+    return f"{number}/2: " in shown().stage or shown().state != "running"
+
+
+def soft_rim(acc: Any, measured: list[str]) -> Iterator[float]:
+    """A furry ball from a soft alpha channel: its material has an opacity."""
+    settings = bpy.context.scene.isc
+    settings.image, settings.mask_source = picture(acc, "fur", furry_ball()), "ALPHA"
+    settings.each, settings.max_size, settings.own_scene = False, 512, False
+    calm(acc)
+    yield from begin(acc)
+    yield from ended(400)
+    note(acc, measured, "soft rim")
+    acc.check("fur" in objects(), f"a furry ball: {shown().message}")
+    nodes = bpy.data.objects["fur"].active_material.node_tree.nodes
+    shader = next(node for node in nodes if node.type == "BSDF_PRINCIPLED")
+    acc.check(shader.inputs["Alpha"].is_linked, "its material has an opacity")
+    with acc.context():
+        bpy.ops.view3d.view_axis(type="FRONT")
+        bpy.ops.view3d.view_selected()
+    yield _SHADERS
+    yield acc.shot("17_soft_rim")
+
+
+def refined(acc: Any, measured: list[str]) -> Iterator[float]:
+    """A refined result in a scene of its own: the lamps of its highlights shine there."""
+    folder = Path(acc.inp, "refined")
+    if not folder.is_dir():
+        acc.log("no refined result is given")
+        return
+    home = bpy.context.scene.name
+    bpy.context.scene.isc.own_scene = True
+    calm(acc)
+    with acc.context():
+        bpy.ops.isc.read_result("INVOKE_DEFAULT", directory=str(folder))
+    yield from ended(100)
+    note(acc, measured, "refined")
+    roles = {str(thing.get("isc_role", "")): thing for thing in bpy.context.scene.objects}
+    lamps = sorted(role for role in roles if role.startswith("lamp"))
+    acc.check(bpy.context.scene.name != home, f"a refined result: {shown().message}")
+    acc.check(lamps, f"its lamps are there: {lamps}")
+    acc.check(all(not roles[role].hide_render for role in lamps), "and shine")
+    acc.view3d()[1].spaces.active.shading.type = "RENDERED"
+    yield _SHADERS
+    yield acc.shot("18_refined")
+    acc.view3d()[1].spaces.active.shading.type = "MATERIAL"
+    yield from press(acc, "isc.return_to_scene")
+    yield 1.5
+    acc.check(bpy.context.scene.name == home, "and back")
+    bpy.context.scene.isc.own_scene = False
+
+
+def calm(acc: Any) -> None:
+    """No materials in the view: compiling their shaders on the processor delays every call."""
+    acc.view3d()[1].spaces.active.shading.type = "SOLID"
+
+
+def picture(acc: Any, name: str, codes: np.ndarray) -> Any:
+    """A photo (H, W, 4) in sRGB codes from 0 to 1, row 0 at the top, as a file, and opened."""
+    height, width = codes.shape[:2]
+    made = bpy.data.images.new(name, width, height, alpha=True)
+    made.pixels.foreach_set(codes[::-1].astype(np.float32).ravel())
+    made.filepath_raw, made.file_format = f"{acc.out}/{name}.png", "PNG"
+    made.save()
+    bpy.data.images.remove(made)
+    return bpy.data.images.load(f"{acc.out}/{name}.png")
+
+
+def balls() -> np.ndarray:
+    """Two glossy balls side by side before nothing."""
+    return np.concatenate(
+        [glossy_ball(320, 140.0, (0.7, 0.25, 0.12)), glossy_ball(320, 110.0, (0.15, 0.4, 0.6))], 1
+    )
+
+
+def glossy_ball(size: int, radius: float, color: tuple[float, float, float]) -> np.ndarray:
+    """A ball under a lamp, (size, size, 4)."""
+    down, across = (np.indices((size, size)) + 0.5 - size / 2) / radius
+    inside = np.hypot(down, across) < 1
+    normal = np.stack([across, -down, np.sqrt(np.maximum(1 - across**2 - down**2, 0))])
+    lamp = np.array([0.4, 0.5, 0.77])
+    half = (lamp + (0, 0, 1)) / np.linalg.norm(lamp + (0, 0, 1))
+    diffuse = 0.2 + 0.7 * np.maximum(np.tensordot(lamp, normal, 1), 0)
+    gloss = 0.6 * np.maximum(np.tensordot(half, normal, 1), 0) ** 80
+    light = diffuse[..., None] * color + gloss[..., None]
+    return np.dstack([np.clip(light, 0, 1) ** (1 / 2.2), inside]) * inside[..., None]
+
+
+def furry_ball() -> np.ndarray:
+    """A ball whose strands fade outward, (640, 640, 4)."""
+    codes, rng = glossy_ball(640, 300.0, (0.5, 0.35, 0.22)), np.random.default_rng(0)
+    down, across = np.indices((640, 640)) + 0.5 - 320
+    strand = ((np.arctan2(down, across) / np.pi + 1) * 300).astype(int)
+    length = np.convolve(rng.uniform(20, 90, 603), np.ones(3) / 3, "valid")[strand]
+    codes[..., 3] = np.clip((300 - np.hypot(down, across)) / length, 0, 1)
+    return codes
 
 
 def box(acc: Any, measured: list[str]) -> Iterator[float]:

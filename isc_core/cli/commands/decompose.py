@@ -4,16 +4,17 @@ import argparse
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 
 from ...batch.names import safe_name
 from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
-from ...errors import InputError, Rejected
+from ...errors import InputError
 from ...imaging.bounding_box import mask_box
 from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
-from ...progress import Monitor, ProgressEvent
+from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
 from ...result_files.exports.full_texture import full_texture
 from ...result_files.known_inputs import read_height, read_light
@@ -40,6 +41,7 @@ from ..interface.options import (
     names_table,
 )
 from ..interface.parser import describe, hints
+from ..interface.several import do_all
 from ..interface.standard_input import STDIN, photo_file
 from ..interface.values import MAPS_SIZE, memory_size, number, positive, texture_size
 from ..interface.viewer import show
@@ -176,7 +178,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises
     ------
     Rejected
-        If some of several photos failed.
+        If some of several photos, or of several things, failed.
     """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
@@ -283,7 +285,9 @@ def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomp
 def _decompose_each(
     options: argparse.Namespace, settings: Settings, prior_set: PriorSet | None, monitor: Monitor
 ) -> list[str]:
-    """Decompose each of several things of a photo into a folder of its own."""
+    """Decompose each of several things of a photo into a folder of its own; one that fails does not
+    stop the others.
+    """
     hints_of(options)
     for option in ("shape", "depth"):
         if getattr(options, option) is not None:
@@ -291,16 +295,35 @@ def _decompose_each(
     if len(options.photo) > 1:
         raise InputError("--each takes the things of one photo: give one")
     path: Path = options.photo[0]
+    monitor.report("looking for the things", 0.0)
     with photo_file(path, options) as file:
         photos = read_each(file, options.mask, options.transfer, limits_of(options))
-    outputs = [options.output / str(number) for number in range(1, len(photos) + 1)]
-    for output in outputs:
-        require_writable_result(output, inputs=(path, options.mask))
-    lines, count = list[str](), len(photos)
-    for index, (photo, output) in enumerate(zip(photos, outputs, strict=True)):
-        part = _named(monitor.part(index / count, (index + 1) / count), f"thing {index + 1}")
-        lines += _decompose_photo(photo, path, output, options, settings, prior_set, part)
-    return lines
+    works = {
+        f"thing {number} of {len(photos)}": partial(
+            _decompose_thing,
+            photo,
+            path,
+            options.output / str(number),
+            options,
+            settings,
+            prior_set,
+        )
+        for number, photo in enumerate(photos, 1)
+    }
+    return do_all("things", works, monitor)
+
+
+def _decompose_thing(
+    photo: Photo,
+    path: Path,
+    output: Path,
+    options: argparse.Namespace,
+    settings: Settings,
+    prior_set: PriorSet | None,
+    monitor: Monitor,
+) -> list[str]:
+    require_writable_result(output, inputs=(path, options.mask))
+    return _decompose_photo(photo, path, output, options, settings, prior_set, monitor)
 
 
 def _decompose_several(
@@ -315,18 +338,11 @@ def _decompose_several(
             )
     if hints_of(options):
         raise InputError("--box, --point and --not belong to one photo: give one")
-    outputs = dict(_outputs(options.photo, options.output))
-    lines, failures = [], []
-    for index, (path, output) in enumerate(outputs.items()):
-        part = _named(monitor.part(index / len(outputs), (index + 1) / len(outputs)), path.name)
-        try:
-            lines += _decompose_one(path, output, options, settings, prior_set, part)
-        except InputError as error:
-            failures.append(str(error))
-    if failures:
-        done = f"{len(failures)} of {len(outputs)} photos failed, see above"
-        raise Rejected("\n".join([*failures, done]))
-    return lines
+    works = {
+        path.name: partial(_decompose_one, path, output, options, settings, prior_set)
+        for path, output in _outputs(options.photo, options.output)
+    }
+    return do_all("photos", works, monitor)
 
 
 def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
@@ -343,15 +359,6 @@ def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
                 "into different folders"
             )
         yield path, folder / name
-
-
-def _named(monitor: Monitor, name: str) -> Monitor:
-    """A monitor whose stages begin with the name of the photo."""
-
-    def report(event: ProgressEvent) -> None:
-        monitor.progress(ProgressEvent(f"{name}: {event.stage}", event.fraction, event.detail))
-
-    return Monitor(report, monitor.cancelled)
 
 
 def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:

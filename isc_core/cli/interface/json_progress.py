@@ -5,8 +5,9 @@
     {"event": "failed", "message": "one line for people", "code": 2}
     {"event": "cancelled"}
 
-Any number of progress events comes first; their fraction, of the whole job, never decreases. One of
-the other three comes last.
+Any number of progress events comes first; their fraction, of the whole job, never decreases; of
+several photos or things they have a `part`, [2, 3] for the second of three. One of the other three
+comes last.
 
 The calling program holds the other end of standard input: the line `cancel` acts as Ctrl-C. With
 `--cancel-at-eof` so does the end of the stream, which comes when that program has ended; without
@@ -99,7 +100,7 @@ class JsonReporter:
         """
         self._write("failed", message=message, code=code)
 
-    def rejected(self, lines: Sequence[str], code: int) -> None:
+    def rejected(self, lines: Sequence[str], code: int, done: Sequence[str] = ()) -> None:
         """Report the violated bounds of a result.
 
         Parameters
@@ -108,7 +109,10 @@ class JsonReporter:
             One for each bound.
         code : int
             Exit code.
+        done : sequence of str, optional
+            Lines of what is done; not reported, they stand in the results, too.
         """
+        del done
         self._write("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:
@@ -120,11 +124,13 @@ class JsonReporter:
         self._most = max(self._most, min(event.fraction, 1.0))
         if event.stage != self._stage or now - self._reported > _REPEAT_SECONDS:
             self._stage, self._reported = event.stage, now
+            part = {} if event.part is None else {"part": event.part}
             self._write(
                 "progress",
                 stage=event.stage,
                 fraction=round(self._most, 4),
                 detail=event.detail,
+                **part,
             )
 
     def _write(self, event: str, **content: object) -> None:

@@ -178,7 +178,7 @@ class TerminalReporter:
         del code
         print(f"isc: {styled('error:', Style.ERROR, sys.stderr)} {message}", file=sys.stderr)
 
-    def rejected(self, lines: Sequence[str], code: int) -> None:
+    def rejected(self, lines: Sequence[str], code: int, done: Sequence[str] = ()) -> None:
         """Print the violated bounds of a result.
 
         Parameters
@@ -187,8 +187,10 @@ class TerminalReporter:
             One for each bound.
         code : int
             Exit code; not printed.
+        done : sequence of str, optional
+            Lines of what is done.
         """
-        del code
+        self.done("", done)
         for line in lines:
             print(f"isc: {styled('rejected:', Style.ERROR, sys.stderr)} {line}", file=sys.stderr)
 

@@ -45,6 +45,7 @@ ROUND, FULLNESS = 1.0, 1.0
 _LEAST = 0.2
 _SMOOTH = 6  # passes over the depth of the rim
 _BEHIND = 0.02  # of the longer side
+_SIDES = (-1, 0, 1)
 _STEP = 1e3  # pixels of height between core and sheet, for small triangles there
 
 
@@ -151,26 +152,36 @@ def make_body(
 def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Continue heights from the mask to the pixels inside, ring by ring.
 
+    Each pixel of a ring is the mean of its neighbours within.
+
     Parameters
     ----------
-    height : (H, W) ndarray
-        0 outside the mask.
+    height : (H, W) or (H, W, C) ndarray
     mask, inside : (H, W) bool ndarray
 
     Returns
     -------
-    (H, W) float64 ndarray
+    float64 ndarray
+        Of the shape of `height`.
     """
-    found, known = height.astype(np.float64), mask.copy()
-    while (inside & ~known).any():
-        grown = _grown(known)
-        ring = grown & ~known
-        if not ring.any():
-            break
-        weight = _sums(known.astype(np.float64))
-        found = np.where(ring, _sums(np.where(known, found, 0)) / np.maximum(weight, 1), found)
-        known = grown
-    return found
+    padded, more = (mask.shape[0] + 2, mask.shape[1] + 2), height.shape[2:]
+    found, known = np.zeros((*padded, *more)), np.pad(mask, 1)
+    found[1:-1, 1:-1] = height
+    frame, missing = np.pad(np.ones_like(mask), 1), np.pad(inside & ~mask, 1)
+    ring, left = np.flatnonzero(np.pad(_grown(mask) & ~mask, 1)), np.count_nonzero(missing)
+    values = found.reshape(-1, *more)
+    known, frame, missing = known.ravel(), frame.ravel(), missing.ravel()
+    around = np.add.outer(_SIDES, np.multiply(_SIDES, padded[1])).ravel()
+    while left and ring.size:
+        beside = ring[:, None] + around
+        weight = known[beside].reshape(-1, 9, *(1,) * len(more))
+        parts = (values[beside] * weight).reshape(-1, 3, 3, *more)
+        values[ring] = parts.sum(2).sum(1) / weight.sum(1)
+        known[ring] = True
+        left -= np.count_nonzero(missing[ring])
+        near = np.unique(beside)
+        ring = near[frame[near] & ~known[near]]
+    return found[1:-1, 1:-1]
 
 
 def _sums(plane: np.ndarray) -> np.ndarray:

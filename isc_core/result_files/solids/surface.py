@@ -173,10 +173,7 @@ def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray)
     """(H, W, 3): the unit normals, also of pixels of the body just beyond the mask."""
     inside = mask.copy()
     inside[pixels[:, 0], pixels[:, 1]] = True
-    planes = [
-        continued(np.where(mask, plane, 0), mask, inside) for plane in np.moveaxis(normal, -1, 0)
-    ]
-    found = np.stack(planes, -1)
+    found = continued(np.where(mask[..., None], normal, 0), mask, inside)
     length = np.linalg.norm(found, axis=-1, keepdims=True)
     return np.where(length > 0, found / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
 

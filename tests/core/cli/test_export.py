@@ -15,8 +15,10 @@ from isc_core.lobe_fitting import fit_lobe
 from isc_core.photo.camera import Camera
 from isc_core.result_files.mesh import build_mesh
 from isc_core.result_files.mesh_options import MeshOptions
-from isc_core.result_files.result_folder import save
+from isc_core.result_files.object_cover import read_cover
+from isc_core.result_files.result_folder import load, save
 from isc_core.result_files.solids.back import Back
+from isc_core.scene.decomposition import COLOR_MAPS
 from tests.core.ball_scene import ball
 from tests.core.command_line import ball_photo, run_isc
 
@@ -264,6 +266,49 @@ def test_a_soft_rim_in_other_formats(fur: Path, tmp_path: Path) -> None:
     with Image.open(tmp_path / "b_alpha.png") as image:
         alpha = np.asarray(image)
     assert alpha.ndim == 2 and (alpha[:, :60] == 255).all() and (alpha == 0).any()
+
+
+@pytest.mark.parametrize("kind", ["fur", "smooth"])
+def test_the_mesh_of_the_result_is_the_exported_one(
+    kind: str, tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    folder = request.getfixturevalue(kind)
+    assert exported(folder, "--format", "glb", "-o", tmp_path / "a.glb") == 0
+    assert (tmp_path / "a.glb").read_bytes() == (folder / "mesh.glb").read_bytes()
+    told = json.loads((folder / "decomposition.json").read_text())["mesh"]
+    assert told["faces"] == len(trimesh.load(folder / "mesh.glb", force="mesh").faces)
+
+
+def test_vertices_of_arrays_are_pixels_where_the_outline_is_none(
+    smooth: Path, tmp_path: Path
+) -> None:
+    """The same as those that `isc arrays` adds, and without a finer outline."""
+    d, cover = load(smooth), read_cover(smooth / "mask.png")
+    save(d, tmp_path / "a", arrays=True, cover=cover)
+    save(d, tmp_path / "b", arrays=True)
+    assert main(["arrays", str(smooth)]) == 0
+    made, plain, added = (
+        dict(np.load(folder / "arrays.npz")) for folder in (tmp_path / "a", tmp_path / "b", smooth)
+    )
+    assert made.keys() == added.keys() and all(
+        np.array_equal(made[name], added[name], equal_nan=made[name].dtype != bool) for name in made
+    )
+    for name in ("vertices", "faces", "uv", "vertex_pixel", "origin"):
+        assert np.array_equal(made[name], plain[name]), name
+    column, row = made["origin"][:2]
+    at = made["vertices"][:, :2] / made["metres_per_pixel"] * (1, -1) + (column, row)
+    np.testing.assert_allclose(at[:, ::-1], made["vertex_pixel"], atol=1e-3)
+
+
+def test_an_object_too_thin_for_an_outline_keeps_its_steps(tmp_path: Path) -> None:
+    d = ball()
+    thin = np.zeros_like(d.mask)
+    thin[40:42, 35:95] = True
+    cover = np.where(thin, 0.75, 0.0)
+    maps = {name: np.where(thin[..., None], getattr(d, name), 0) for name in COLOR_MAPS}
+    d = replace(d, mask=thin, height=np.where(thin, d.height, 0), brdf=None, **maps)
+    save(d, tmp_path / "thin", cover=cover)
+    assert len(trimesh.load(tmp_path / "thin" / "mesh.glb", force="mesh").faces) == 2 * 59
 
 
 def test_arrays_have_the_cover(fur: Path) -> None:

@@ -1,17 +1,23 @@
 """Several photos, a photo from standard input, PNG layers, --open, -v, and completion."""
 
+import errno
+import json
 import os
 import shutil
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
 
+from isc_core.cli.interface.several import do_all
 from isc_core.cli.main import main
+from isc_core.errors import Cancelled, InputError, Rejected
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.result_folder import load
 from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, write_image
 
@@ -49,8 +55,75 @@ def test_a_photo_that_fails_does_not_stop_the_others(
     broken.write_bytes(first.read_bytes()[:200])
     assert isc("decompose", first, broken, second, *NAIVE, "-q", "-o", tmp_path / "out") == 1
     errors = capsys.readouterr().err.splitlines()
-    assert "broken.png" in errors[0] and errors[1].endswith("1 of 3 photos failed, see above")
+    assert "broken.png" in errors[0] and errors[1].endswith("1 of 3 photos failed")
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["ball", "other_ball"]
+
+
+def two_balls(folder: Path) -> Path:
+    """A photo of two balls on black."""
+    ball = ball_codes(12.0)
+    both = np.concatenate([ball, 0.8 * ball], axis=1).astype("uint16")
+    return write_image(folder / "shelf.png", both)
+
+
+def test_a_thing_that_fails_stops_no_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo, out = two_balls(tmp_path), tmp_path / "out"
+    (out / "1").mkdir(parents=True)
+    (out / "1" / "diary.txt").write_text("mine")
+    words = ("decompose", photo, "--each", *NAIVE, "-o", out)
+    assert isc(*words) == 1
+    printed = capsys.readouterr()
+    errors = [line for line in printed.err.splitlines() if "rejected" in line]
+    assert "thing 1 of 2: " in errors[0] and str(out / "1") in errors[0]
+    assert errors[1].endswith("1 of 2 things failed") and len(errors) == 2
+    assert f"see {out / '2' / 'preview.png'}" in printed.out, "what is done is told"
+    assert [path.name for path in (out / "1").iterdir()] == ["diary.txt"]
+    assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "all") == 0
+    kept, alone = (load(folder / "2") for folder in (out, tmp_path / "all"))
+    assert np.array_equal(kept.reflectance, alone.reflectance)
+    assert isc(*words, "--progress", "json") == 1
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["event"] == "failed" and last["code"] == 1 and "thing 1 of 2: " in last["message"]
+
+
+def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo = two_balls(tmp_path)
+    photo.write_bytes(photo.read_bytes()[:200])
+    assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "out") == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1 and not (tmp_path / "out").exists()
+
+
+def test_want_of_memory_or_room_stops_no_other() -> None:
+    events: list[ProgressEvent] = []
+
+    def work(error: BaseException | None, monitor: Monitor) -> list[str]:
+        monitor.report("half", 0.5)
+        if error is not None:
+            raise error
+        return ["done"]
+
+    def run(*errors: BaseException | None) -> list[str]:
+        works = {f"thing {i}": partial(work, error) for i, error in enumerate(errors)}
+        return do_all("things", works, Monitor(events.append))
+
+    full = OSError(errno.ENOSPC, "No space left on device", "a\nb")
+    with pytest.raises(Rejected) as rejected:
+        run(MemoryError(), None, full, InputError("thing 3 cannot be used"))
+    lines = str(rejected.value).splitlines()
+    assert lines[0].startswith("thing 0: not enough memory") and rejected.value.lines == ["done"]
+    assert lines[1:3] == ["thing 2: a\\nb: No space left on device", "thing 3 cannot be used"]
+    assert lines[3] == "3 of 4 things failed"
+    assert [event.stage for event in events] == [f"thing {i}: half" for i in range(4)]
+    np.testing.assert_allclose([event.fraction for event in events], np.arange(1, 8, 2) / 8)
+    for stopping in (Cancelled("now"), BrokenPipeError(), KeyboardInterrupt()):
+        events.clear()
+        with pytest.raises(type(stopping)):
+            run(stopping, None)
+        assert len(events) == 1, "what ends the command ends all"
 
 
 def test_what_belongs_to_one_photo_is_refused_for_several(
