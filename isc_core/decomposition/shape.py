@@ -33,6 +33,7 @@ from ..sirfs.recover import Recovered, RecoverOptions, recover
 from ..sirfs.settings import PredictionWeights, Weights, isc_weights, prediction_weights
 from ..sirfs.solver import SolverOptions
 from .layers import scaled_light
+from .settings import Illumination
 from .task import DecompositionTask
 
 # Level of the brightest channels' percentile below, white being 1; it is .23 to .87 in the training
@@ -251,6 +252,7 @@ def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> R
     return RecoverOptions(
         options.solve_size,
         options.margin,
+        settings.illumination != Illumination.PHOTO,
         options.whole_frame,
         options.drop_near_edge,
         settings.shading_only,

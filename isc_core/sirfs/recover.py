@@ -4,11 +4,13 @@ brings the result back to the image's scale.
 Problem: the priors are statistics per pixel, so the answer would depend on the photo's scale and on
 the empty space around the object. The object is therefore resampled to one size
 (`RecoverOptions.solve_size`), and a window around its bounding box with a fixed margin is solved.
+Where priors were fitted at the size given, a larger object is then solved at that size, too, from
+what was found (`RecoverOptions.to_own_size`).
 
 Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: one object; detail finer than `solve_size` allows is not in the height.
+Limits: one object; detail finer than the size that is solved allows is not in the height.
 """
 
 from dataclasses import dataclass, field, replace
@@ -44,6 +46,8 @@ class RecoverOptions:
         Long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
     margin : int
         Pixels of empty space around the box at that size.
+    to_own_size : bool
+        Solve a larger object at the size given, too, from what is found at `solve_size`.
     whole_frame : bool
         Solve the frame as given instead of a window around the object. The height then is returned
         as solved, not shifted to a mean of 0.
@@ -57,6 +61,7 @@ class RecoverOptions:
 
     solve_size: int = SOLVE_SIZE
     margin: int = MARGIN
+    to_own_size: bool = False
     whole_frame: bool = False
     drop_near_edge: bool = False
     shading_only: bool = False
@@ -359,9 +364,17 @@ def recover(
     fixed = None
     if known.height is not None:
         fixed = _scaled_height(window.cut_replicated(known.height), factor)
+    again = options.to_own_size and factor < 1 and fixed is None
     result = solve(
-        problem, options.solver, known_height=fixed, known_light=known.light, monitor=monitor
+        problem,
+        options.solver,
+        known_height=fixed,
+        known_light=known.light,
+        monitor=monitor.part(0, 0.5 if again else 1),
     )
+    if again:
+        problem = _problem(inputs, floor, priors, weights, options)
+        result = _solved_again(problem, result, options.solver, known.light, monitor.part(0.5, 1))
     if known.height is not None:
         height = window.cut_replicated(known.height)
     else:
@@ -369,6 +382,23 @@ def recover(
         if known.depth is None and not options.whole_frame:
             height = height - height[inputs.valid].mean()
     return _recovered(result, window.put(height, mask.shape), problem.valid.shape)
+
+
+def _solved_again(
+    problem: Problem,
+    before: SirfsResult,
+    options: SolverOptions,
+    known_light: np.ndarray | None,
+    monitor: Monitor,
+) -> SirfsResult:
+    """Solve a finer problem from the result of a coarser one; evaluations are of both."""
+    start = resample_height(before.height, problem.valid.shape), before.light
+    found = solve(problem, options, known_light=known_light, start=start, monitor=monitor)
+    return replace(
+        found,
+        iterations=before.iterations + found.iterations,
+        evaluations=before.evaluations + found.evaluations,
+    )
 
 
 def _recovered(result: SirfsResult, height: np.ndarray, solved_shape: tuple[int, ...]) -> Recovered:

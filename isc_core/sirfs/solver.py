@@ -335,6 +335,27 @@ class ParameterVector:
             self.levels(x)[level][...] = height
         return x
 
+    def of(self, height: np.ndarray, light: np.ndarray) -> np.ndarray:
+        """Return the vector of a height and a light.
+
+        Parameters
+        ----------
+        height : (H, W) ndarray
+        light : (9, C) ndarray
+            Not used where the light is known.
+
+        Returns
+        -------
+        (N,) ndarray
+        """
+        x, prior = np.zeros_like(self.x), self._problem.priors.light
+        if self._known_light is None:
+            whitened = solve_linear(prior.unwhiten, (stack(light) - prior.offset)[:, None])
+            x[self._edges[-1] :] = whitened[:, 0]
+        if self.shapes:
+            self.levels(x)[0][...] = height
+        return x
+
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x
         self.evaluations += 1
@@ -355,6 +376,7 @@ def solve(
     *,
     known_height: np.ndarray | None = None,
     known_light: np.ndarray | None = None,
+    start: tuple[np.ndarray, np.ndarray] | None = None,
     monitor: Monitor | None = None,
 ) -> SirfsResult:
     """Minimise the objective of a problem.
@@ -370,6 +392,8 @@ def solve(
         Kept as given.
     known_light : (9, C) ndarray, optional
         Kept as given.
+    start : tuple of ndarray, optional
+        Height (H, W) and light (9, C) to start from instead.
     monitor : Monitor, optional
 
     Returns
@@ -395,9 +419,11 @@ def solve(
         unknowns = ParameterVector(problem, backend, options.levels, known_height, known_light)
         monitor.report(STAGE, 0.0)
         if unknowns.x.size:
-            run = multi_start(
-                unknowns, problem.weights.starts, options.lbfgs, backend.algebra(), monitor
-            )
+            weights, lbfgs, algebra = problem.weights, options.lbfgs, backend.algebra()
+            if start is None:
+                run = multi_start(unknowns, weights.starts, lbfgs, algebra, monitor)
+            else:
+                run = Minimisation(unknowns, unknowns.of(*start), lbfgs, algebra)
             outcome = run.run(_reporter(monitor, options.lbfgs.iterations))
             if unknowns.x is not run.x:  # it had converged before another start was tried
                 unknowns(run.x, np.empty_like(run.x))

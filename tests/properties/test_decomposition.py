@@ -69,7 +69,7 @@ def small_solves() -> Iterator[None]:
     def small(*args: Any, **options: Any) -> recover.RecoverOptions:
         given = recover.RecoverOptions(*args, **options)
         solver = replace(given.solver, lbfgs=FEW_STEPS)
-        return replace(given, solve_size=SIDE, margin=4, solver=solver)
+        return replace(given, solve_size=SIDE, margin=4, to_own_size=False, solver=solver)
 
     with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
         yield

@@ -67,7 +67,7 @@ def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
     """SIRFS at 24 pixels instead of 256, and not converged: irrelevant to these tests."""
 
     def small(*values: Any) -> RecoverOptions:
-        return replace(RecoverOptions(*values), solve_size=24, margin=6)
+        return replace(RecoverOptions(*values), solve_size=24, margin=6, to_own_size=False)
 
     monkeypatch.setattr(shape, "RecoverOptions", small)
     monkeypatch.setattr(

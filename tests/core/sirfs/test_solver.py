@@ -262,6 +262,18 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"
 
 
+def test_it_goes_on_from_a_given_height_and_light() -> None:
+    problem = make_problem(blob())
+    options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(evaluations=40))
+    before = solve(problem, options)
+    none = replace(options, lbfgs=LbfgsOptions(evaluations=1))
+    same = solve(problem, none, start=(before.height, before.light))
+    np.testing.assert_allclose(same.height, before.height, atol=1e-9)
+    np.testing.assert_allclose(same.light, before.light, atol=1e-9)
+    further = solve(problem, options, start=(before.height, before.light))
+    assert further.terms.total < before.terms.total
+
+
 @pytest.mark.slow
 def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
     """A light far from any likely one is a bad start; which of the starts stands first does not
