@@ -3,7 +3,9 @@
 Importing the libraries takes longer than a user takes to press Ctrl-C, and some of them catch the
 exception that it raises. Until `cli.main` takes over, nothing has been written, so Ctrl-C ends the
 process at once. The handler is installed before anything else is imported. Python's search for
-unreachable objects, a tenth of the time of imports that leave none, begins after them.
+unreachable objects, a tenth of the time of imports that leave none, begins after them. BLAS works
+on one thread unless the environment says otherwise: its threads wait for work by spinning, which
+takes the cores from ISC's own.
 
 Dismantling the interpreter after a decomposition takes a third of a second, which frees memory that
 the system takes back anyway. So the process ends itself, after what was registered with `atexit`.
@@ -38,6 +40,7 @@ def start() -> NoReturn:
         signal.signal(signal.SIGINT, _end)
     gc.disable()  # until `cli.main` has imported the command
     sys.setswitchinterval(_SWITCH)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from .cli.main import main
 
     code = main()
