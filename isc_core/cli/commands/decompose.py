@@ -298,6 +298,7 @@ def _decompose_each(
     monitor.report("looking for the things", 0.0)
     with photo_file(path, options) as file:
         photos = read_each(file, options.mask, options.transfer, limits_of(options))
+    _require_no_other_things(options.output, len(photos))
     works = {
         f"thing {number} of {len(photos)}": partial(
             _decompose_thing,
@@ -311,6 +312,17 @@ def _decompose_each(
         for number, photo in enumerate(photos, 1)
     }
     return do_all("things", works, monitor)
+
+
+def _require_no_other_things(output: Path, count: int) -> None:
+    """Refuse a folder of more things: programs that read it would take them for this photo's."""
+    for result in sorted(output.glob("*/decomposition.json")):
+        name = result.parent.name
+        if name.isdecimal() and int(name) > count:
+            raise InputError(
+                f"{result.parent} is the result of another run, and this photo has {count} "
+                f"{'thing' if count == 1 else 'things'}: remove it, or choose another folder"
+            )
 
 
 def _decompose_thing(

@@ -97,6 +97,18 @@ def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
     assert len(capsys.readouterr().err.splitlines()) == 1 and not (tmp_path / "out").exists()
 
 
+def test_results_of_more_things_in_the_folder_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo, out = two_balls(tmp_path), tmp_path / "out"
+    (out / "3").mkdir(parents=True)
+    (out / "3" / "decomposition.json").write_text("{}")
+    assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", out) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"{out / '3'} is the result of another run, and this photo has 2 things" in line
+    assert [path.name for path in out.iterdir()] == ["3"]
+
+
 def test_want_of_memory_or_room_stops_no_other() -> None:
     events: list[ProgressEvent] = []
 
