@@ -9,6 +9,7 @@ pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from isc_core.progress import Monitor
 from isc_core.refinement import GlossRefinement
+from isc_core.refinement.gloss_note import GlossOutcome
 from synth.capture.truth import render_truth
 from synth.rendering import RenderOptions
 from synth.scene import Scene
@@ -51,10 +52,14 @@ def test_scores_compare_the_lobe_with_that_of_the_start() -> None:
     # A lobe that is the truth itself has no error left; nothing to fit leaves nothing to compare.
     lobe = replace(start.brdf, predicted=truth.specular)
     better = replace(start, brdf=lobe)
-    perfect = score_refinement(truth, Refined(start, GlossRefinement(better, True, 1)))
+    perfect = score_refinement(
+        truth, Refined(start, GlossRefinement(better, GlossOutcome.REFINED, 1))
+    )
     assert perfect.kept == 1 and perfect.gloss is not None and perfect.gloss < 1e-3
     assert perfect.normal == 1 and perfect.reflectance == 1
-    nothing = score_refinement(truth, Refined(start, GlossRefinement(start, False)))
+    nothing = score_refinement(
+        truth, Refined(start, GlossRefinement(start, GlossOutcome.NO_HIGHLIGHT))
+    )
     assert nothing.photo is None and nothing.kept is None
     assert len(show_refinement(truth, answer)) == 3
     assert set(refinement_maps(answer)) >= {"specular.R", "start.G", "refined.B"}
