@@ -15,9 +15,10 @@ import bpy
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
+from isc_core.result_files.things import things_in
 
 from .datablocks.provenance import find_tagged
-from .files.result_arrays import ARRAYS, things_in
+from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
 from .operators.messages import join_notes
 from .operators.request import DecomposeRequest, MethodSettings

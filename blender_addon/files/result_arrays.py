@@ -253,23 +253,6 @@ def read_result(folder: Path | str) -> ResultArrays:
     return ResultArrays(**values, description=description, folder=folder)
 
 
-def things_in(folder: Path) -> list[Path]:
-    """Return the results of the things of a photo, from left to right.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder that `isc decompose --each` has written.
-
-    Returns
-    -------
-    list of Path
-        Those of its folders 1, 2 and so on that are there.
-    """
-    found = (path.parent for path in folder.glob(f"*/{DESCRIPTION}"))
-    return sorted((one for one in found if one.name.isdecimal()), key=lambda one: int(one.name))
-
-
 def read_description(path: Path) -> dict[str, Any]:
     """Read the description of a result.
 

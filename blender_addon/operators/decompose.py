@@ -9,9 +9,10 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
+from isc_core.result_files.things import things_in
 
 from ..datablocks.provenance import KEY, find_tagged
-from ..files.result_arrays import ARRAYS, things_in
+from ..files.result_arrays import ARRAYS
 from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
@@ -181,7 +182,9 @@ def _updated_objects(request: DecomposeRequest) -> Iterator[Any]:
     if request.build.each:
         start = f"{request.build.name} "
         made = {str(obj.get(KEY, "")) for obj in bpy.data.objects}
-        keys = sorted(key for key in made if key.removeprefix(start).isdecimal())
+        keys = sorted(
+            key for key in made if key.startswith(start) and key.removeprefix(start).isdecimal()
+        )
     found = (find_tagged(bpy.data.objects, key, OBJECT) for key in keys)
     return (obj for obj in found if obj is not None)
 

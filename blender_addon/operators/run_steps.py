@@ -16,17 +16,11 @@ from isc_core.errors import InputError
 from isc_core.refinement.gloss_note import gloss_line
 from isc_core.result_files.diagnostics_text import status_lines
 from isc_core.result_files.reading_notes_text import stored_note_lines
+from isc_core.result_files.things import things_in
 
 from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
-from ..files.result_arrays import (
-    ARRAYS,
-    DESCRIPTION,
-    ResultArrays,
-    read_description,
-    read_result,
-    things_in,
-)
+from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
 from ..files.result_cache import ResultCache, content_key
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
 from ..scene.things import prepare_things

@@ -41,6 +41,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.result_files.solids.body",
         "isc_core.result_files.solids.rim",
         "isc_core.result_files.solids.surface",
+        "isc_core.result_files.things",
         "isc_core.scene.diagnostics",
         "isc_core.shading.ambient_occlusion",
         "isc_core.shading.brdf.energy",

@@ -322,11 +322,7 @@ class ParameterVector:
         (N,) ndarray
         """
         p, x = self._problem, np.zeros_like(self.x)
-        prior = p.priors.light
-        if self._known_light is None:  # whitened, the expected light is at 0
-            x[self._edges[-1] :] = solve_linear(
-                prior.unwhiten, (start.light - 1) * prior.offset[:, None]
-            )[:, 0]
+        self._set_light(x, (start.light - 1) * p.priors.light.offset)
         if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
             level = min(_START_LEVEL, len(self.shapes) - 1)
             height = start.dome * p.silhouette.dome
@@ -348,13 +344,17 @@ class ParameterVector:
         -------
         (N,) ndarray
         """
-        x, prior = np.zeros_like(self.x), self._problem.priors.light
-        if self._known_light is None:
-            whitened = solve_linear(prior.unwhiten, (stack(light) - prior.offset)[:, None])
-            x[self._edges[-1] :] = whitened[:, 0]
+        x = np.zeros_like(self.x)
+        self._set_light(x, stack(light) - self._problem.priors.light.offset)
         if self.shapes:
             self.levels(x)[0][...] = height
         return x
+
+    def _set_light(self, x: np.ndarray, away: np.ndarray) -> None:
+        """Set a light in a vector by its difference (9 C,) from the expected one, which is at 0."""
+        if self._known_light is None:
+            unwhiten = self._problem.priors.light.unwhiten
+            x[self._edges[-1] :] = solve_linear(unwhiten, away[:, None])[:, 0]
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x

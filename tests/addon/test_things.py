@@ -15,7 +15,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.datablocks.staging import completed  # noqa: E402
-from blender_addon.files.result_arrays import read_result, things_in  # noqa: E402
+from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators import decompose as operators  # noqa: E402
 from blender_addon.operators import result  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
@@ -25,6 +25,7 @@ from blender_addon.scene.build import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from blender_addon.scene.things import place_things, prepare_things, stage_things  # noqa: E402
 from isc_core.result_files.result_folder import save  # noqa: E402
+from isc_core.result_files.things import things_in  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 from tests.addon.test_operators import census  # noqa: E402

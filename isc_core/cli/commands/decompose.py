@@ -21,6 +21,7 @@ from ...result_files.known_inputs import read_height, read_light
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
+from ...result_files.things import things_in
 from ...scene.decomposition import Decomposition
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
@@ -316,11 +317,10 @@ def _decompose_each(
 
 def _require_no_other_things(output: Path, count: int) -> None:
     """Refuse a folder of more things: programs that read it would take them for this photo's."""
-    for result in sorted(output.glob("*/decomposition.json")):
-        name = result.parent.name
-        if name.isdecimal() and int(name) > count:
+    for thing in things_in(output):
+        if int(thing.name) > count:
             raise InputError(
-                f"{result.parent} is the result of another run, and this photo has {count} "
+                f"{thing} is the result of another run, and this photo has {count} "
                 f"{'thing' if count == 1 else 'things'}: remove it, or choose another folder"
             )
 
