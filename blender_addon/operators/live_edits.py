@@ -31,6 +31,7 @@ from ..scene.material_edits import (
     begin_bake,
     color_state,
     finish_bake,
+    release_edited,
 )
 from ..scene.photo_highlights import has_moved, hide_highlights, show_highlights
 
@@ -45,10 +46,18 @@ def add_handlers() -> None:
     """Follow edits from now on."""
     bpy.app.handlers.depsgraph_update_post.append(_after_update)
     bpy.app.handlers.save_pre.append(_before_saving)
+    for before in (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
+        before.append(_before_undo)
+    for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        after.append(_after_undo)
 
 
 def remove_handlers() -> None:
     """Stop following edits."""
+    for after in (bpy.app.handlers.undo_post, bpy.app.handlers.redo_post):
+        after.remove(_after_undo)
+    for before in (bpy.app.handlers.undo_pre, bpy.app.handlers.redo_pre):
+        before.remove(_before_undo)
     bpy.app.handlers.save_pre.remove(_before_saving)
     bpy.app.handlers.depsgraph_update_post.remove(_after_update)
     _stop_bakes()
@@ -140,6 +149,18 @@ def _after_update(scene: Any, depsgraph: Any) -> None:
 def _before_saving(*_: Any) -> None:
     for material in _materials():
         _bake_now(material)
+
+
+@persistent
+def _before_undo(*_: Any) -> None:
+    for material in _materials():
+        release_edited(material)
+
+
+@persistent
+def _after_undo(*_: Any) -> None:
+    for material in _materials():
+        settle_edits(material)
 
 
 def _bake_now(material: bpy.types.Material) -> None:

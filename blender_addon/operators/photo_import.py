@@ -37,7 +37,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
         "Create a mesh with material from a photo of one object, the mask is found if the photo "
         "has no transparency"
     )
-    bl_options = {"REGISTER"}
+    bl_options = {"UNDO"}
 
     filepath: StringProperty(
         name="Photo",

@@ -45,6 +45,7 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
 # index of refraction.
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
+_EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
 
 
 def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
@@ -104,12 +105,15 @@ def apply_edits(material: bpy.types.Material) -> bool:
     _write_numbers(material, surface, group.inputs)
     if _color_state(group) == material.get(_COLOR):
         return False
-    target = surface.inputs["Base Color"]
-    if not _is_ours(target, group):
+    if not _is_ours(surface.inputs["Base Color"], group):
         return False
-    if not target.is_linked or target.links[0].from_node != group:
-        material.node_tree.links.new(group.outputs["Base Color"], target)
-    return _can_bake(material, group)
+    can_bake = _can_bake(material, group)
+    image = _find_edited(material, _color_state(group)) if can_bake else None
+    if image is not None:
+        _show_edited(material, image)
+        return False
+    _show_group(material)
+    return can_bake
 
 
 @dataclass(frozen=True)
@@ -201,13 +205,32 @@ def finish_bake(material: bpy.types.Material, state: str, file: ImageFile) -> No
     surface, group = surface_node(material), dichromatic_node(material)
     if surface is None or group is None:
         return
-    key, role = str(material.get(KEY, material.name)), "edited_base_color"
-    image = tag(new_image(file), key, role)
-    image.name = image_name(key, role)
-    node = _edited_texture(material, group.inputs["Base Color"].links[0].from_node)
-    _replace_image(node, image)
-    material.node_tree.links.new(node.outputs["Color"], surface.inputs["Base Color"])
-    material[_COLOR] = state
+    key = str(material.get(KEY, material.name))
+    image = tag(new_image(file), key, _EDITED_ROLE)
+    image.name, image[_STATE] = image_name(key, _EDITED_ROLE), state
+    _show_edited(material, image)
+
+
+def release_edited(material: bpy.types.Material) -> None:
+    """Show the edited colours through the group; `apply_edits` finds their image again.
+
+    Blender's undo keeps a material that two of its steps have in common as it is, and frees images
+    that have been made since the later step: before an undo, materials may not use such images.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC; nothing changes where no texture has edited colours.
+    """
+    surface = surface_node(material)
+    node = None if surface is None else material.node_tree.nodes.get(EDITED)
+    if surface is None or node is None or node.type != "TEX_IMAGE":
+        return
+    if any(link.to_socket != surface.inputs["Base Color"] for link in node.outputs["Color"].links):
+        return  # the user's own nodes: the step that linked them has the image
+    _show_group(material)
+    node.image = None
+    material.pop(_COLOR, None)
 
 
 def color_state(material: bpy.types.Material) -> str:
@@ -238,6 +261,8 @@ def forget_edits(material: bpy.types.Material) -> None:
     for name in (_NUMBERS, _COLOR):
         if name in material:
             del material[name]
+    for image in _edited_images(material):  # of a base colour that is replaced
+        image.pop(_STATE, None)
     node = material.node_tree.nodes.get(EDITED) if material.node_tree else None
     if node is not None and node.type == "TEX_IMAGE":
         _replace_image(node, None)
@@ -354,6 +379,40 @@ def _can_bake(material: bpy.types.Material, group: bpy.types.Node) -> bool:
     return node.image.packed_file is not None or bool(node.image.size[0])
 
 
+def _edited_images(material: bpy.types.Material) -> list[bpy.types.Image]:
+    key = material.get(KEY, material.name)
+    return [
+        image
+        for image in bpy.data.images
+        if image.get(KEY) == key and image.get(ROLE) == _EDITED_ROLE and image.library is None
+    ]
+
+
+def _find_edited(material: bpy.types.Material, state: str) -> bpy.types.Image | None:
+    """An image of these edits that is still there, as after an undo."""
+    found = (image for image in _edited_images(material) if image.get(_STATE) == state)
+    return next(found, None)
+
+
+def _show_group(material: bpy.types.Material) -> None:
+    surface, group = surface_node(material), dichromatic_node(material)
+    if surface is None or group is None:
+        return
+    target = surface.inputs["Base Color"]
+    if not target.is_linked or target.links[0].from_node != group:
+        material.node_tree.links.new(group.outputs["Base Color"], target)
+
+
+def _show_edited(material: bpy.types.Material, image: bpy.types.Image) -> None:
+    surface, group = surface_node(material), dichromatic_node(material)
+    if surface is None or group is None:
+        return
+    node = _edited_texture(material, group.inputs["Base Color"].links[0].from_node)
+    _replace_image(node, image)
+    material.node_tree.links.new(node.outputs["Color"], surface.inputs["Base Color"])
+    material[_COLOR] = image[_STATE]
+
+
 def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.types.Node:
     tree = material.node_tree
     node = tree.nodes.get(EDITED)
@@ -369,5 +428,5 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
 def _replace_image(node: Any, image: bpy.types.Image | None) -> None:
     """A new datablock each time: undo restores the pixels of one only with its datablock."""
     old, node.image = node.image, image
-    if old is not None and old.users == 0 and old.get(ROLE) == "edited_base_color":
+    if old is not None and old.users == 0 and old.get(ROLE) == _EDITED_ROLE:
         bpy.data.images.remove(old)

@@ -51,6 +51,24 @@ def test_only_a_photo_without_transparency_needs_a_mask_first(
     assert settings.image.name == name and settings.mask_source == "ALPHA"
 
 
+def test_a_photo_is_an_undo_step(
+    addon: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Otherwise undo could free the photo that the scene still uses."""
+    started = SimpleNamespace(isc=SimpleNamespace(auto_mask=lambda *_: None))
+    fake = SimpleNamespace(**vars(bpy) | {"ops": started})
+    monkeypatch.setattr(photo_import, "bpy", fake)
+    addon.ops.ed.undo_push(message="empty")
+    path = photo_file(tmp_path, "a.png")
+    addon.ops.isc.photo_as_object("EXEC_DEFAULT", True, filepath=str(path))
+    addon.context.scene.isc.max_size = 300
+    addon.ops.ed.undo_push(message="size")
+    addon.ops.ed.undo()
+    assert addon.context.scene.isc.image == addon.data.images["a.png"]
+    addon.ops.ed.undo()
+    assert addon.context.scene.isc.image is None and not addon.data.images
+
+
 def test_a_file_that_is_no_photo_is_refused_and_leaves_nothing(addon: Any, tmp_path: Path) -> None:
     (tmp_path / "list.png").write_text("milk, eggs")
     (tmp_path / "empty.jpg").write_bytes(b"")
