@@ -33,7 +33,7 @@ from isc_core.io.atomic import remove_unfinished, remove_unfinished_in, unfinish
 _CANCEL_SECONDS = 2.0  # from the request to cancel to the kill
 # How long Blender's own exit waits for the files of a killed worker to be removed.
 _CLEANUP_SECONDS = 5.0
-_NICENESS = 5  # the window takes precedence where both need the processor
+_NICENESS = 10  # the window takes precedence where both need the processor
 _LOG_BYTES = 8000
 
 

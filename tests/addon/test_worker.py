@@ -378,7 +378,7 @@ def test_an_unresponsive_worker_is_killed_with_its_children(
     at_stage(worker, "asleep")
     assert (tmp_path / "new" / ".out.0a1b2c3d.partial" / "maps.exr").is_file()
     assert os.getpriority(os.PRIO_PROCESS, worker.pid) == min(
-        os.getpriority(os.PRIO_PROCESS, 0) + 5, 19
+        os.getpriority(os.PRIO_PROCESS, 0) + 10, 19
     )
     getattr(worker, how)()
     assert worker.poll().state == "running", "nobody has waited"
