@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..imaging.area_enlarge import enlarge_averages
 from ..imaging.framing import continued
 from ..imaging.resampling import height_scale, resample_height, resample_inside
 from ..progress import Monitor
@@ -278,6 +279,8 @@ class SolveInputs:
             return resample_inside(values, self.valid, factor)[0]
 
         image, share = resample_inside(self.image, self.valid, factor)
+        if factor > 1:  # as sharp as a larger photo would be, for the priors are of differences
+            image = enlarge_averages(self.image, self.valid, share.shape)
         silhouette, photo = (
             resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
             for m in (self.silhouette, self.photo)

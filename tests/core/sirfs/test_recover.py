@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from isc_core.errors import Cancelled
+from isc_core.imaging.area_resize import averaged
+from isc_core.imaging.resampling import resample_inside
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
 from isc_core.scene.known_inputs import DepthObservation, SceneConstraints
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.recover import Recovered, RecoverOptions, recover
+from isc_core.sirfs.recover import Recovered, RecoverOptions, SolveInputs, recover
 from isc_core.sirfs.solver import SolverOptions
 
 from .small_problems import Scene, blob, made_priors, weights
@@ -143,6 +145,23 @@ def test_a_larger_photo_gives_the_same_shape_larger(factor: int) -> None:
     coarse = big.height.reshape(64, factor, 72, factor).mean(axis=(1, 3)) / factor
     away = (coarse - small.height)[inner(scene.mask)]
     assert np.abs(away - away.mean()).max() < 0.02 * np.ptp(small.height[scene.mask])
+
+
+def test_a_smaller_photo_is_solved_as_sharp_as_a_larger_one() -> None:
+    """From three quarters of the size; interpolated linearly, it is half as far again from it."""
+    scene = blob((144, 160))
+    paint = np.kron(np.random.default_rng(0).uniform(0.5, 1, (36, 40)), np.ones((4, 4)))
+    large, small = (
+        averaged(scene.image * paint[..., None], scene.mask, f)[:2] for f in (0.5, 0.375)
+    )
+    inputs = SolveInputs(*small, small[1], np.ones_like(small[1]))
+    linear, _ = resample_inside(*small, 4 / 3)
+    where = inner(large[1], 2)
+    errors = [
+        np.std(np.log(image[where]) - np.log(large[0][where]))
+        for image in (inputs.scaled(4 / 3).image, linear)
+    ]
+    assert errors[0] < 0.8 * errors[1]
 
 
 def test_solving_at_another_size_keeps_the_shape() -> None:
