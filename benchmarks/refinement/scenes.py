@@ -8,6 +8,7 @@ none. FOLDER keeps what was rendered and decomposed.
 Scenes below `CHOSEN_ON` were used to choose constants; those from there on are for reports.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -84,8 +85,8 @@ def scene_of(folder: Path, number: int, size: int) -> RefinementScene:
     truth = place / "truth.npz"
     if not truth.exists():
         place.mkdir(parents=True, exist_ok=True)
-        maps = _rendered(number, size)
-        save(decompose(_photo(maps, size), name=place.name), place / "start")
+        maps = rendered(number, size)
+        save(decompose(photo_of(maps), name=place.name), place / "start")
         np.savez(truth, **maps)
     with np.load(truth, allow_pickle=False) as stored:
         maps = {name: stored[name] for name in stored.files}
@@ -108,13 +109,41 @@ def centred(mesh: Mesh) -> Mesh:
     return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
 
 
-def _photo(maps: dict[str, np.ndarray], size: int) -> Photo:
+def photo_of(maps: dict[str, np.ndarray]) -> Photo:
+    """Return the photo of a rendered scene.
+
+    Parameters
+    ----------
+    maps : dict of str to ndarray
+        With `image` and `mask`.
+
+    Returns
+    -------
+    Photo
+        Linear, of its own exposure.
+    """
     mask = maps["mask"]
-    source = PhotoSource("", (size, size), 32, "linear", "file")
+    source = PhotoSource("", (mask.shape[1], mask.shape[0]), 32, "linear", "file")
     return Photo(np.maximum(maps["image"], 0), mask, 1e-4, np.zeros_like(mask), source)
 
 
-def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
+def rendered(number: int, size: int, names: Sequence[str] = _MAPS) -> dict[str, np.ndarray]:
+    """Render a scene.
+
+    Parameters
+    ----------
+    number : int
+        Number of the scene.
+    size : int
+        Side of the image in pixels.
+    names : sequence of str, optional
+        True maps that are wanted.
+
+    Returns
+    -------
+    dict of str to ndarray
+        The maps by name, and `light`, the kind of light.
+    """
     rng = np.random.default_rng([SEED, number])
     kind = SMOOTH if number % 3 == 2 else LAMPS[(number // 3 + number % 3) % len(LAMPS)]
     mesh = centred(make_shape(_SHAPES[number % len(_SHAPES)], rng))
@@ -125,7 +154,7 @@ def _rendered(number: int, size: int) -> dict[str, np.ndarray]:
     scene = Scene(mesh, material, _lights(kind, rng), camera_around(mesh, size, 0.88))
     options = RenderOptions(_SAMPLES, number)
     _, truth = exposed(scene, render_truth(scene, options), _LEVEL)
-    return {name: getattr(truth, name) for name in _MAPS} | {"light": np.array(kind)}
+    return {name: getattr(truth, name) for name in names} | {"light": np.array(kind)}
 
 
 def _lights(kind: str, rng: np.random.Generator) -> tuple[Light, ...]:

@@ -24,6 +24,7 @@ from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.resampling import resample_inside
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.photo import Photo, read_photo
+from isc_core.scene.decomposition import Decomposition
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import isc_weights
@@ -118,23 +119,33 @@ def scale_figures(photo: Photo, *, resized: bool = False) -> list[tuple[int, flo
     figures = []
     for size in SIZES[:-1]:
         small = results[size]
-        factor = small.mask.shape[0] / largest.mask.shape[0]
-        normal, share = resample_inside(largest.normal.astype(float), largest.mask, factor)
-        rows, columns = (min(a, b) for a, b in zip(normal.shape[:2], small.mask.shape, strict=True))
-        normal, share = normal[:rows, :columns], share[:rows, :columns]
-        normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
-        both = small.mask[:rows, :columns] & (share > 0.99)
         spread = [
             float(np.std(d.height[d.mask])) / max(mask_box(d.mask)[2:]) for d in (small, largest)
         ]
-        figures.append(
-            (
-                size,
-                angle(normal, small.normal[:rows, :columns].astype(float), both),
-                spread[0] / spread[1],
-            )
-        )
+        figures.append((size, change_of_normals(small, largest), spread[0] / spread[1]))
     return figures
+
+
+def change_of_normals(small: Decomposition, large: Decomposition) -> float:
+    """Compare the normals of a small result with those of a large one, on the smaller grid.
+
+    Parameters
+    ----------
+    small, large : Decomposition
+        Of the same photo.
+
+    Returns
+    -------
+    float
+        Median angle, degrees.
+    """
+    factor = small.mask.shape[0] / large.mask.shape[0]
+    normal, share = resample_inside(large.normal.astype(float), large.mask, factor)
+    rows, columns = (min(a, b) for a, b in zip(normal.shape[:2], small.mask.shape, strict=True))
+    normal, share = normal[:rows, :columns], share[:rows, :columns]
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+    both = small.mask[:rows, :columns] & (share > 0.99)
+    return angle(normal, small.normal[:rows, :columns].astype(float), both)
 
 
 def padding_figures(photo: Photo) -> list[tuple[int, float]]:

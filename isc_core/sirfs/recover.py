@@ -4,6 +4,8 @@ brings the result back to the image's scale.
 Problem: the priors are statistics per pixel, so the answer would depend on the photo's scale and on
 the empty space around the object. The object is therefore resampled to one size
 (`RecoverOptions.solve_size`), and a window around its bounding box with a fixed margin is solved.
+Where that enlarges it, the averages over its pixels stay (`imaging.area_enlarge`): interpolation
+that blurs would change the differences between neighbours.
 Where priors were fitted at the size given, a larger object is then solved at that size, too, from
 what was found (`RecoverOptions.to_own_size`).
 
@@ -279,7 +281,7 @@ class SolveInputs:
             return resample_inside(values, self.valid, factor)[0]
 
         image, share = resample_inside(self.image, self.valid, factor)
-        if factor > 1:  # as sharp as a larger photo would be, for the priors are of differences
+        if factor > 1:
             image = enlarge_averages(self.image, self.valid, share.shape)
         silhouette, photo = (
             resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
