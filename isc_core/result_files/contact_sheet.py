@@ -33,6 +33,7 @@ from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 _GAP, _EDGE, _LABEL, _HEAD = 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
 _KEY = 10  # pixels: side of a key's square
+_RADIUS = 12  # pixels: of the cards' round corners
 _SMALL = 480  # pixels: long side of a sheet's thumbnail
 _TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
     (1.0, 0.42, 0.04),
@@ -495,7 +496,14 @@ def _picture(panel: Panel) -> Image.Image:
 
 
 def _rounded() -> Image.Image:
-    """The card's shape, with smooth round corners."""
-    shape = Image.new("L", (4 * SIDE, 4 * SIDE), 0)
-    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * SIDE - 1, 4 * SIDE - 1), 48, fill=255)
-    return shape.resize((SIDE, SIDE), Image.Resampling.LANCZOS)
+    """The card's shape, with smooth round corners: those of a small card."""
+    half = 2 * _RADIUS
+    drawn = Image.new("L", (8 * half, 8 * half), 0)
+    box = (0, 0, 8 * half - 1, 8 * half - 1)
+    ImageDraw.Draw(drawn).rounded_rectangle(box, 4 * _RADIUS, fill=255)
+    small = drawn.resize((2 * half, 2 * half), Image.Resampling.LANCZOS)
+    shape = Image.new("L", (SIDE, SIDE), 255)
+    for x, left in ((0, 0), (half, SIDE - half)):
+        for y, top in ((0, 0), (half, SIDE - half)):
+            shape.paste(small.crop((x, y, x + half, y + half)), (left, top))
+    return shape

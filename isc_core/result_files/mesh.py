@@ -69,6 +69,7 @@ from .solids.back import Back
 from .solids.rim import Rim
 from .solids.surface import heights_seen, make_solid, placed
 from .triangulation.adaptive_triangles import Triangulation, adaptive_triangles
+from .triangulation.renumbering import renumbered
 from .triangulation.vertex_normals import (
     detail_normals,
     directions_at,
@@ -644,7 +645,7 @@ def _full_grid(cells: np.ndarray) -> Triangulation:
     top_right, bottom_left, bottom_right = top_left + 1, top_left + width, top_left + width + 1
     lower = np.stack([top_left, bottom_left, bottom_right], -1)
     upper = np.stack([top_left, bottom_right, top_right], -1)
-    used, faces = np.unique(np.stack([lower, upper], 1).reshape(-1), return_inverse=True)
+    used, faces = renumbered(np.stack([lower, upper], 1))
     return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
 
 

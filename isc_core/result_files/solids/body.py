@@ -34,6 +34,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..triangulation.adaptive_triangles import Triangulation
+from ..triangulation.renumbering import renumbered
 from .back import Back
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
@@ -122,7 +123,8 @@ def make_body(
     around = _grown(core) & ~core
     round_height = np.sqrt(np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0))
     last = np.where(inside, known - ROUND * round_height, 0.0)
-    last = np.where(inside, smoothed_within(last, surrounded(inside), _SMOOTH), 0.0)
+    (last,) = smoothed_within((last,), surrounded(inside), _SMOOTH)
+    last[~inside] = 0.0
     rows, columns = sheet.pixels.T
     heights = known[rows, columns]
     heights[sheet.inner :] = last[rows, columns][sheet.inner :]
@@ -231,12 +233,11 @@ def _joined(
 
 def _used(body: Body) -> Body:
     """The body without vertices that no triangle has."""
-    kept, faces = np.unique(body.faces, return_inverse=True)
+    kept, faces = renumbered(body.faces)
     if len(kept) == len(body.places):
         return body
     vertices = (body.places, body.heights, body.pixels, body.front, body.texture)
     places, heights, pixels, front, texture = (values[kept] for values in vertices)
-    faces = faces.reshape(-1, 3).astype(np.int64)
     return Body(places, heights, pixels, faces, front, body.visible, texture)
 
 

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..triangulation.adaptive_triangles import Triangulation, adaptive_triangles
+from ..triangulation.renumbering import renumbered
 from .smoothing import binomial
 
 _CLOSEST = 0.1  # pixels
@@ -112,10 +113,10 @@ def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget:
     assert grid is not None
     flat = grid.vertices @ (width, 1)
     faces = np.concatenate([flat[grid.faces], _cut_cells(corners, width, smooth.size)])
-    used, faces = np.unique(faces, return_inverse=True)
+    used, faces = renumbered(faces)
     inner = int(np.searchsorted(used, smooth.size))
     pixels, places = _positions(used, inner, smooth)
-    return Outlined(places, pixels, inner, faces.reshape(-1, 3).astype(np.int64))
+    return Outlined(places, pixels, inner, faces)
 
 
 def _cut_cells(corners: np.ndarray, width: int, size: int) -> np.ndarray:

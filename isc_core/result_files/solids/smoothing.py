@@ -7,6 +7,8 @@ Citation: H. Knutsson and C.-F. Westin, "Normalized and differential convolution
 doi:10.1109/CVPR.1993.341081.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
@@ -25,10 +27,21 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
     (H, W) float64 ndarray
     """
     smooth = np.pad(plane.astype(np.float64), 1)
+    other = np.empty_like(smooth)
     for _ in range(passes):
-        for axis in (0, 1):
-            smooth = (np.roll(smooth, 1, axis) + 2 * smooth + np.roll(smooth, -1, axis)) / 4
+        _filter_down(smooth, other)
+        _filter_down(other.T, smooth.T)
     return smooth[1:-1, 1:-1]
+
+
+def _filter_down(plane: np.ndarray, out: np.ndarray) -> None:
+    """Filter a map down its columns, whose ends meet."""
+    np.multiply(plane, 2, out=out)
+    out[1:] += plane[:-1]
+    out[0] += plane[-1]
+    out[:-1] += plane[1:]
+    out[-1] += plane[0]
+    out /= 4
 
 
 def surrounded(inside: np.ndarray) -> np.ndarray:
@@ -47,21 +60,27 @@ def surrounded(inside: np.ndarray) -> np.ndarray:
     return np.asarray(inside & vertical & horizontal)
 
 
-def smoothed_within(values: np.ndarray, counts: np.ndarray, passes: int) -> np.ndarray:
-    """Smooth a map of the pixels that count, and continue it to those near them.
+def smoothed_within(
+    maps: Sequence[np.ndarray], counts: np.ndarray, passes: int
+) -> list[np.ndarray]:
+    """Smooth maps of the pixels that count, and continue them to those near these.
 
     Parameters
     ----------
-    values : (H, W) ndarray
+    maps : sequence of (H, W) ndarray
     counts : (H, W) bool ndarray
     passes : int
         Also the reach in pixels.
 
     Returns
     -------
-    (H, W) float64 ndarray
+    list of (H, W) float64 ndarray
         Beyond that reach as given.
     """
     weight = binomial(counts, passes)
-    total = binomial(np.where(counts, values, 0), passes)
-    return np.where(weight > 0, total / np.where(weight > 0, weight, 1), values)
+    reached = weight > 0
+    weight[~reached] = 1
+    return [
+        np.where(reached, binomial(np.where(counts, values, 0), passes) / weight, values)
+        for values in maps
+    ]

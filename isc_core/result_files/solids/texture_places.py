@@ -85,8 +85,8 @@ def _axis(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         + right**2 * (sides[2] + sides[3] - 2 * u)
     )
     known = surrounded(u > 0)
-    down, right, along, square = (
-        smoothed_within(one, known, _SMOOTH) for one in (down, right, along, down**2 + right**2)
+    down, right, along, square = smoothed_within(
+        (down, right, along, down**2 + right**2), known, _SMOOTH
     )
     bend = np.clip(-along / np.maximum(square, 1e-9), _BALL, _BAR)
     return np.stack([down, right], -1) / bend[..., None], bend

@@ -33,6 +33,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .renumbering import renumbered
+
 _ROOT = 64  # cells along a side of the largest squares; a power of two
 _HALF = _ROOT // 2
 _LEAST_COSINE = 0.05
@@ -283,5 +285,5 @@ def _roots(shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _compact(triangles: np.ndarray, width: int) -> Triangulation:
-    used, faces = np.unique(triangles.reshape(-1), return_inverse=True)
-    return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
+    used, faces = renumbered(triangles)
+    return Triangulation(np.stack(np.divmod(used, width), -1), faces)
