@@ -18,7 +18,6 @@ command line; `--no-config` ignores the file.
 
 import argparse
 import difflib
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -85,6 +84,8 @@ def _find(arguments: Sequence[str]) -> tuple[Path | None, bool]:
 
 
 def _read(path: Path) -> dict[str, object]:
+    import tomllib
+
     remedy = "give a TOML file with --config"
     if not path.exists():
         raise InputError(f"{path}: no such file: {remedy}")

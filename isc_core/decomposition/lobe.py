@@ -7,11 +7,11 @@ Limits: those of `lobe_fitting`.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..lobe_fitting import PixelData, RecoveredScene, fit_lobe
-from ..lobe_fitting.observed import channel_means
+from ..imaging.channels import channel_means
 from ..photo.photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
@@ -23,6 +23,9 @@ from ..sirfs.silhouette import silhouette_normals
 from .layers import shaded
 from .shape import Shape
 from .task import DecompositionTask
+
+if TYPE_CHECKING:
+    from ..lobe_fitting import RecoveredScene
 
 _NOTHING = 0.03  # of the photo's white: specular light that is nowhere brighter is none
 _MUCH_CLIPPED = 0.05  # of the object
@@ -111,6 +114,8 @@ def fit_specular(
         if not _shines(split.specular, photo):
             none = LobeFitOutcome.NO_SPECULAR
             return FittedLobe(LobeFit.without_lobe(model, none, photo.image.shape), clipped)
+        from ..lobe_fitting import PixelData, fit_lobe
+
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         fit = fit_lobe(
             split.specular,
@@ -129,7 +134,9 @@ def _shines(specular: np.ndarray, photo: Photo) -> bool:
     return float(channel_means(specular, photo.mask).max()) > _NOTHING * white
 
 
-def _recovered(shading: np.ndarray, task: DecompositionTask) -> RecoveredScene | None:
+def _recovered(shading: np.ndarray, task: DecompositionTask) -> "RecoveredScene | None":
+    from ..lobe_fitting import RecoveredScene
+
     if task.known.height is not None:
         return None
     profile = (task.prior_set or shipped_prior_set(task.settings.illumination)).silhouette

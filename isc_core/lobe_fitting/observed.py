@@ -6,6 +6,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.bounding_box import mask_slices
+from ..imaging.channels import channel_means
 from ..imaging.row_blocks import row_blocks
 from ..scene.light_estimate import LightEstimate
 from ..shading.brdf.directions import unit
@@ -168,24 +169,6 @@ class Observed:
         (..., 3) ndarray
         """
         return np.asarray(self.normal[where], float)
-
-
-def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
-    """Average the channels of some pixels.
-
-    Parameters
-    ----------
-    values : (H, W, 3) ndarray
-    where : (H, W) ndarray of bool
-
-    Returns
-    -------
-    (n,) ndarray of float
-    """
-    blocks = (block.rows for block in row_blocks(where.shape))
-    return np.concatenate(
-        [np.asarray(values[rows][where[rows]], float).mean(axis=1) for rows in blocks]
-    )
 
 
 def observe(

@@ -46,6 +46,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_slices
+from ..imaging.channels import channel_means
 from ..imaging.row_blocks import row_blocks
 from ..imaging.upsampling import enlarged
 from ..scene.light_estimate import LightEstimate
@@ -59,7 +60,7 @@ from ..scene.lobe_fit import (
 )
 from ..shading.brdf.ggx import F0
 from .lamps import ALPHAS, Lamps, contributions
-from .observed import Observed, channel_means
+from .observed import Observed
 from .pixels import Pixels
 from .starts import light_of_half_vector
 

@@ -7,7 +7,6 @@ from dataclasses import fields
 from functools import partial
 from pathlib import Path
 
-from ...batch.names import safe_name
 from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError
@@ -16,8 +15,6 @@ from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
-from ...result_files.exports.full_texture import full_texture
-from ...result_files.known_inputs import read_height, read_light
 from ...result_files.mesh_options import MeshOptions
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
@@ -248,6 +245,8 @@ def _decompose_photo(
         refined = [line]
     writing, texture = monitor.part(0.8, 1.0), None
     if options.texture_size is not None and options.texture_size != MAPS_SIZE:
+        from ...result_files.exports.full_texture import full_texture
+
         writing.report("refining the texture", 0.0)
         texture = full_texture(photo, result, options.texture_size)
     save(
@@ -359,6 +358,8 @@ def _decompose_several(
 
 def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
     """Each photo and the folder of its result."""
+    from ...batch.names import safe_name
+
     seen: dict[str, Path] = {}
     for path in photos:
         if path == STDIN:
@@ -374,6 +375,10 @@ def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
 
 
 def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:
+    if options.shape is options.light is options.depth is None:
+        return KnownInputs()
+    from ...result_files.known_inputs import read_height, read_light
+
     size, scale, limits = photo.mask.shape, options.height_scale, limits_of(options)
     return KnownInputs(
         height=None if options.shape is None else read_height(options.shape, size, scale, limits),

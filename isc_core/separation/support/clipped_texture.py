@@ -31,7 +31,6 @@ from scipy import ndimage
 
 from ...imaging.bounding_box import mask_slices
 from ...imaging.tiles import Place
-from ...inpainting.patch_fill import fill_patches
 from ...inpainting.pull_push import fill
 
 _RING = 4  # pixels held out around a hole, half a patch
@@ -122,6 +121,8 @@ def _continued(
     rest = known & ~ring
     if not ring.any() or not rest.any():
         return smooth
+    from ...inpainting.patch_fill import fill_patches
+
     with ThreadPoolExecutor(1) as aside:
         tried = aside.submit(fill_patches, albedo, rest, holes | ring)
         copied = np.exp(fill_patches(albedo, known, holes) + shading)
