@@ -20,7 +20,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from ..errors import InputError
-from ..imaging.srgb import linear_to_srgb, srgb_to_linear
+from ..imaging.srgb import srgb_codes, srgb_to_linear
 from ..io.atomic import new_file
 from ..io.printable_names import readable
 from ..scene.decomposition import Decomposition, Separation
@@ -490,7 +490,7 @@ def _picture(panel: Panel) -> Image.Image:
         color = np.clip(panel.color[..., channel].ravel()[covered], 0, 1)
         linear = alpha * color + (1 - alpha) * srgb_to_linear(card / 255.0)
         plane = np.full(panel.coverage.shape, card, np.uint8)
-        plane.ravel()[covered] = np.rint(255 * linear_to_srgb(linear))
+        plane.ravel()[covered] = srgb_codes(linear)
         planes.append(plane)
     return Image.fromarray(np.stack(planes, -1))
 

@@ -27,6 +27,7 @@ from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.memory import LARGE, give_back_memory
+from ..io.png import encode_png
 from ..io.printable_names import readable
 from ..photo.camera import Camera
 from ..photo.grabcut import encoded_mask
@@ -77,7 +78,7 @@ _RESULT_FILES = (
     ENVIRONMENT,
     *LAYER_PNGS,
 )  # including files written on demand
-_PREVIEW_COMPRESSION = 2  # of 9: a third of the time of the usual 6 for 16 % more bytes
+_PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the usual 6 for 18 % more bytes
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
@@ -183,7 +184,8 @@ def _write_maps(d: Decomposition, channels: Mapping[str, np.ndarray], folder: Pa
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:
-    contact_sheet(decomposition).save(path, compress_level=_PREVIEW_COMPRESSION)
+    sheet = np.asarray(contact_sheet(decomposition))
+    path.write_bytes(encode_png(sheet, _PREVIEW_COMPRESSION))
 
 
 def _write_description(decomposition: Decomposition, built: MeshResult, path: Path) -> None:
@@ -274,7 +276,7 @@ def save_separation(
         if cover is not None:
             (partial / MASK).write_bytes(encoded_mask(cover))
         sheet = separation_sheet(separation, image, inside, title)
-        sheet.save(partial / "preview.png", compress_level=_PREVIEW_COMPRESSION)
+        (partial / "preview.png").write_bytes(encode_png(np.asarray(sheet), _PREVIEW_COMPRESSION))
 
 
 def require_writable_result(

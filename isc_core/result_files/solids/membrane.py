@@ -67,13 +67,13 @@ def _relaxed(found: np.ndarray, inside: np.ndarray, load: float) -> np.ndarray:
     width = found.shape[1]
     pixels = np.flatnonzero(inside)
     row, column = np.divmod(pixels, width)
-    colors = [pixels[(row + column) % 2 == parity] for parity in (0, 1)]
+    first, second = (pixels[(row + column) % 2 == parity] for parity in (0, 1))
     flat, length = found.reshape(-1), max(found.shape)
     sweeps, over = _SWEEPS, _OVER
     if length > _LONG:
         sweeps, over = max(_SWEEPS * _LONG // length, _FEWEST), _OVER_LONG
     sweep = _swept if compiled_available() else _swept_in_numpy
-    sweep(flat, *colors, width, load, over, sweeps)
+    sweep(flat, first, second, width, load, over, sweeps)
     return found
 
 
