@@ -1,3 +1,4 @@
+# mypy: disable-error-code="no-untyped-def"
 """Edge-aware averages, in a time independent of their extent.
 
 Problem: a statistic over the pixels that can be reached from a pixel without crossing an edge.
@@ -17,6 +18,8 @@ processing", ACM Trans. Graph. 30(4), 69 (2011), doi:10.1145/2010324.1964964.
 from dataclasses import dataclass
 
 import numpy as np
+
+from ...numerics.jit import compiled_available, jit
 
 _PASSES = 2
 
@@ -52,7 +55,8 @@ class Paths:
         for step in range(_PASSES):
             sigma = self.reach * np.sqrt(3) * 2 ** (_PASSES - 1 - step) / np.sqrt(4**_PASSES - 1)
             log_feedback = -np.sqrt(2) / sigma
-            _filter_recursively(smooth, np.exp(log_feedback * self.across.T))
+            across = np.ascontiguousarray(self.across.T)
+            _filter_recursively(smooth, np.exp(log_feedback * across))
             smooth = np.ascontiguousarray(smooth.transpose(2, 1, 0))
             _filter_recursively(smooth, np.exp(log_feedback * self.down))
             smooth = np.ascontiguousarray(smooth.transpose(2, 1, 0))
@@ -102,8 +106,27 @@ def _filter_recursively(layers: np.ndarray, feedback: np.ndarray) -> None:
 
     `feedback` (W, H): of the step into each pixel.
     """
+    if compiled_available():
+        _filter_rows(layers, feedback.astype(layers.dtype, copy=False))
+        return
     last = len(layers)
     for j in range(1, last):
         layers[j] += feedback[j] * (layers[j - 1] - layers[j])
     for j in range(last - 2, -1, -1):
         layers[j] += feedback[j + 1] * (layers[j + 1] - layers[j])
+
+
+@jit(types="r[3] r[2]")
+def _filter_rows(layers, feedback):
+    """As `_filter_recursively`."""
+    last, count, length = layers.shape
+    for j in range(1, last):
+        for k in range(count):
+            here, before, share = layers[j, k], layers[j - 1, k], feedback[j]
+            for i in range(length):
+                here[i] += share[i] * (before[i] - here[i])
+    for j in range(last - 2, -1, -1):
+        for k in range(count):
+            here, before, share = layers[j, k], layers[j + 1, k], feedback[j + 1]
+            for i in range(length):
+                here[i] += share[i] * (before[i] - here[i])
