@@ -27,6 +27,8 @@ compensates for it.
 
 import numpy as np
 
+from ..imaging.channels import length, smallest, total
+
 # An orthonormal basis of the colours with sum 0, (3, 2).
 PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
 # Quantiles: of the intensity, below which colours do not count; of those beyond the hull.
@@ -75,16 +77,15 @@ def distance_of_white(colour: np.ndarray) -> float:
     float
         In the chromaticity plane; negative inside the hull.
     """
-    intensity = colour.sum(axis=1, dtype=float)
+    intensity = total(colour.astype(float, copy=False))
     bright = intensity >= max(float(np.quantile(intensity, _DARK)), 1e-12)
     if not bright.any():
         return 0.0
     places = 3 * colour[bright] / intensity[bright, None] @ PLANE
     places = places[_thinned(len(places))]
     angle = np.arange(_DIRECTIONS) * (2 * np.pi / _DIRECTIONS)
-    return float(
-        np.quantile(places @ np.stack([np.cos(angle), np.sin(angle)]), _STRAY, axis=0).max()
-    )
+    along = np.stack([np.cos(angle), np.sin(angle)], axis=1) @ places.T
+    return float(np.quantile(along, _STRAY, axis=1, overwrite_input=True).max())
 
 
 def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
@@ -103,13 +104,13 @@ def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
     here, turn, rising = turns(colour, change)
     flanks = np.flatnonzero(rising)
     normal = np.cross(colour[flanks], change[flanks])
-    if len(flanks) < _FEW or np.linalg.norm(normal, axis=1).sum() < _FAINT * len(colour):
+    if len(flanks) < _FEW or length(normal).sum() < _FAINT * len(colour):
         return 0.0
     kept = _thinned(len(flanks))
     flanks, normal = flanks[kept], normal[kept]
-    weight = np.linalg.norm(normal, axis=1)
+    weight = length(normal)
     end = colour[flanks] + change[flanks] / 2
-    end /= end.sum(axis=1, keepdims=True)
+    end /= total(end)[:, None]
     return max(
         float(
             weight
@@ -135,13 +136,13 @@ def turns(colour: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarra
     rising : (N,) ndarray of bool
         Which may be flanks.
     """
-    rise = change.sum(axis=1)
-    here = colour / np.maximum(colour.sum(axis=1), 1e-12)[:, None]
+    rise = total(change)
+    here = colour / np.maximum(total(colour), 1e-12)[:, None]
     turn = change / np.maximum(rise, 1e-12)[:, None] - here
     return (
         here,
         turn,
-        (rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN),
+        (rise > _RISE) & (smallest(change) > 0) & (length(turn) > _TURN),
     )
 
 
@@ -161,10 +162,7 @@ def leads_to(light: np.ndarray, here: np.ndarray, turn: np.ndarray) -> np.ndarra
         Which do.
     """
     way = light / light.sum() - here
-    cosine = (turn * way).sum(axis=1) / np.maximum(
-        np.linalg.norm(turn, axis=1) * np.linalg.norm(way, axis=1), 1e-12
-    )
-    return cosine > _TOWARD
+    return total(turn * way) / np.maximum(length(turn) * length(way), 1e-12) > _TOWARD
 
 
 def _thinned(number: int) -> slice:
@@ -185,5 +183,5 @@ def _agreement(
     there.
     """
     off = normal @ (white / np.linalg.norm(white))
-    ahead = ((white / white.sum() - end) * turn).sum(axis=1) > 0
+    ahead = total((white / white.sum() - end) * turn) > 0
     return np.where(ahead & leads_to(white, here, turn), 1 / (1 + np.square(off / _TOLERANCE)), 0.0)

@@ -39,6 +39,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.channels import length, total
 from ..imaging.smoothing import masked_gaussian
 from ..scene.diagnostics import IlluminantOutcome
 from .gamut import PLANE, leads_to, turns, without_white
@@ -253,7 +254,7 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
     diagonal = float(np.hypot(mask.shape[0], mask.shape[1]))
     sigma = max(_FINE * diagonal, 0.6)
     smooth = masked_gaussian(np.where(mask[..., None], image, 0).astype(float), mask, sigma)
-    bright = max(float(np.quantile(smooth[mask].sum(axis=1), 0.99)), 1e-30)
+    bright = max(float(np.quantile(total(smooth[mask]), 0.99)), 1e-30)
     step, side = max(1, round(sigma)), max(diagonal / _BLOCKS, 1.0)
     places = np.stack(
         np.meshgrid(*(np.arange(n) // side for n in mask.shape), indexing="ij"), -1
@@ -264,7 +265,7 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
         known = mask[before] & mask[middle] & mask[after]
         change = (smooth[after] - smooth[before])[known] / bright
         colours.append(smooth[middle][known] / bright)
-        rises.append(change * np.where(change.sum(axis=1) < 0, -1, 1)[:, None])
+        rises.append(change * np.where(total(change) < 0, -1, 1)[:, None])
         blocks.append(places[middle][known].astype(int))
     return _Changes(np.concatenate(colours), np.concatenate(rises), np.concatenate(blocks))
 
@@ -282,16 +283,17 @@ def _planes(
     be highlights of that light.
     """
     normals = np.cross(flanks.colour, flanks.change)
-    length = np.linalg.norm(normals, axis=1)
-    units = normals / length[:, None]
-    along, offset = units @ PLANE, units.sum(axis=1)
-    blocks = np.unique(flanks.block, return_inverse=True)[1]
+    size = length(normals)
+    units = normals / size[:, None]
+    along, offset = units @ PLANE, total(units)
+    in_use = np.bincount(flanks.block) > 0
+    blocks = (np.cumsum(in_use) - 1)[flanks.block]
     prior = np.eye(2) / options.prior_deviation**2
     precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
     for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):
         off = offset + along @ shift
-        weight = length / (1 + np.square(off / tolerance))
-        agreeing = weight.sum() / length.sum()
+        weight = size / (1 + np.square(off / tolerance))
+        agreeing = weight.sum() / size.sum()
         weight /= weight.sum()
         curvature = (along * weight[:, None]).T @ along
         pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)

