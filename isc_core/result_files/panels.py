@@ -7,6 +7,7 @@ import numpy as np
 from PIL import Image, ImageFilter
 
 from ..imaging.bounding_box import mask_slices
+from ..imaging.channels import largest, length
 
 SIDE = 320  # pixels
 MARGIN = 0.06  # room around the object, of the panel's side
@@ -158,7 +159,7 @@ def exposure(inside: np.ndarray) -> float:
     float
         1 for a black object, and for none.
     """
-    bright = float(np.percentile(inside.max(-1), 99.5)) if inside.size else 0.0
+    bright = float(np.percentile(largest(inside), 99.5)) if inside.size else 0.0
     return 0.95 / bright if bright > 0 else 1.0
 
 
@@ -175,5 +176,5 @@ def unit_normals(scaled: np.ndarray) -> np.ndarray:
     (N, N, 3) ndarray
         (0, 0, 1) where they have no length.
     """
-    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    return np.where(length > 1e-6, scaled / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))
+    size = length(scaled)[..., None]
+    return np.where(size > 1e-6, scaled / np.maximum(size, 1e-6), (0.0, 0.0, 1.0))

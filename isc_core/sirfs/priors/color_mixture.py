@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scale_mixture import refine_weights
+from .scale_mixture import decaying, refine_weights
 from .tabulated_potential import TabulatedPotential
 
 TABLE_NODES = 100_000
@@ -208,4 +208,4 @@ def _unit_determinant(matrix: np.ndarray) -> np.ndarray:
 
 def _densities(m: np.ndarray, variances: np.ndarray) -> np.ndarray:
     """N(x; 0, v_k S) as a function of m, of shape (..., K)."""
-    return np.exp(-m[..., None] / variances) * (2 * np.pi * variances) ** -1.5
+    return decaying(-m[..., None] / variances) * (2 * np.pi * variances) ** -1.5
