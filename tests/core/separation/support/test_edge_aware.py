@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from isc_core.numerics.jit import compiled_available
+from isc_core.separation.support import edge_aware
 from isc_core.separation.support.edge_aware import Paths
 
 
@@ -164,3 +166,14 @@ def test_small_photos(shape: tuple[int, int]) -> None:
         and found.min() >= value.min() - 1e-12
         and found.max() <= value.max() + 1e-12
     )
+
+
+@pytest.mark.skipif(not compiled_available(), reason="needs compiled kernels")
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_kernel_has_the_bytes_of_numpy(dtype: type, monkeypatch: pytest.MonkeyPatch) -> None:
+    paths = rough_paths()
+    layers: np.ndarray = texture(2, 40, 50).astype(dtype)
+    paths = Paths(paths.across.astype(dtype), paths.down.astype(dtype), paths.reach)
+    compiled = paths.average(layers)
+    monkeypatch.setattr(edge_aware, "compiled_available", lambda: False)
+    assert np.array_equal(compiled, paths.average(layers))
