@@ -85,7 +85,7 @@ def test_a_command_leaves_out_the_notes_of_scipy() -> None:
     """As SciPy writes them at each import otherwise, since 1.17."""
     code = "; ".join(
         (
-            "from isc_core.cli.scipy_start import skip_docstring_notes",
+            "from isc_core.cli.interface.scipy_start import skip_docstring_notes",
             "skip_docstring_notes()",
             "from scipy import ndimage, special",
             "assert 'Array API' not in ndimage.uniform_filter.__doc__",

@@ -9,7 +9,7 @@ from ... import __version__
 from ...errors import InputError
 from ...progress import Monitor
 from ..interface.parser import EXIT_CODES, Parser, add_general_options
-from ..scipy_start import skip_docstring_notes
+from ..interface.scipy_start import skip_docstring_notes
 from .registry import CommandEntry, all_commands, find_command
 
 _EXAMPLES = """examples:

@@ -12,7 +12,9 @@ BOTH = pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @BOTH
 def test_statistics_have_the_bytes_of_reductions(dtype: type) -> None:
     rng = np.random.default_rng(0)
-    image = (rng.normal(size=(50, 60, 3)) * 10.0 ** rng.uniform(-3, 3, (50, 60, 3))).astype(dtype)
+    image: np.ndarray = (
+        rng.normal(size=(50, 60, 3)) * 10.0 ** rng.uniform(-3, 3, (50, 60, 3))
+    ).astype(dtype)
     for found, wanted in (
         (total(image), image.sum(axis=-1)),
         (length(image), np.linalg.norm(image, axis=-1)),
