@@ -79,18 +79,3 @@ def test_a_decomposition_imports_only_what_it_uses(tmp_path: Path) -> None:
     assert not used & {"trimesh", "networkx", "scipy.optimize", "scipy.interpolate", "scipy.io"}
     assert not used & {"isc_core.batch", "isc_core.lobe_fitting.fit", "isc_core.refinement"}
     assert not used & {"isc_core.inpainting.patch_fill", "isc_core.result_files.exports"}
-
-
-def test_a_command_leaves_out_the_notes_of_scipy() -> None:
-    """As SciPy writes them at each import otherwise, since 1.17."""
-    code = "; ".join(
-        (
-            "from isc_core.cli.interface.scipy_start import skip_docstring_notes",
-            "skip_docstring_notes()",
-            "from scipy import ndimage, special",
-            "assert 'Array API' not in ndimage.uniform_filter.__doc__",
-            "assert ndimage.uniform_filter([0.0, 3.0, 0.0], 3).tolist() == [1.0, 1.0, 1.0]",
-            "assert special.erfc(0.0) == 1",
-        )
-    )
-    assert "scipy.ndimage" in imported(code)

@@ -9,7 +9,6 @@ from ... import __version__
 from ...errors import InputError
 from ...progress import Monitor
 from ..interface.parser import EXIT_CODES, Parser, add_general_options
-from ..interface.scipy_start import skip_docstring_notes
 from .registry import CommandEntry, all_commands, find_command
 
 _EXAMPLES = """examples:
@@ -52,7 +51,6 @@ def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentPar
 
 def _declare(parser: argparse.ArgumentParser, entry: CommandEntry) -> None:
     """Add the options of a command; if it cannot be imported, a `run` that says why."""
-    skip_docstring_notes()
     try:
         module = importlib.import_module(entry.module)
     except ImportError as error:
