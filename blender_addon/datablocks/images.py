@@ -29,6 +29,7 @@ _CHECKSUM = "isc_file_crc32"
 # Names of the textures in files, by role.
 TEXTURE_NAMES = {
     "base_color": "basecolor",
+    "plain_base_color": "basecolor_plain",
     "edited_base_color": "basecolor_edited",
     "normal_map": "normal",
     "specular_variation": "specular",

@@ -261,7 +261,7 @@ def _place(
         variation=images.get("specular_variation"),
         normal=images.get("normal_map"),
         alpha=images.get("alpha"),
-        plain=prepared.plain,
+        plain=images.get("plain_base_color"),
     )
     material = ensure_material(key, maps, prepared.specular)
     _remove_unused(key, maps)
@@ -436,10 +436,11 @@ def _ensure_camera_and_light(
 
 
 def _remove_unused(key: str, maps: MaterialMaps) -> None:
-    """Remove the textures of an earlier mesh that this one lacks: it had fewer triangles, or a
-    soft rim.
+    """Remove the textures of an earlier build that this one lacks: its mesh had fewer triangles, or
+    a soft rim, or its material gloss.
     """
-    for role, image in (("normal_map", maps.normal), ("alpha", maps.alpha)):
+    held = {"normal_map": maps.normal, "alpha": maps.alpha, "plain_base_color": maps.plain}
+    for role, image in held.items():
         old = find_tagged(bpy.data.images, key, role)
         if image is None and old is not None and old.users == 0:
             bpy.data.images.remove(old)

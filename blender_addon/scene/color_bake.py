@@ -1,7 +1,7 @@
 """Edited base colours as a texture.
 
-Equation: base colour = g v (1 - p s) rotated(rho; hue, saturation), as the group "ISC Dichromatic"
-computes it, clipped at 1 and coded in 8 bits; see `dichromatic`.
+Equation: base colour = g v rotated(rho; hue, saturation), as the group "ISC Dichromatic" computes
+it, clipped at 1 and coded in 8 bits; see `dichromatic`.
 
 Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
 saturation and value).

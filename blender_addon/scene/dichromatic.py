@@ -1,12 +1,11 @@
 """The node group "ISC Dichromatic": the edits of an object's diffuse and specular light, before its
 Principled BSDF.
 
-Equation: base colour = g_d v (1 - p s) rotated(rho; hue, saturation), g_d the diffuse gain, v the
-value, p 1 while the photo's own highlights are shown and s the share of the light that the specular
-layer takes from the diffuse one (`specular_share`). For a specular level L (1 is plastic) and its
-gain g_s, the reflectance along the normal is f0 = min(.04 (1 - p) g_s L, .96), and the index of
-refraction is (1 + sqrt f0) / (1 - sqrt f0): unlike Blender's own level, USD has it, too. Roughness
-= min(1, r / g) for the gain g of the gloss.
+Equation: base colour = g_d v rotated(rho; hue, saturation), g_d the diffuse gain, v the value and
+rho the texture (`specular_layer`). For a specular level L (1 is plastic) and its gain g_s, the
+reflectance along the normal is f0 = min(.04 (1 - p) g_s L, .96), p 1 while the photo's own
+highlights are shown, and the index of refraction is (1 + sqrt f0) / (1 - sqrt f0): unlike Blender's
+own level, USD has it, too. Roughness = min(1, r / g) for the gain g of the gloss.
 
 The group holds the values; its outputs are linked only while a slider moves. Otherwise the BSDF has
 images and numbers, which every exporter reads: see `material_edits`.
@@ -31,7 +30,7 @@ from isc_core.shading.brdf.ggx import F0
 
 from ..datablocks.nodes import add_node, connect
 
-VERSION = 3
+VERSION = 4
 MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
 
@@ -126,15 +125,6 @@ DICHROMATIC_INPUTS = (
         0.1,
         10,
         "Divides the roughness, above 1 the highlights are sharper, 1 as in the photo",
-    ),
-    GroupInput(
-        "Specular Share",
-        "Float",
-        0.0,
-        0,
-        1,
-        "Share of the light that the specular layer takes from the diffuse one",
-        factor=True,
     ),
     GroupInput(
         "Photo Highlights",
@@ -283,8 +273,6 @@ def _edited_color(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.NodeSocke
     ]
     for node, default in zip(unchanged, (0.5, 1.0), strict=True):
         node.inputs[1].default_value, node.inputs[2].default_value = default, 1e-6
-    taken = add_node(group, "Math", (-450, -20), operation="SUBTRACT", label="Not Taken")
-    taken.inputs[0].default_value = 1.0
     changed = add_node(group, "Math", (-550, 650), operation="SUBTRACT", label="Changed?")
     changed.inputs[0].default_value = 1.0
     connect(
@@ -304,16 +292,7 @@ def _edited_color(group: bpy.types.NodeTree, inputs: Any) -> bpy.types.NodeSocke
         (inputs["Base Color"], recolour.inputs["Color"]),
         (recolour.outputs["Color"], scaled.inputs[0]),
         (
-            _product(group, inputs["Photo Highlights"], inputs["Specular Share"], (-650, -20)),
-            taken.inputs[1],
-        ),
-        (
-            _product(
-                group,
-                _product(group, inputs["Diffuse Gain"], inputs["Value"], (-450, 150)),
-                taken.outputs["Value"],
-                (-280, 120),
-            ),
+            _product(group, inputs["Diffuse Gain"], inputs["Value"], (-450, 150)),
             scaled.inputs["Scale"],
         ),
     )

@@ -10,7 +10,6 @@ from typing import Literal
 
 import bpy
 
-from ..datablocks.images import ImageFile
 from ..datablocks.mesh import UV
 from ..datablocks.nodes import add_node, connect, node_tree
 from ..datablocks.provenance import datablock_name, find_tagged, tag
@@ -25,7 +24,7 @@ from .material_edits import (
     dichromatic_node,
     forget_edits,
 )
-from .photo_highlights import show_highlights
+from .photo_highlights import remember_base_colors, show_highlights
 
 SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")
@@ -41,7 +40,7 @@ class MaterialMaps:
     Attributes
     ----------
     base_color : bpy.types.Image
-        Base colour.
+        Base colour, of what is under the specular layer.
     specular : bpy.types.Image or None
         The photo's highlights.
     variation : bpy.types.Image or None
@@ -50,8 +49,8 @@ class MaterialMaps:
         Tangent-space normal map.
     alpha : bpy.types.Image or None
         Opacity; None for an opaque object.
-    plain : ImageFile or None
-        The base colour without its compensation for the specular share, if known.
+    plain : bpy.types.Image or None
+        Base colour without a specular layer above; None if it is the same.
     """
 
     base_color: bpy.types.Image
@@ -59,7 +58,7 @@ class MaterialMaps:
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
     alpha: bpy.types.Image | None = None
-    plain: ImageFile | None = None
+    plain: bpy.types.Image | None = None
 
 
 @dataclass(frozen=True)
@@ -74,14 +73,11 @@ class SpecularSettings:
         Roughness of the lobe, in [0, 1].
     source : str
         "lobe", "image" (the photo's highlights until light, camera or pose change) or "none".
-    share : float
-        Share of the diffuse light for which the base colour is compensated.
     """
 
     level: float
     roughness: float
     source: SpecularSource
-    share: float = 0.0
 
 
 def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) -> bpy.types.Material:
@@ -115,12 +111,13 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     _set_values(material, group, specular, kept)
     if maps.specular is not None:
         material["isc_highlights"] = maps.specular
+    remember_base_colors(material, maps.base_color, maps.plain)
     if specular.source == "image":
         show_highlights(material)
     if bpy.app.background:
-        bake_edits(material, maps.plain)
+        bake_edits(material)
     else:
-        begin_bake(material, maps.plain)  # colours that take longer are baked later, as after edits
+        begin_bake(material)  # colours that take longer are baked later, as after edits
     return material
 
 
@@ -183,7 +180,6 @@ def _set_values(
     if matte:
         inputs["Specular Level"].default_value = 0.0
     material[_FIT] = [inputs[name].default_value for name in _FITTED]
-    inputs["Specular Share"].default_value = specular.share
     for name, value in kept.items():
         if not (matte and name == "Specular Level"):
             inputs[name].default_value = value

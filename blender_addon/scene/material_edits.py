@@ -45,6 +45,7 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
 # index of refraction.
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
+_FORMER = "Specular Share"
 _EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
 
 
@@ -135,27 +136,25 @@ class PendingBake:
     edit: ColorEdit
 
 
-def bake_edits(material: bpy.types.Material, plain: ImageFile | None = None) -> None:
+def bake_edits(material: bpy.types.Material) -> None:
     """Write all edits into the BSDF and its textures.
 
     Parameters
     ----------
     material : bpy.types.Material
         A local material of ISC; nothing changes where there is nothing to write.
-    plain : ImageFile, optional
-        The base colour without its compensation for the specular share.
     """
-    pending = begin_bake(material, plain)
+    pending = begin_bake(material)
     if pending is not None and (file := edited_file(pending.source, pending.edit)) is not None:
         finish_bake(material, pending.state, file)
 
 
-def begin_bake(material: bpy.types.Material, plain: ImageFile | None = None) -> PendingBake | None:
+def begin_bake(material: bpy.types.Material) -> PendingBake | None:
     """Write all edits into the BSDF that need no computing of colours.
 
     Parameters
     ----------
-    material, plain : bpy.types.Material, ImageFile
+    material : bpy.types.Material
         As of `bake_edits`.
 
     Returns
@@ -175,10 +174,7 @@ def begin_bake(material: bpy.types.Material, plain: ImageFile | None = None) -> 
         tree.links.remove(target.links[0])
         target.default_value = (*np.clip(color, 0, 1), 1.0)
     elif not edit.changes_nothing:
-        share = group.inputs["Specular Share"].default_value
-        if plain is None or not (edit.only_scales and abs(edit.gain + share - 1) <= UNCHANGED):
-            return PendingBake(state, color_source(source.links[0].from_node.image), edit)
-        finish_bake(material, state, plain)
+        return PendingBake(state, color_source(source.links[0].from_node.image), edit)
     else:
         tree.links.new(source.links[0].from_socket, target)
         if (node := tree.nodes.get(EDITED)) is not None:
@@ -305,17 +301,12 @@ def specular_level(surface: Any) -> float:
 
 
 def _color_edit(inputs: Any) -> ColorEdit:
-    hue, saturation, value, gain, shown, share = (
+    hue, saturation, value, gain, shown = (
         float(inputs[name].default_value)
-        for name in (
-            "Hue",
-            "Saturation",
-            "Value",
-            "Diffuse Gain",
-            "Photo Highlights",
-            "Specular Share",
-        )
+        for name in ("Hue", "Saturation", "Value", "Diffuse Gain", "Photo Highlights")
     )
+    # Until version 3 of the group, the photo's highlights used the base colour under the layer.
+    share = inputs[_FORMER].default_value if _FORMER in inputs else 0.0
     return ColorEdit(hue, saturation, value * gain * (1 - shown * share))
 
 

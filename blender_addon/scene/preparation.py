@@ -16,9 +16,9 @@ from ..datablocks.images import (
     DATA,
     SRGB,
     ImageFile,
+    coded_file,
     map_file,
     map_files,
-    scaled_file,
     texture_file,
 )
 from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arrays
@@ -28,7 +28,7 @@ from .camera import eye_of
 from .displacement import displacement_map, flatten
 from .hand_edits import checksum_of
 from .material import SpecularSettings, SpecularSource
-from .specular_share import specular_share
+from .specular_layer import SpecularLayer, specular_layer
 
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
@@ -116,8 +116,6 @@ class PreparedObject:
         The files of the images, by role; "photo" is one of them if no image of the file shows it.
     specular : SpecularSettings
         The specular part of the material.
-    plain : ImageFile or None
-        The base colour without its compensation for the specular share, where it is needed.
     offset : tuple of float
         Where it lies from the first object of the same photo; metres in Blender's axes.
     """
@@ -128,7 +126,6 @@ class PreparedObject:
     checksum: str
     files: dict[str, ImageFile]
     specular: SpecularSettings
-    plain: ImageFile | None
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
@@ -162,10 +159,12 @@ def prepare(
     specular = _specular_settings(result, options)
     files = map_files(result, options.all_maps)
     files["environment_map"] = map_file(result.environment_map, COLOR)
-    files["base_color"] = _base_color(result, 1 / (1 - specular.share))
-    plain = None
-    if options.specular_from == "image" and specular.share > 0:
-        plain = _base_color(result, 1.0)
+    layer = None
+    if options.specular_from != "none":
+        layer = specular_layer(result, specular.level / _peak(result), specular.roughness)
+    files["base_color"] = _base_color(result, layer)
+    if layer is not None:
+        files["plain_base_color"] = _base_color(result, None)
     if result.specular_variation is not None:
         values = result.specular_variation / _peak(result)
         files["specular_variation"] = texture_file(values, DATA)
@@ -179,7 +178,7 @@ def prepare(
         files["displacement"] = map_file(displacement_map(result, options.size_metres), DATA)
     if with_photo:
         files["photo"] = map_file(result.image, COLOR, result.mask)
-    return PreparedObject(result, options, mesh, checksum_of(mesh), files, specular, plain)
+    return PreparedObject(result, options, mesh, checksum_of(mesh), files, specular)
 
 
 def require_options(options: BuildOptions) -> None:
@@ -215,21 +214,19 @@ def _geometry(result: ResultArrays, options: BuildOptions) -> tuple[MeshGeometry
     return front_geometry(result, options.size_metres), result.normal_map
 
 
-def _base_color(result: ResultArrays, gain: float) -> ImageFile:
-    if result.texture is not None:
-        return scaled_file(result.texture, gain)
-    return texture_file(gain * result.base_color, SRGB)
+def _base_color(result: ResultArrays, layer: SpecularLayer | None) -> ImageFile:
+    """The base colour, of what is under a specular layer if there is one."""
+    if (codes := result.texture) is not None:
+        return coded_file(codes if layer is None else layer.codes_under(codes))
+    color = result.base_color
+    return texture_file(color if layer is None else layer.color_under(color), SRGB)
 
 
 def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:
     """Values of the fit; without a fitted level the object is diffuse, as in the photo's light."""
     level = result.specular_level if np.isfinite(result.specular_level) else 0.0
     roughness = result.roughness if np.isfinite(result.roughness) else _DEFAULT_ROUGHNESS
-    mean = level if options.specular_from != "none" else 0.0
-    if result.specular_variation is not None:
-        mean *= float(result.specular_variation[result.mask].mean())
-    share = specular_share(mean, roughness, result.normal[result.mask][:, 2])
-    return SpecularSettings(level * _peak(result), roughness, options.specular_from, share)
+    return SpecularSettings(level * _peak(result), roughness, options.specular_from)
 
 
 def _peak(result: ResultArrays) -> float:

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..imaging.row_blocks import row_blocks
 from ..scene.decomposition import Decomposition
-from ..shading.brdf.ggx import F0
+from ..shading.brdf.ggx import F0, Ggx
 from ..shading.brdf.roughness import alpha_from_blender
 from .specular_level import SpecularFit, SpecularSource, fitted_specular
 
@@ -75,9 +75,9 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
         1 is plastic; infinite under a black environment map.
     """
     from ..shading.environment_map import resampled
-    from ..shading.lobe_rendering import Lobe, MirroredEnvironment
+    from ..shading.mirrored_environment import MirroredEnvironment
 
-    lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
+    lobe = Ggx(max(float(alpha_from_blender(roughness)), _NARROWEST), F0)
     mirrored, view = MirroredEnvironment(lobe, resampled(environment, _ROWS)), d.view
     room = list[np.ndarray]()
     for block in row_blocks(d.mask.shape):

@@ -1,9 +1,7 @@
 """A specular lobe, and its radiance toward the viewer under a light or an environment map.
 
-Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E. With the viewer along z it
-depends on the normal alone, so under an environment map of many samples it is evaluated on a table
-of normals in the stereographic plane (x, y) / (1 + z) and interpolated there. For other views, the
-normal is looked up that mirrors the same light to a viewer along z.
+Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E; under an environment map as
+`mirrored_environment` says.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
 doi:10.2312/EGWR/EGSR07/195-206 (see `brdf`).
@@ -15,21 +13,18 @@ are those of the view along z.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from .brdf.blinn_phong import BlinnPhong
 from .brdf.ggx import Ggx
 from .brdf.model import Model, check_range
 from .brdf.roughness import exponent_from_alpha, fitted_exponent
-from .environment_map import directions, solid_angles
 from .lights import VIEW, DirectionalLight
-from .perspective import far_view_normals
-from .radiance import DistantLights, directional, radiance
+from .mirrored_environment import MirroredEnvironment
+from .radiance import directional, radiance
 
 DEFAULT_EXPONENT = 60.0
 
 _FITTED_ALPHA = 0.5  # the largest alpha of `fitted_exponent`
-_TABLE = 65  # samples of the stereographic plane along an axis
 
 
 @dataclass(frozen=True)
@@ -96,65 +91,6 @@ def lobe_under(
     return radiance(lobe.model, _unit(normal), view, directional(light.direction, light.irradiance))
 
 
-class MirroredEnvironment:
-    """An environment map as a lobe mirrors it toward the viewer: evaluated once, looked up often.
-
-    Parameters
-    ----------
-    lobe : Lobe
-    environment : (rows, 2 rows, 3) ndarray
-        Linear radiance, see `environment_map`.
-    """
-
-    def __init__(self, lobe: Lobe, environment: np.ndarray) -> None:
-        rows = len(environment)
-        lit = (environment > 0).any(-1).reshape(-1)
-        self._table = np.zeros((_TABLE, _TABLE, 3))
-        if lit.any():
-            lights = DistantLights(
-                directions(rows).reshape(-1, 3)[lit],
-                (solid_angles(rows)[..., None] * environment).reshape(-1, 3)[lit],
-            )
-            self._table = radiance(lobe.model, _table_normals(), VIEW, lights)
-
-    def toward(self, normal: np.ndarray, view: np.ndarray = VIEW) -> np.ndarray:
-        """Look up the radiance of the lobe toward the viewer.
-
-        Parameters
-        ----------
-        normal : (N, 3) ndarray
-            Unit normals, camera frame.
-        view : (3,) or (N, 3) ndarray, optional
-            Unit vectors toward the viewer.
-
-        Returns
-        -------
-        (N, 3) ndarray
-        """
-        if view.ndim > 1:
-            normal = far_view_normals(normal, view)
-        places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
-        return np.stack(
-            [
-                ndimage.map_coordinates(self._table[..., c], places.T, order=1, mode="nearest")
-                for c in range(3)
-            ],
-            -1,
-        )
-
-
-def _table_normals() -> np.ndarray:
-    """The unit normals (N, N, 3) of the table's places."""
-    axis = np.linspace(-1.0, 1.0, _TABLE)
-    u, v = np.meshgrid(axis, axis, indexing="ij")
-    # The corners lie behind the horizon, where no normal is looked up.
-    square = np.minimum(u * u + v * v, 1)
-    shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
-    normals = np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]
-    normals[_TABLE // 2, _TABLE // 2] = VIEW
-    return _unit(normals)
-
-
 def lobe_in_environment(
     lobe: Lobe, normal: np.ndarray, environment: np.ndarray, view: np.ndarray = VIEW
 ) -> np.ndarray:
@@ -174,7 +110,7 @@ def lobe_in_environment(
     -------
     (N, 3) ndarray
     """
-    return MirroredEnvironment(lobe, environment).toward(normal, view)
+    return MirroredEnvironment(lobe.model, environment).toward(normal, view)
 
 
 def _unit(normal: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.addon.scene_render import pixels, render
@@ -23,7 +23,6 @@ SOCKETS = {
     "Specular Gain",
     "Roughness",
     "Gloss Gain",
-    "Specular Share",
     "Photo Highlights",
 }
 
@@ -144,14 +143,16 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     """The lobe is that of the fit; of the diffuse light it takes a share that grows sideways."""
+    from blender_addon.scene.specular_layer import specular_layer
+
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
     built = build(replace(result, specular_level=1.0, roughness=0.45))
     lamp(built, direction)
     here = inside(result)
     layers = render(built.scene, tmp_path, samples=16)
-    lambert = (
-        result.base_color[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
-    )
+    layer = specular_layer(result, 1.0, 0.45)
+    under = layer.color_under(result.base_color) * (1 - layer.effect[..., 3:])
+    lambert = under[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
     matt = (layers["Diffuse Direct"] * layers["Diffuse Color"])[here]
     np.testing.assert_allclose(matt, lambert, rtol=0.05)
     assert matt.sum() == pytest.approx(lambert.sum(), rel=0.01)
@@ -188,22 +189,54 @@ def test_the_highlight_moves_with_a_lamp(
     assert max(angles) < 4
 
 
-@pytest.mark.parametrize(("level", "roughness"), [(0.3, 0.2), (1.0, 0.4), (2.0, 0.3)])
-def test_the_object_is_as_bright_as_without_a_specular_layer(
-    blender: Any, result: ResultArrays, tmp_path: Path, level: float, roughness: float
+@pytest.mark.parametrize(("level", "roughness", "most"), [(0.3, 0.2, 0.03), (1.0, 0.4, 0.06)])
+def test_the_object_looks_as_without_a_specular_layer(
+    blender: Any, result: ResultArrays, tmp_path: Path, level: float, roughness: float, most: float
 ) -> None:
-    """The BSDF takes from the diffuse light what it mirrors; the base colour makes up for it."""
+    """What the layer mirrors of the recovered light and what it takes from the diffuse one cancel
+    in the base colour, pixel by pixel.
+    """
     here = inside(result)
 
-    def diffuse(**options: Any) -> np.ndarray:
+    def seen(**options: Any) -> np.ndarray:
         fitted = replace(result, specular_level=level, roughness=roughness)
-        layers = render(build(fitted, **options).scene, tmp_path, samples=16)
-        seen: np.ndarray = (layers["Diffuse Direct"] * layers["Diffuse Color"])[here]
-        return seen
+        layers = render(build(fitted, **options).scene, tmp_path, samples=64)
+        return np.asarray(layers["Combined"][here][:, :3])
 
-    plain, layered = diffuse(specular_from="none", name="a"), diffuse(name="b")
-    assert layered.sum() == pytest.approx(plain.sum(), rel=0.01)
-    assert np.sqrt(np.square(layered / plain - 1).mean()) < 0.06
+    plain, layered = seen(specular_from="none", name="a"), seen(name="b")
+    assert layered.sum() == pytest.approx(plain.sum(), rel=most / 2)
+    assert np.sqrt(np.square(layered / plain - 1).mean()) < most
+
+
+@pytest.mark.parametrize("sharper", [1, 3])
+def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
+    result: ResultArrays, sharper: int
+) -> None:
+    from blender_addon.scene.specular_layer import specular_layer
+
+    layer, (rows, columns) = specular_layer(result, 1.0, 0.3), result.mask.shape
+    codes = np.full((sharper * rows, sharper * columns, 3), (200, 120, 40), np.uint8)
+    under = layer.codes_under(codes)
+    middle = sharper // 2
+    color = srgb_to_linear(np.array([200, 120, 40]) / 255)
+    wanted = linear_to_srgb(
+        np.clip(layer.color_under(np.broadcast_to(color, (rows, columns, 3))), 0, 1)
+    )
+    off = under[middle::sharper, middle::sharper] - 255 * wanted
+    assert np.abs(off[result.mask]).max() < 0.51
+    assert (under[middle::sharper, middle::sharper][result.mask] < codes[0, 0]).all(-1).mean() > 0.5
+
+
+def test_at_most_half_of_a_color_is_the_mirrored_environment(result: ResultArrays) -> None:
+    """Little is taken off as it is, much no further than to the half; in each channel."""
+    from blender_addon.scene.specular_layer import SpecularLayer
+
+    effect = np.zeros((1, 3, 4), np.float32)
+    effect[0, :, :3] = np.array([[0.0], [0.01], [10.0]])
+    (colors,) = SpecularLayer(effect).color_under(np.full((1, 3, 3), (0.8, 0.4, 0.2)))
+    np.testing.assert_allclose(colors[0], (0.8, 0.4, 0.2))
+    np.testing.assert_allclose(colors[1], (0.79, 0.39, 0.19), atol=6e-4)
+    np.testing.assert_allclose(colors[2], (0.4, 0.2, 0.1))
 
 
 def test_gloss_and_gains_are_numbers_on_the_surface(blender: Any, result: ResultArrays) -> None:
@@ -298,7 +331,7 @@ def mirror(blender: Any) -> Any:
 def test_the_share_is_that_of_blenders_layers(
     blender: Any, mirror: Any, tmp_path: Path, level: float, roughness: float
 ) -> None:
-    from blender_addon.scene.specular_share import specular_share
+    from blender_addon.scene.specular_layer import specular_share
 
     mirror["Specular IOR Level"].default_value = 0.5 * level
     mirror["Roughness"].default_value = roughness
@@ -309,9 +342,9 @@ def test_the_share_is_that_of_blenders_layers(
         camera.rotation_euler = angle, 0, 0
         layers = render(blender.context.scene, tmp_path, samples=64)
         taken = 1 - (layers["Diffuse Direct"] * layers["Diffuse Color"]).mean()
-        share = specular_share(level, roughness, np.array([np.cos(angle)]))
+        (share,) = specular_share(level, roughness, np.array([np.cos(angle)]))
         assert share == pytest.approx(taken, abs=0.02)
-    assert specular_share(0.0, roughness, np.ones(1)) == 0
+    assert specular_share(0.0, roughness, np.ones(2)).tolist() == [0, 0]
 
 
 def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: ResultArrays) -> None:

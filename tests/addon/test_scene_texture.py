@@ -47,14 +47,36 @@ def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -
     assert fine.texture is not None and np.array_equal(codes(image), fine.texture)
 
 
-def test_with_the_photos_highlights_the_texture_is_not_compensated(
-    blender: Any, fine: ResultArrays
-) -> None:
-    built = build(replace(fine, specular_level=1.0, roughness=0.3), specular_from="image")
-    assert fine.texture is not None
-    off = np.abs(codes(texture(built, "Edited Base Color")) - fine.texture.astype(int))
-    assert off.max() == 0
-    assert codes(texture(built)).mean() > fine.texture.mean() + 0.5, "for highlights of a lobe"
+def test_the_photos_highlights_are_on_the_plain_texture(blender: Any, fine: ResultArrays) -> None:
+    """The surface's own highlights, and its environment's, are on another one."""
+    from blender_addon.scene.photo_highlights import hide_highlights, show_highlights
+
+    glossy = replace(fine, specular_level=1.0, roughness=0.3)
+    built = build(glossy, specular_from="image")
+    assert fine.texture is not None and np.array_equal(codes(texture(built)), fine.texture)
+    hide_highlights(built.material)
+    under = codes(texture(built))
+    bright = fine.texture > 40
+    assert (under != fine.texture)[bright].mean() > 0.5
+    show_highlights(built.material)
+    assert np.array_equal(codes(texture(built)), fine.texture)
+    assert np.array_equal(codes(texture(build(glossy, specular_from="lobe"))), under)
+
+    mine = blender.data.images.new("mine", 4, 4)
+    built.material.node_tree.nodes["Base Color"].image = mine
+    show_highlights(built.material)
+    assert texture(built) == mine, "the user's own image stays"
+
+
+def test_a_build_without_gloss_leaves_one_texture(blender: Any, fine: ResultArrays) -> None:
+    def roles() -> list[str]:
+        return [role for image in blender.data.images if "base" in (role := image["isc_role"])]
+
+    build(replace(fine, specular_level=1.0, roughness=0.3), specular_from="image")
+    assert sorted(roles()) == ["base_color", "plain_base_color"]
+    built = build(fine)
+    assert roles() == ["base_color"]
+    assert np.array_equal(codes(texture(built)), fine.texture)
 
 
 def test_building_again_with_maps_replaces_it(blender: Any, fine: ResultArrays) -> None:

@@ -1,0 +1,82 @@
+"""An environment map as a glossy surface mirrors it toward the viewer.
+
+Equation: M(n) = sum over samples of f_r(n, v, l) max(0, n . l) L(l) w(l), w the solid angles. With
+the viewer along z it depends on the normal alone, so that it is evaluated on a table of normals in
+the stereographic plane (x, y) / (1 + z) and interpolated there. For other views, the normal is
+looked up that mirrors the same light to a viewer along z.
+
+Citation: R. Ramamoorthi, P. Hanrahan, "Frequency space environment map rendering", SIGGRAPH 2002,
+doi:10.1145/566654.566611 (the integral; here it is summed directly).
+
+Limits: no cast shadows, no interreflection. The lobe's width and Fresnel's factor are those of the
+view along z.
+"""
+
+import numpy as np
+
+from .brdf.model import Model
+from .environment_map import directions, solid_angles
+from .lights import VIEW
+from .perspective import far_view_normals
+from .radiance import DistantLights, radiance
+
+_TABLE = 65  # samples of the stereographic plane along an axis
+
+
+class MirroredEnvironment:
+    """What a reflectance model mirrors of an environment: evaluated once, looked up often.
+
+    Parameters
+    ----------
+    model : Model
+        Its values have no colour.
+    environment : (rows, 2 rows, 3) ndarray
+        Linear radiance, see `environment_map`.
+    """
+
+    def __init__(self, model: Model, environment: np.ndarray) -> None:
+        rows = len(environment)
+        lit = (environment > 0).any(-1).reshape(-1)
+        self._table = np.zeros((_TABLE, _TABLE, 3))
+        if lit.any():
+            lights = DistantLights(
+                directions(rows).reshape(-1, 3)[lit],
+                (solid_angles(rows)[..., None] * environment).reshape(-1, 3)[lit],
+            )
+            self._table = radiance(model, _table_normals(), VIEW, lights)
+
+    def toward(self, normal: np.ndarray, view: np.ndarray = VIEW) -> np.ndarray:
+        """Look up the radiance toward the viewer.
+
+        Parameters
+        ----------
+        normal : (N, 3) ndarray
+            Unit normals, camera frame.
+        view : (3,) or (N, 3) ndarray, optional
+            Unit vectors toward the viewer.
+
+        Returns
+        -------
+        (N, 3) ndarray
+        """
+        if view.ndim > 1:
+            normal = far_view_normals(normal, view)
+        places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
+        first = np.clip(places.astype(np.int64), 0, _TABLE - 2)
+        u, v = np.clip(places - first, 0, 1).T[..., None]
+        (i, j), table = first.T, self._table
+        nearer = (1 - v) * table[i, j] + v * table[i, j + 1]
+        farther = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
+        return np.asarray((1 - u) * nearer + u * farther)
+
+
+def _table_normals() -> np.ndarray:
+    """The unit normals (N, N, 3) of the table's places."""
+    axis = np.linspace(-1.0, 1.0, _TABLE)
+    u, v = np.meshgrid(axis, axis, indexing="ij")
+    # The corners lie behind the horizon, where no normal is looked up.
+    square = np.minimum(u * u + v * v, 1)
+    shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
+    normals = np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]
+    normals[_TABLE // 2, _TABLE // 2] = VIEW
+    return np.asarray(normals / np.linalg.norm(normals, axis=-1, keepdims=True))
