@@ -23,8 +23,9 @@ from .material_edits import (
     begin_bake,
     dichromatic_node,
     forget_edits,
+    remember_base_colors,
 )
-from .photo_highlights import remember_base_colors, show_highlights
+from .photo_highlights import show_highlights
 
 SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")

@@ -8,7 +8,8 @@ moves, the group's output is linked to the BSDF, so that the graphics processor 
 then `bake_edits` writes the edited colours into a texture and links that. An unedited base colour
 is the recovered texture itself.
 
-Equation: see `color_bake`.
+Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
+the specular layer (`specular_layer`); without, or while the photo's are shown, the plain one.
 
 Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
 exporters then see the unedited image, or none.
@@ -45,6 +46,7 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
 # index of refraction.
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
+_UNDER_LAYER, _PLAIN = "isc_base_color", "isc_plain_base_color"
 _FORMER = "Specular Share"
 _EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
 
@@ -87,6 +89,26 @@ def surface_node(material: bpy.types.Material) -> bpy.types.Node | None:
     return node if node is not None and node.type == "BSDF_PRINCIPLED" else None
 
 
+def remember_base_colors(
+    material: bpy.types.Material, under_layer: bpy.types.Image, plain: bpy.types.Image | None
+) -> None:
+    """Store the two base colours of a material: `apply_edits` shows the right one.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    under_layer : bpy.types.Image
+        Under its specular layer.
+    plain : bpy.types.Image or None
+        Without that; None if it is the same.
+    """
+    for name, image in ((_UNDER_LAYER, under_layer), (_PLAIN, plain)):
+        material.pop(name, None)
+        if plain is not None:
+            material[name] = image
+
+
 def apply_edits(material: bpy.types.Material) -> bool:
     """Write the numbers into the BSDF, and show the edited colour.
 
@@ -104,6 +126,7 @@ def apply_edits(material: bpy.types.Material) -> bool:
     if surface is None or group is None:
         return False
     _write_numbers(material, surface, group.inputs)
+    _choose_base_color(material, group)
     if _color_state(group) == material.get(_COLOR):
         return False
     if not _is_ours(surface.inputs["Base Color"], group):
@@ -298,6 +321,21 @@ def specular_level(surface: Any) -> float:
     level = surface.inputs["Specular IOR Level"]
     factor = OWN_LEVEL if level.is_linked else level.default_value
     return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / 0.5)
+
+
+def _choose_base_color(material: bpy.types.Material, group: bpy.types.Node) -> None:
+    """Without highlights of its own, the surface has the base colour without a layer above; images
+    that the user has put in their place stay.
+    """
+    names = ("Specular Level", "Specular Gain", "Photo Highlights")
+    level, gain, shown = (float(group.inputs[name].default_value) for name in names)
+    under, plain = material.get(_UNDER_LAYER), material.get(_PLAIN)
+    node = group.id_data.nodes.get(BASE_COLOR)
+    if under is None or plain is None or node is None or node.type != "TEX_IMAGE":
+        return
+    wanted = under if level * gain * (1 - shown) > 0 else plain
+    if node.image in (under, plain) and node.image != wanted:
+        node.image = wanted
 
 
 def _color_edit(inputs: Any) -> ColorEdit:

@@ -3,8 +3,7 @@
 The layer is emission that only the camera sees, so it is exact from the photo's view and in the
 photo's light, and wrong elsewhere: highlights would stand still under a moving lamp. It therefore
 turns itself off as soon as the light, the camera or the object's place differ from those that it
-was first seen with. While it is on, the BSDF's own highlights are off, and its base colour is that
-without a specular layer above, see `specular_layer`.
+was first seen with. While it is on, the BSDF's own highlights are off.
 """
 
 import hashlib
@@ -16,10 +15,9 @@ import bpy
 
 from ..datablocks.nodes import add_node, connect
 from .dichromatic import HIGHLIGHTS, highlights_group
-from .material_edits import BASE_COLOR, dichromatic_node, surface_node
+from .material_edits import dichromatic_node, surface_node
 
 IMAGE, _SEEN = "isc_highlights", "isc_highlights_seen"
-_UNDER_LAYER, _PLAIN = "isc_base_color", "isc_plain_base_color"
 _SUM, _TEXTURE = "Photo Highlights", "Highlights of the Photo"
 _DIGITS = 5
 
@@ -68,7 +66,6 @@ def show_highlights(material: bpy.types.Material) -> None:
         (total.outputs["Shader"], output.inputs["Surface"]),
     )
     group.inputs["Photo Highlights"].default_value = 1.0
-    _use_base_color(material, _PLAIN)
     forget_view(material)
 
 
@@ -86,32 +83,11 @@ def hide_highlights(material: bpy.types.Material) -> None:
         return
     output = _output(surface)
     group.inputs["Photo Highlights"].default_value = 0.0
-    _use_base_color(material, _UNDER_LAYER)
     for name in (_TEXTURE, HIGHLIGHTS, _SUM):
         if (node := tree.nodes.get(name)) is not None:
             tree.nodes.remove(node)
     if output is not None:
         tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
-
-
-def remember_base_colors(
-    material: bpy.types.Material, under_layer: bpy.types.Image, plain: bpy.types.Image | None
-) -> None:
-    """Store the two base colours of a material: those of its own highlights, and of the photo's.
-
-    Parameters
-    ----------
-    material : bpy.types.Material
-        A local material of ISC.
-    under_layer : bpy.types.Image
-        Under its specular layer.
-    plain : bpy.types.Image or None
-        Without that; None if it is the same.
-    """
-    for name, image in ((_UNDER_LAYER, under_layer), (_PLAIN, plain)):
-        material.pop(name, None)
-        if plain is not None:
-            material[name] = image
 
 
 def forget_view(material: bpy.types.Material) -> None:
@@ -153,14 +129,6 @@ def has_moved(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
         material[_SEEN] = known | {scene.name: seen}
         return False
     return bool(known[scene.name] != seen)
-
-
-def _use_base_color(material: bpy.types.Material, name: str) -> None:
-    """Show one of the two base colours, unless the user has put another in their place."""
-    node = material.node_tree.nodes.get(BASE_COLOR)
-    both = [material.get(one) for one in (_UNDER_LAYER, _PLAIN)]
-    if node is not None and node.type == "TEX_IMAGE" and None not in both and node.image in both:
-        node.image = material[name]
 
 
 def _output(surface: bpy.types.Node) -> bpy.types.Node | None:

@@ -151,6 +151,7 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     here = inside(result)
     layers = render(built.scene, tmp_path, samples=16)
     layer = specular_layer(result, 1.0, 0.45)
+    assert layer is not None
     under = layer.color_under(result.base_color) * (1 - layer.effect[..., 3:])
     lambert = under[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
     matt = (layers["Diffuse Direct"] * layers["Diffuse Color"])[here]
@@ -215,6 +216,7 @@ def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
     from blender_addon.scene.specular_layer import specular_layer
 
     layer, (rows, columns) = specular_layer(result, 1.0, 0.3), result.mask.shape
+    assert layer is not None
     codes = np.full((sharper * rows, sharper * columns, 3), (200, 120, 40), np.uint8)
     under = layer.codes_under(codes)
     middle = sharper // 2

@@ -49,22 +49,31 @@ def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -
 
 def test_the_photos_highlights_are_on_the_plain_texture(blender: Any, fine: ResultArrays) -> None:
     """The surface's own highlights, and its environment's, are on another one."""
+    from blender_addon.scene.material_edits import bake_edits, dichromatic_node
     from blender_addon.scene.photo_highlights import hide_highlights, show_highlights
 
     glossy = replace(fine, specular_level=1.0, roughness=0.3)
     built = build(glossy, specular_from="image")
     assert fine.texture is not None and np.array_equal(codes(texture(built)), fine.texture)
     hide_highlights(built.material)
+    bake_edits(built.material)
     under = codes(texture(built))
     bright = fine.texture > 40
     assert (under != fine.texture)[bright].mean() > 0.5
     show_highlights(built.material)
+    bake_edits(built.material)
     assert np.array_equal(codes(texture(built)), fine.texture)
-    assert np.array_equal(codes(texture(build(glossy, specular_from="lobe"))), under)
+    node = dichromatic_node(build(glossy, specular_from="lobe").material)
+    assert node is not None
+    assert np.array_equal(codes(texture(built)), under)
+    node.inputs["Specular Gain"].default_value = 0.0
+    bake_edits(built.material)
+    assert np.array_equal(codes(texture(built)), fine.texture), "a diffuse surface is the photo's"
+    node.inputs["Specular Gain"].default_value = 1.0
 
     mine = blender.data.images.new("mine", 4, 4)
     built.material.node_tree.nodes["Base Color"].image = mine
-    show_highlights(built.material)
+    bake_edits(built.material)
     assert texture(built) == mine, "the user's own image stays"
 
 
