@@ -45,8 +45,6 @@ class RenderVariant:
         Pixel filter, in pixels; None: that of the scene.
     relit : RelitTruth or None
         Another light, direct only.
-    mirrors_world : bool
-        Whether gloss shows the world, beside the lamps.
     """
 
     gloss: Gloss = "none"
@@ -54,7 +52,6 @@ class RenderVariant:
     own_shadows: bool | None = None
     filter_width: float | None = None
     relit: RelitTruth | None = None
-    mirrors_world: bool = True
 
 
 def render(
@@ -93,9 +90,6 @@ def render(
         built.scene.view_layers[0].material_override = _white()
     if variant.relit is not None:
         _relight(built, variant.relit)
-    if not variant.mirrors_world:
-        bpy.context.scene.world = built.world  # Cycles expects that the context has one
-        built.world.cycles_visibility.glossy = False
     return render_scene(built.scene, samples, variant.filter_width)
 
 
