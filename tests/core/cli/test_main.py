@@ -138,7 +138,7 @@ def test_options_reach_the_result(tmp_path: Path) -> None:
         "--threads",
         "1",
         "--engine",
-        "numpy",
+        "numba",
     ]
     assert (
         isc(
@@ -159,7 +159,7 @@ def test_options_reach_the_result(tmp_path: Path) -> None:
         "illumination": "laboratory",
         "max_size": 30,
         "threads": 1,
-        "engine": "numpy",
+        "engine": "numba",
     }
     assert {name: p.settings[name] for name in expected} == expected
     assert p.seed == 5

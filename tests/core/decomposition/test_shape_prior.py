@@ -45,8 +45,7 @@ def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("cut", [0, 60])
-@pytest.mark.parametrize("illumination", ["natural", "laboratory"])
+@pytest.mark.parametrize(("illumination", "cut"), [("natural", 60), ("laboratory", 0)])
 def test_every_photo_takes_what_was_predicted(illumination: str, cut: int) -> None:
     one, other = (
         found(cut=cut, illumination=illumination, shape_prior=prior)

@@ -59,8 +59,7 @@ def test_the_cost_grows_by_half_the_squared_distance_in_deviations() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("engine", ["numba", "numpy"])
-def test_a_cast_is_the_object_s_colour_rather_than_the_light_s(engine: str) -> None:
+def test_a_cast_is_the_object_s_colour_rather_than_the_light_s() -> None:
     size = 64
     down, right = np.meshgrid(*2 * [(np.arange(size) - 31.5) / 28], indexing="ij")
     mask = down**2 + right**2 < 1
@@ -70,7 +69,7 @@ def test_a_cast_is_the_object_s_colour_rather_than_the_light_s(engine: str) -> N
     photo = Photo(
         image, mask, 1 / 255, np.zeros_like(mask), PhotoSource("", (size, size), 8, "linear", "")
     )
-    settings = Settings("sirfs", engine=engine, shape_prior="silhouette", light_prior="dataset")
+    settings = Settings("sirfs", shape_prior="silhouette", light_prior="dataset")
 
     def ratio(weight: float) -> float:
         options = SolveOptions(light_colour_weight=replace(BALANCED_LIGHT, weight=weight))
