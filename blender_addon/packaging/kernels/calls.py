@@ -1,9 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, a turned mesh, and SIRFS in both
-precisions on a ball of a few pixels call each version of each kernel. The first calls of each are
-kept, with what the arrays held before and after. They run on one thread: others would write to
-these arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, and, in both precisions,
+averages along paths and SIRFS on a ball of a few pixels call each version of each kernel. The first
+calls of each are kept, with what the arrays held before and after. They run on one thread: others
+would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -25,6 +25,7 @@ from isc_core.result_files.turned_view import turned_view
 from isc_core.scene.normal_estimate import NormalEstimate
 from isc_core.scene.shading_estimate import ShadingEstimate
 from isc_core.separation import separate
+from isc_core.separation.support.edge_aware import Paths
 from isc_core.sirfs.priors.prior_file import shipped_priors
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import Start, isc_weights
@@ -176,6 +177,9 @@ def _run_programs() -> None:
     turned_view(corners, np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)]), corners, 20.0, _SIDE, 2.0)
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
+        kind = np.float32 if single else np.float64
+        across, down, *layers = (1 + rng.random((4, 9, 11))).astype(kind)
+        Paths(across, down, 5.0).average(np.stack(layers))
 
 
 def _recover_shape(diffuse: np.ndarray, mask: np.ndarray, single: bool) -> None:

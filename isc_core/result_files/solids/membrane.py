@@ -1,4 +1,3 @@
-# mypy: disable-error-code="no-untyped-def"
 """A membrane over the pixels of a region, under a uniform load.
 
 Equation: lap z = -load inside, z given on the pixels around. Under a load of 4 with z = 0 around,
@@ -16,7 +15,6 @@ Limits: a fixed number of sweeps: a sphere of 2,200 pixels is 1.1 % of its radiu
 import numpy as np
 
 from ...imaging.upsampling import enlarged
-from ...numerics.jit import compiled_available, jit
 
 _SWEEPS, _OVER = 40, 1.8
 # Levels longer than so many pixels: their sweeps fall with their length, to the least.
@@ -67,30 +65,13 @@ def _relaxed(found: np.ndarray, inside: np.ndarray, load: float) -> np.ndarray:
     width = found.shape[1]
     pixels = np.flatnonzero(inside)
     row, column = np.divmod(pixels, width)
-    first, second = (pixels[(row + column) % 2 == parity] for parity in (0, 1))
+    colors = [pixels[(row + column) % 2 == parity] for parity in (0, 1)]
     flat, length = found.reshape(-1), max(found.shape)
     sweeps, over = _SWEEPS, _OVER
     if length > _LONG:
         sweeps, over = max(_SWEEPS * _LONG // length, _FEWEST), _OVER_LONG
-    sweep = _swept if compiled_available() else _swept_in_numpy
-    sweep(flat, first, second, width, load, over, sweeps)
-    return found
-
-
-@jit(types="f8[1] i8[1] i8[1] i8 f8 f8 i8")
-def _swept(flat, first, second, width, load, over, sweeps):
-    """Relax the pixels `first` and then `second` of `flat` (H W,), `sweeps` times."""
     for _ in range(sweeps):
-        for at in (first, second):
-            for k in range(len(at)):
-                p = at[k]
-                near = flat[p - 1] + flat[p + 1] + flat[p - width] + flat[p + width]
-                flat[p] += over * ((near + load) / 4 - flat[p])
-
-
-def _swept_in_numpy(flat, first, second, width, load, over, sweeps):
-    """As `_swept`."""
-    for _ in range(sweeps):
-        for at in (first, second):
+        for at in colors:
             near = flat[at - 1] + flat[at + 1] + flat[at - width] + flat[at + width]
             flat[at] += over * ((near + load) / 4 - flat[at])
+    return found

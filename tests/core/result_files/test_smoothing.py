@@ -1,26 +1,9 @@
-"""Membranes, smoothing and renumbering: compiled as in NumPy, and what they are to be."""
+"""Smoothing of maps and numbering of vertices, against plain ways to do the same."""
 
 import numpy as np
-import pytest
 
-from isc_core.numerics.jit import compiled_available
-from isc_core.result_files.solids import membrane as membranes
 from isc_core.result_files.solids.smoothing import binomial, smoothed_within
 from isc_core.result_files.triangulation.renumbering import renumbered
-
-
-def disc(size: int, radius: float) -> np.ndarray:
-    y, x = np.mgrid[:size, :size] - (size - 1) / 2
-    return np.hypot(x, y) < radius
-
-
-@pytest.mark.skipif(not compiled_available(), reason="needs compiled kernels")
-def test_compiled_membranes_have_the_bytes_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
-    inside = disc(70, 30)
-    given = inside, disc(70, 31.5) & ~inside, np.random.default_rng(0).normal(size=inside.shape)
-    compiled = membranes.membrane(*given, 4.0)
-    monkeypatch.setattr(membranes, "compiled_available", lambda: False)
-    assert np.array_equal(compiled, membranes.membrane(*given, 4.0))
 
 
 def test_each_map_is_smoothed_as_if_it_were_alone() -> None:
