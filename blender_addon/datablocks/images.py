@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.imaging.srgb import linear_to_srgb, srgb_codes, srgb_to_linear
 from isc_core.io.png import encode_png
 
 from ..files.exr import encode_exr
@@ -151,8 +151,7 @@ def scaled_file(codes: np.ndarray, gain: float) -> ImageFile:
     ImageFile
         PNG in sRGB.
     """
-    linear = gain * srgb_to_linear(np.arange(256) / 255)
-    table = np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8)
+    table = srgb_codes(gain * srgb_to_linear(np.arange(256) / 255))
     return coded_file(table[codes])
 
 

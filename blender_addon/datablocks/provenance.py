@@ -11,7 +11,7 @@ be changed.
 
 import json
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import bpy
@@ -48,15 +48,25 @@ def find_tagged(blocks: Iterable[Any], key: str, role: str) -> Any:
     bpy.types.ID or None
         The datablock.
     """
+    return next(all_tagged(blocks, key, role), None)
+
+
+def all_tagged(blocks: Iterable[Any], key: str, role: str) -> Iterator[Any]:
+    """Find all local datablocks of a key and a role.
+
+    Parameters
+    ----------
+    blocks, key, role
+        As of `find_tagged`.
+
+    Yields
+    ------
+    bpy.types.ID
+    """
     roles = (role, _FORMER_ROLES.get(role, role))
-    return next(
-        (
-            block
-            for block in blocks
-            if block.get(KEY) == key and block.get(ROLE) in roles and block.library is None
-        ),
-        None,
-    )
+    for block in blocks:
+        if block.get(KEY) == key and block.get(ROLE) in roles and block.library is None:
+            yield block
 
 
 def tag(block: Any, key: str, role: str) -> Any:

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.io.png import decode_png
 
 from ..datablocks.images import SRGB, ImageFile, coded_file, own_file, scaled_file
@@ -139,8 +139,7 @@ def edited_file(
             return None
         rows = given[top : top + _ROWS]
         colors = table[rows] if codes is not None else rows.astype(float)
-        colors = np.clip(recolour_reflectance(colors, *edit.values), 0, 1)
-        edited[top : top + _ROWS] = np.rint(255 * linear_to_srgb(colors))
+        edited[top : top + _ROWS] = srgb_codes(recolour_reflectance(colors, *edit.values))
     return coded_file(edited)
 
 

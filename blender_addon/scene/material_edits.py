@@ -15,6 +15,7 @@ Limits: keyframed edits, and a base colour that comes from the user's own nodes,
 exporters then see the unedited image, or none.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,7 +26,7 @@ from isc_core.shading.brdf.ggx import F0
 
 from ..datablocks.images import ImageFile, image_name, new_image
 from ..datablocks.nodes import add_node
-from ..datablocks.provenance import KEY, ROLE, tag
+from ..datablocks.provenance import KEY, ROLE, all_tagged, tag
 from .color_bake import (
     UNCHANGED,
     ColorEdit,
@@ -134,9 +135,9 @@ def apply_edits(material: bpy.types.Material) -> bool:
     can_bake = _can_bake(material, group)
     image = _find_edited(material, _color_state(group)) if can_bake else None
     if image is not None:
-        _show_edited(material, image)
+        _show_edited(material, surface, group, image)
         return False
-    _show_group(material)
+    _show_group(surface, group)
     return can_bake
 
 
@@ -224,10 +225,10 @@ def finish_bake(material: bpy.types.Material, state: str, file: ImageFile) -> No
     surface, group = surface_node(material), dichromatic_node(material)
     if surface is None or group is None:
         return
-    key = str(material.get(KEY, material.name))
+    key = _key(material)
     image = tag(new_image(file), key, _EDITED_ROLE)
     image.name, image[_STATE] = image_name(key, _EDITED_ROLE), state
-    _show_edited(material, image)
+    _show_edited(material, surface, group, image)
 
 
 def release_edited(material: bpy.types.Material) -> None:
@@ -241,13 +242,15 @@ def release_edited(material: bpy.types.Material) -> None:
     material : bpy.types.Material
         A local material of ISC; nothing changes where no texture has edited colours.
     """
-    surface = surface_node(material)
-    node = None if surface is None else material.node_tree.nodes.get(EDITED)
-    if surface is None or node is None or node.type != "TEX_IMAGE":
+    surface, group = surface_node(material), dichromatic_node(material)
+    if surface is None or group is None:
+        return
+    node = material.node_tree.nodes.get(EDITED)
+    if node is None or node.type != "TEX_IMAGE":
         return
     if any(link.to_socket != surface.inputs["Base Color"] for link in node.outputs["Color"].links):
         return  # the user's own nodes: the step that linked them has the image
-    _show_group(material)
+    _show_group(surface, group)
     node.image = None
     material.pop(_COLOR, None)
 
@@ -408,13 +411,12 @@ def _can_bake(material: bpy.types.Material, group: bpy.types.Node) -> bool:
     return node.image.packed_file is not None or bool(node.image.size[0])
 
 
-def _edited_images(material: bpy.types.Material) -> list[bpy.types.Image]:
-    key = material.get(KEY, material.name)
-    return [
-        image
-        for image in bpy.data.images
-        if image.get(KEY) == key and image.get(ROLE) == _EDITED_ROLE and image.library is None
-    ]
+def _edited_images(material: bpy.types.Material) -> Iterator[bpy.types.Image]:
+    return all_tagged(bpy.data.images, _key(material), _EDITED_ROLE)
+
+
+def _key(material: bpy.types.Material) -> str:
+    return str(material.get(KEY, material.name))
 
 
 def _find_edited(material: bpy.types.Material, state: str) -> bpy.types.Image | None:
@@ -423,19 +425,18 @@ def _find_edited(material: bpy.types.Material, state: str) -> bpy.types.Image | 
     return next(found, None)
 
 
-def _show_group(material: bpy.types.Material) -> None:
-    surface, group = surface_node(material), dichromatic_node(material)
-    if surface is None or group is None:
-        return
+def _show_group(surface: bpy.types.Node, group: bpy.types.Node) -> None:
     target = surface.inputs["Base Color"]
     if not target.is_linked or target.links[0].from_node != group:
-        material.node_tree.links.new(group.outputs["Base Color"], target)
+        group.id_data.links.new(group.outputs["Base Color"], target)
 
 
-def _show_edited(material: bpy.types.Material, image: bpy.types.Image) -> None:
-    surface, group = surface_node(material), dichromatic_node(material)
-    if surface is None or group is None:
-        return
+def _show_edited(
+    material: bpy.types.Material,
+    surface: bpy.types.Node,
+    group: bpy.types.Node,
+    image: bpy.types.Image,
+) -> None:
     node = _edited_texture(material, group.inputs["Base Color"].links[0].from_node)
     _replace_image(node, image)
     material.node_tree.links.new(node.outputs["Color"], surface.inputs["Base Color"])

@@ -28,14 +28,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from isc_core.imaging.row_blocks import row_blocks
-from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.imaging.upsampling import enlarged
 from isc_core.inpainting.pull_push import fill
 from isc_core.shading.brdf.energy import directional_albedo
 from isc_core.shading.brdf.ggx import F0, Ggx
 from isc_core.shading.environment_map import resampled
+from isc_core.shading.lights import VIEW
 from isc_core.shading.mirrored_environment import MirroredEnvironment
-from isc_core.shading.perspective import far_view_normals, view_directions
+from isc_core.shading.perspective import view_directions
 
 from ..files.result_arrays import ResultArrays
 from .camera import camera_of
@@ -105,8 +106,7 @@ class SpecularLayer:
         for block in row_blocks(codes.shape):
             part = codes[block.rows]
             effect = enlarged(self.effect, part.shape[:2], factor, (block.rows.start, 0))
-            colors = np.clip(_under(table[part], effect), 0, 1)
-            under[block.rows] = np.rint(255 * linear_to_srgb(colors))
+            under[block.rows] = srgb_codes(_under(table[part], effect))
         return under
 
 
@@ -129,15 +129,14 @@ def specular_layer(result: ResultArrays, level: float, roughness: float) -> Spec
     """
     if level <= 0:
         return None
-    mask, normal, view = result.mask, result.normal[result.mask].astype(float), None
-    if (camera := camera_of(result)) is not None:
-        view = view_directions(camera, result.size[::-1])[mask]
-    cosines = normal[:, 2] if view is None else (normal * view).sum(-1)
+    mask, camera = result.mask, camera_of(result)
+    normal = result.normal[mask].astype(float)
+    view = VIEW if camera is None else view_directions(camera, result.size[::-1])[mask]
     mirrored = MirroredEnvironment(
         _layer(level, roughness), resampled(result.environment_map.astype(float), _ROWS)
-    ).toward(normal if view is None else far_view_normals(normal, view))
+    ).toward(normal, view)
     shading = result.shading[mask] / result.reflectance_scale
-    share = specular_share(level, roughness, cosines)[:, None]
+    share = specular_share(level, roughness, (normal * view).sum(-1))[:, None]
     inside = np.concatenate([mirrored / np.maximum(shading, _DARKEST), share], -1)
     if result.specular_variation is not None:
         inside *= result.specular_variation[mask][:, None]

@@ -78,7 +78,7 @@ def mean_channel(image: np.ndarray) -> np.ndarray:
     -------
     (...) ndarray
     """
-    return (image[..., 0] + image[..., 1] + image[..., 2]) / 3
+    return total(image) / 3
 
 
 def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -95,7 +95,7 @@ def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     """
     blocks = (block.rows for block in row_blocks(where.shape))
     return np.concatenate(
-        [np.asarray(values[rows][where[rows]], float).mean(axis=1) for rows in blocks]
+        [mean_channel(np.asarray(values[rows][where[rows]], float)) for rows in blocks]
     )
 
 

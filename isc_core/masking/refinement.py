@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from ..imaging.guided_filter import affine_fit
 from ..imaging.resampling import resampled
-from ..imaging.srgb import linear_to_srgb
+from ..imaging.srgb import srgb_codes
 from ..photo.grabcut import Label, segmented
 from ..photo.masks import tidy_mask
 
@@ -30,21 +30,6 @@ _LINE = 5  # pixels: no point of the middle line lies less deep than others as n
 _BAND = 0.03  # of the part's longer side: as far off as the network's outline may be
 _ITERATIONS = 1
 _EPSILON = 1e-3  # of the guided filter, for sRGB codes in [0, 1]
-
-
-def coded(light: np.ndarray) -> np.ndarray:
-    """Return linear light as sRGB codes.
-
-    Parameters
-    ----------
-    light : (H, W, 3) ndarray
-        1 is white.
-
-    Returns
-    -------
-    (H, W, 3) uint8 ndarray
-    """
-    return np.asarray(np.rint(255 * np.clip(linear_to_srgb(np.clip(light, 0, 1)), 0, 1)), np.uint8)
 
 
 def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -67,7 +52,7 @@ def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarr
     height, width = cover.shape
     factor = min(1.0, SIDE / max(width, height))
     small = round(height * factor), round(width * factor)
-    codes = coded(resampled(light, small))
+    codes = srgb_codes(resampled(light, small))
     soft = soft_cover(codes, resampled(cover, small), _nearest(known, small))
     return resampled(soft, (height, width))
 

@@ -27,7 +27,7 @@ from scipy import ndimage
 from ..errors import InputError
 from ..imaging.minimum_cut import STEPS, minimum_cut, shifted
 from ..imaging.resampling import resampled
-from ..imaging.srgb import linear_to_srgb
+from ..imaging.srgb import srgb_codes
 from ..io.atomic import new_file, require_writable_file
 from ..io.decoders import MIN_SIDE
 from ..io.limits import USUAL, Limits
@@ -77,11 +77,7 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
         min(y + h + h // 2, height),
     )
     crop = image[top:bottom, left:right]
-    coded = (
-        crop
-        if crop.dtype == np.uint8
-        else np.rint(255 * np.clip(linear_to_srgb(crop), 0, 1)).astype(np.uint8)
-    )
+    coded = crop if crop.dtype == np.uint8 else srgb_codes(crop)
     cover = _solve(coded, (x - left, y - top, w, h), iterations)
     mask = np.zeros((height, width), bool)
     inside = cover[y - top : y - top + h, x - left : x - left + w] > 0.5

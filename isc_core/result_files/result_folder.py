@@ -184,8 +184,11 @@ def _write_maps(d: Decomposition, channels: Mapping[str, np.ndarray], folder: Pa
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:
-    sheet = np.asarray(contact_sheet(decomposition))
-    path.write_bytes(encode_png(sheet, _PREVIEW_COMPRESSION))
+    _write_sheet(contact_sheet(decomposition), path)
+
+
+def _write_sheet(sheet: Image.Image, path: Path) -> None:
+    path.write_bytes(encode_png(np.asarray(sheet), _PREVIEW_COMPRESSION))
 
 
 def _write_description(decomposition: Decomposition, built: MeshResult, path: Path) -> None:
@@ -276,7 +279,7 @@ def save_separation(
         if cover is not None:
             (partial / MASK).write_bytes(encoded_mask(cover))
         sheet = separation_sheet(separation, image, inside, title)
-        (partial / "preview.png").write_bytes(encode_png(np.asarray(sheet), _PREVIEW_COMPRESSION))
+        _write_sheet(sheet, partial / "preview.png")
 
 
 def require_writable_result(

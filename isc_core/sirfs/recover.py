@@ -280,9 +280,11 @@ class SolveInputs:
         def inside(values: np.ndarray) -> np.ndarray:
             return resample_inside(values, self.valid, factor)[0]
 
-        image, share = resample_inside(self.image, self.valid, factor)
+        _, share = resample_inside(self.valid, self.valid, factor)
         if factor > 1:
             image = enlarge_averages(self.image, self.valid, share.shape)
+        else:
+            image = inside(self.image)
         silhouette, photo = (
             resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
             for m in (self.silhouette, self.photo)
