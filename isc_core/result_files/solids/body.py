@@ -4,10 +4,14 @@ Problem: a photo shows one side. Turned, that sheet ends in the steps of its pix
 form is missing.
 
 Model: u is a membrane over the inside of the outline, lap u = -4 and u = 0 around, so that sqrt(u)
-is the height of a sphere over a disc. At the rim, where the surface turns away from the viewer, the
-last seen height z and the outline are sqrt(u) apart in depth:
+is the height of a sphere over a disc; near the outline, u follows it between the pixels (see
+`cross_section`). At the rim, where the surface turns away from the viewer, the last seen height z
+and the outline are sqrt(u) apart in depth:
 
     rim = z - ROUND sqrt(u),   continued inward by a membrane m without load.
+
+Heights of the last two pixels before the outline are at most rim + ROUND sqrt(u): seen from the
+side, the steps of the outermost pixels would be teeth.
 
 The back at a pixel is
 
@@ -36,6 +40,7 @@ import numpy as np
 from ..triangulation.adaptive_triangles import Triangulation
 from ..triangulation.renumbering import renumbered
 from .back import Back
+from .cross_section import between_pixels, cross_section, near_outline
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 from .rim import Rim
@@ -121,10 +126,11 @@ def make_body(
     sheet = outlined(smooth, known + _STEP * thin, cosine, triangles)
     # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
     around = _grown(core) & ~core
-    round_height = np.sqrt(np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0))
-    last = np.where(inside, known - ROUND * round_height, 0.0)
-    (last,) = smoothed_within((last,), surrounded(inside), _SMOOTH)
-    last[~inside] = 0.0
+    u = np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0)
+    section = cross_section(u)
+    u = between_pixels(u, smooth, section)
+    round_height = np.sqrt(u)
+    known, last = _rolled(known, round_height, inside, np.where(core, near_outline(smooth), 0))
     rows, columns = sheet.pixels.T
     heights = known[rows, columns]
     heights[sheet.inner :] = last[rows, columns][sheet.inner :]
@@ -146,9 +152,23 @@ def make_body(
     hidden = ~body.front & core[body.pixels[:, 0], body.pixels[:, 1]]
     outline = (np.arange(len(hidden)) < len(front))[hidden]
     body.texture[hidden] = folded_places(
-        np.square(round_height), body.places[hidden], body.pixels[hidden], outline
+        u, section, body.places[hidden], body.pixels[hidden], outline
     )
     return body
+
+
+def _rolled(
+    known: np.ndarray, round_height: np.ndarray, inside: np.ndarray, near: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The heights (H, W), rolled off to the outline, and the depth of the rim.
+
+    Without that the outermost pixels stand out by their distances to the outline, which their steps
+    change from pixel to pixel.
+    """
+    last = np.where(inside, known - ROUND * round_height, 0.0)
+    (last,) = smoothed_within((last,), surrounded(inside), _SMOOTH)
+    last[~inside] = 0.0
+    return known + near * np.minimum(last + ROUND * round_height - known, 0), last
 
 
 def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.ndarray:

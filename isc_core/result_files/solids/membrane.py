@@ -43,9 +43,9 @@ def membrane(inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: f
     """
     start = None
     if min(inside.shape) > _COARSEST:
-        known, weight = _blocks(np.where(around, values, 0.0)), _blocks(around)
+        known, weight = block_sums(np.where(around, values, 0.0)), block_sums(around)
         coarse_around = weight > 0
-        coarse_inside = (_blocks(inside) > 0) & ~coarse_around
+        coarse_inside = (block_sums(inside) > 0) & ~coarse_around
         means = known / np.maximum(weight, 1e-9)
         coarse = membrane(coarse_inside, coarse_around, means, 4 * load)
         start = enlarged(coarse, inside.shape, 2)
@@ -55,8 +55,18 @@ def membrane(inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: f
     return _relaxed(found, inside, load)
 
 
-def _blocks(plane: np.ndarray) -> np.ndarray:
-    """Sums over blocks of 2 x 2 pixels."""
+def block_sums(plane: np.ndarray) -> np.ndarray:
+    """Return sums over blocks of 2 x 2 pixels.
+
+    Parameters
+    ----------
+    plane : (H, W) ndarray
+
+    Returns
+    -------
+    (h, w) float64 ndarray
+        Half as large, rounded up.
+    """
     even = np.pad(plane.astype(np.float64), [(0, size % 2) for size in plane.shape])
     return np.asarray(even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2])
 

@@ -3,39 +3,41 @@
 Problem: seen along the view, the sides of a body are a fraction of a pixel wide. With the texture
 of the pixels in front of them they are streaks.
 
-Equation: the texture folds at the outermost pixels and runs back inside. With u the membrane whose
-root is the depth (`body`), and c = -d^2 u / dg^2 along its gradient g, limited to 2 (a ball) to 4
-(a bar), a point is r = |g| / c pixels from the axis, on an ellipse of half widths
+Equation: the texture folds at the outermost pixels and runs back inside. On the ellipse across the
+outline, of half width a (see `cross_section`), a point r pixels from the axis takes its texture
+from r' pixels, as far as its angle on the ellipse says:
 
-    a = sqrt(2 u / c + r^2)  across,   b = sqrt(c / 2) a  in depth.
+    r' = a (w x + (1 - w) sin(90 deg x)),   x = phi / (90 deg + e),   sin e = sqrt(1 / a),
 
-It takes its texture from the place that is as far from the axis as its angle on the ellipse says:
-
-    r' = a phi / (90 deg + e),   tan phi = r / sqrt(2 u / c),   sin e = sqrt(2 / a),
-
-where phi is 90 deg on the outline, and e more at the outermost pixels, which are one pixel from
-where u ends. On a ball this is the azimuthal equidistant projection of the back.
+where phi is 90 deg on the outline, and e more at the outermost pixels, which are half a pixel from
+it on average. On a ball, w = 1 is the azimuthal equidistant projection, which does not stretch, and
+w = 0 the orthographic one, in which the back is the mirror image of the front and the texture at
+the outline is stretched without end. In between, colours continue behind the outline, and what is
+printed beside it comes back further behind: 30 deg behind the outline r' is .79 a instead of .67.
 
 Citation: J. P. Snyder, "Map projections: a working manual", U.S. Geological Survey Professional
-Paper 1395 (1987), doi:10.3133/pp1395, section 25.
+Paper 1395 (1987), doi:10.3133/pp1395, sections 20 and 25.
 
-Limits: exact for ellipsoids of revolution and bars only. In the middle of the back the texture is
-1.6 times as large as in the photo, and what the photo shows comes back as its mirror image. Sides
-that are steep in front of the outline keep the photo's pixels. In narrow notches texture may come
-from a pixel or two outside.
+Limits: exact for ellipsoids of revolution and bars only. Texture behind the outline is up to 1 / w
+times as long as in the photo, and what the photo shows comes back as its mirror image. Sides that
+are steep in front of the outline keep the photo's pixels. In narrow notches texture may come from a
+pixel or two outside.
 """
 
 import numpy as np
 
-from .smoothing import smoothed_within, surrounded
+from .cross_section import CrossSection
 
-_BALL, _BAR = 2.0, 4.0  # -d^2 u / dg^2
 _THINNEST = 3.0  # pixels: the least a that e is taken for
-_SMOOTH = 6  # passes
+_EVEN = 0.4  # w
 
 
 def folded_places(
-    u: np.ndarray, places: np.ndarray, pixels: np.ndarray, outline: np.ndarray
+    u: np.ndarray,
+    section: CrossSection,
+    places: np.ndarray,
+    pixels: np.ndarray,
+    outline: np.ndarray,
 ) -> np.ndarray:
     """Return where vertices behind the visible pixels take their texture from.
 
@@ -43,6 +45,8 @@ def folded_places(
     ----------
     u : (H, W) ndarray
         The membrane, 0 outside of the body.
+    section : CrossSection
+        Of `u`.
     places : (V, 2) ndarray
         Row and column of each vertex.
     pixels : (V, 2) ndarray of int
@@ -56,37 +60,13 @@ def folded_places(
         Row and column.
     """
     rows, columns = pixels.T
-    toward, bend = (plane[rows, columns] for plane in _axis(u))
-    radius = np.hypot(*toward.T)
-    across = np.sqrt(2 * u[rows, columns] / bend + radius**2)
+    toward, bend, across = section.at(rows, columns)
     depth = np.where(outline, 0, np.sqrt(2 * u[rows, columns] / bend))
-    angle = np.pi / 2 + np.arcsin(np.sqrt(2 / np.maximum(across, _THINNEST)))
-    folded = across * np.arctan2(radius, depth) / angle
-    share = np.where(radius > 1e-9, 1 - folded / np.maximum(radius, 1e-9), 0)
-    return np.asarray(places + share[:, None] * toward)
-
-
-def _axis(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """From each pixel to the axis, (H, W, 2), and the limited bend c, (H, W).
-
-    Derivatives are those of pixels with all neighbours inside; smoothed, and continued to the rest.
-    """
-    at = np.pad(u, 1)
-
-    def near(down: int, right: int) -> np.ndarray:
-        return np.asarray(at[1 + down : len(at) - 1 + down, 1 + right : at.shape[1] - 1 + right])
-
-    sides = [near(*side) for side in ((1, 0), (-1, 0), (0, 1), (0, -1))]
-    down, right = (sides[0] - sides[1]) / 2, (sides[2] - sides[3]) / 2
-    twist = (near(1, 1) - near(1, -1) - near(-1, 1) + near(-1, -1)) / 4
-    along = (
-        down**2 * (sides[0] + sides[1] - 2 * u)
-        + 2 * down * right * twist
-        + right**2 * (sides[2] + sides[3] - 2 * u)
-    )
-    known = surrounded(u > 0)
-    down, right, along, square = smoothed_within(
-        (down, right, along, down**2 + right**2), known, _SMOOTH
-    )
-    bend = np.clip(-along / np.maximum(square, 1e-9), _BALL, _BAR)
-    return np.stack([down, right], -1) / bend[..., None], bend
+    across = np.maximum(across, depth)
+    radius = np.sqrt(across**2 - depth**2)
+    whole = np.pi / 2 + np.arcsin(np.sqrt(1 / np.maximum(across, _THINNEST)))
+    share = np.arctan2(radius, depth) / whole
+    folded = across * (_EVEN * share + (1 - _EVEN) * np.sin(np.pi / 2 * share))
+    # On the axis, where the direction is that of rounding errors, nothing moves.
+    length = np.maximum(np.maximum(np.hypot(*toward.T), radius), 1e-9)
+    return np.asarray(places + ((radius - folded) / length)[:, None] * toward)
