@@ -74,15 +74,18 @@ def turned_panels(
 
     def panel(name: str, yaw: float) -> Panel:
         texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
+
+        def painted(places: np.ndarray) -> np.ndarray:
+            column, row = places.T
+            layers = [
+                ndimage.map_coordinates(layer, (row, column), order=1, mode="nearest")
+                for layer in np.moveaxis(texture, -1, 0)
+            ]
+            return np.stack(layers, -1)
+
         room = 1 - 2 * MARGIN
-        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, closed=True)
-        covered = view.coverage > 0
-        color, (column, row) = np.zeros((SIDE, SIDE, 3)), view.values[covered].T
-        for channel in range(3):
-            color[covered, channel] = ndimage.map_coordinates(
-                texture[..., channel], (row, column), order=1, mode="nearest"
-            )
-        return Panel(gain * color, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
+        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, painted)
+        return Panel(gain * view.values, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
 
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(panel, names, (ANGLE, -ANGLE)))

@@ -9,16 +9,18 @@ Equation: the vertices are turned about the vertical axis and projected in paral
 on, [.] being the signed area, are not negative. Depth and values are sums of those of the vertices
 weighted by them, and of all triangles at a pixel the nearest is seen, of equally near ones the
 first. Each is tested at all pixel centres of its box. The picture is drawn twice as fine and
-averaged.
+averaged; where values are places in a texture, its colours are, for a mean of places of two
+surfaces is a place of neither.
 
 Citation: J. Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988,
 doi:10.1145/54852.378457; the depth buffer: E. Catmull, "A subdivision algorithm for computer
 display of curved surfaces", thesis, University of Utah, 1974.
 
-Limits: no perspective; values are interpolated linearly, without textures. Made for triangles of a
+Limits: no perspective; values are interpolated linearly. Made for triangles of a
 few pixels: a triangle costs as much as its box.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +58,7 @@ def turned_view(
     zoom: float,
     room: float = 1.0,
     closed: bool = False,
+    painted: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> View:
     """Draw a mesh that is turned about the vertical axis.
 
@@ -78,6 +81,8 @@ def turned_view(
         Share of the picture's side that the mesh may fill, in (0, 1].
     closed : bool
         Leave out what faces away: a closed mesh hides it.
+    painted : callable, optional
+        Of values (N, C), the colours (N, D) that are averaged in their place.
 
     Returns
     -------
@@ -93,12 +98,23 @@ def turned_view(
         a, b, c = points[faces, :2].transpose(1, 0, 2)
         faces = faces[_cross(b - a, c - a) < 0]  # rows count downward
     fine = _nearest(points, faces, values, _FINE * side)
+    if painted is not None:
+        fine = _painted(fine, painted)
     steps = [(row, column) for row in range(_FINE) for column in range(_FINE)]
     cells = np.zeros((side, side, fine.shape[2]))
     for row, column in steps:
         cells += fine[row::_FINE, column::_FINE]
     covered = np.rint(cells[..., -1])
     return View(cells[..., :-1] / np.maximum(covered, 1)[..., None], covered / _FINE**2)
+
+
+def _painted(fine: np.ndarray, painted: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    covered = fine[..., -1] > 0
+    colors = painted(fine[covered, :-1])
+    picture = np.zeros((*covered.shape, colors.shape[1] + 1))
+    picture[covered, :-1] = colors
+    picture[..., -1] = covered
+    return picture
 
 
 def _nearest(points: np.ndarray, faces: np.ndarray, values: np.ndarray, side: int) -> np.ndarray:
