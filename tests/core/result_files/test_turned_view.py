@@ -94,3 +94,21 @@ def test_triangles_without_area_are_nothing() -> None:
     vertices = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0]])
     view = turned_view(vertices, np.array([[0, 1, 2], [0, 0, 0]]), vertices, 0.0, SIDE, 1.0)
     assert not view.coverage.any() and not view.values.any()
+
+
+def test_colours_are_averaged_rather_than_places_in_the_texture() -> None:
+    """Where a square hides half of a pixel of another, the texture between their places is not
+    seen.
+    """
+    (far, faces), (near, _) = plane(), plane(size=31.0)
+    vertices = np.concatenate([far, near + (0, 0, 5)])
+    both = np.concatenate([faces, faces + 4])
+    places = np.repeat([[0.0], [2.0]], 4, axis=0)
+
+    def painted(places: np.ndarray) -> np.ndarray:
+        return np.where(np.abs(places - 1) < 0.5, 1.0, 0.0)
+
+    args = vertices, both, places, 0.0, SIDE, 1.0
+    between = np.abs(turned_view(*args).values - 1) < 0.5
+    assert between.any()
+    assert turned_view(*args, painted=painted).values.max() == 0
