@@ -289,25 +289,10 @@ def _settings_json(settings: Settings) -> dict[str, object]:
 
 
 def _versions() -> dict[str, str]:
+    """Versions of what computed: a package that is not loaded had no part in the result."""
     versions = {"isc": __version__, "python": platform.python_version()}
-    for package in _PACKAGES:
-        version = _version(package)
-        if version is not None:
-            versions[package] = version
-    return versions
-
-
-def _version(package: str) -> str | None:
-    """The version of a package; None if it is not installed. A loaded one need not be looked up."""
-    loaded = sys.modules.get(package)
-    if loaded is not None:
-        return str(loaded.__version__)
-    from importlib import metadata
-
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
+    loaded = ((package, sys.modules.get(package)) for package in _PACKAGES)
+    return versions | {package: str(one.__version__) for package, one in loaded if one}
 
 
 def _input_json(photo: Photo, name: str) -> dict[str, object]:
