@@ -173,24 +173,32 @@ def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.nda
     (H, W, D) float32 ndarray
     """
     rows, columns, channels = layer.shape
-    kernel_step = _step_of(weight)
-    kernel = np.rint(weight.astype(np.float64) / kernel_step).reshape(-1, weight.shape[2])
-    layer_step = _step_of(layer)
-    out = np.empty((rows, columns, weight.shape[2]), np.float32)
+    kernel_step, layer_step = _step_of(weight), _step_of(layer)
+    kernel = weight.reshape(-1, weight.shape[2]).astype(np.float64)
+    _to_multiples(kernel, kernel_step)
+    scale, out = layer_step * kernel_step, np.empty((rows, columns, weight.shape[2]), np.float32)
     height = max(1, _BLOCK_BYTES // (72 * channels * columns))
     for top in range(0, rows, height):
         count = min(height, rows - top)
         near = layer[max(top - 1, 0) : top + count + 1]
-        above, below = int(top == 0), int(top + count == rows)
-        block = np.pad(np.rint(near / layer_step), ((above, below), (1, 1), (0, 0)))
-        neighbourhoods = np.stack(
-            [block[i : i + count, j : j + columns] for i in range(3) for j in range(3)], axis=2
-        )
+        block, above = np.zeros((count + 2, columns + 2, channels), np.float32), int(top == 0)
+        block[above : above + len(near), 1:-1] = near
+        _to_multiples(block, layer_step)
+        neighbourhoods = np.empty((count, columns, 9, channels))
+        for k in range(9):
+            i, j = divmod(k, 3)
+            neighbourhoods[:, :, k] = block[i : i + count, j : j + columns]
         sums = neighbourhoods.reshape(-1, 9 * channels) @ kernel
-        out[top : top + count] = (sums * (layer_step * kernel_step) + bias).reshape(
-            count, columns, -1
-        )
+        sums *= scale
+        sums += bias
+        out[top : top + count] = sums.reshape(count, columns, -1)
     return out
+
+
+def _to_multiples(values: np.ndarray, step: float) -> None:
+    """Count values in whole steps, a power of two."""
+    values /= values.dtype.type(step)
+    np.rint(values, out=values)
 
 
 def _step_of(values: np.ndarray) -> float:
