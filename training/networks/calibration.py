@@ -137,7 +137,8 @@ def main() -> None:
     found = temperatures(network, (draw(rng) for _ in range(_BATCHES)))
     print(", ".join(f"{name} {value:.3f}" for name, value in zip(TEMPERATURES, found, strict=True)))
     with new_file(given.output) as temporary, temporary.open("wb") as file:
-        np.savez_compressed(file, **{**arrays, "temperatures": found})
+        # Not compressed: that saves a fourteenth of the bytes, and costs each command 30 ms.
+        np.savez(file, **{**arrays, "temperatures": found})
 
 
 if __name__ == "__main__":
