@@ -332,13 +332,16 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     radius = SIDE * (0.5 - MARGIN) * 0.9
     axis = (np.arange(SIDE) + 0.5 - SIDE / 2) / radius
     x, y = np.meshgrid(axis, -axis)
-    distance = np.hypot(x, y)
+    distance, color = np.hypot(x, y), np.zeros((SIDE, SIDE, 3), np.float32)
+    coverage = np.clip((1 - distance) * radius + 0.5, 0, 1).astype(np.float32)
+    seen = coverage > 0
+    x, y, distance = x[seen], y[seen], distance[seen]
     shrink = np.minimum(
         1, 1 / np.maximum(distance, 1e-9)
     )  # outside the outline: its normal, for the pixels that it crosses
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
-    color, coverage = np.exp(real_sh(normal) @ illumination), (1 - distance) * radius + 0.5
-    return color.astype(np.float32), np.clip(coverage, 0, 1).astype(np.float32)
+    color[seen] = np.exp(real_sh(normal) @ illumination)
+    return color, coverage
 
 
 def _relief(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
@@ -357,10 +360,8 @@ def _relief(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> 
         ],
         np.float32,
     )
-    key, fill_light = (
-        np.clip((normal @ light + 0.3) / 1.3, 0, 1) ** 1.5,
-        0.6 + 0.4 * normal[..., 1],
-    )  # an area light: a soft shadow edge
+    facing, fill_light = np.clip((normal @ light + 0.3) / 1.3, 0, 1), 0.6 + 0.4 * normal[..., 1]
+    key = facing * np.sqrt(facing)  # an area light: a soft shadow edge
     height = small["height"]
     tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
     base = (1 - tint) * low_tone + tint * high_tone
@@ -484,13 +485,15 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 def _picture(panel: Panel) -> Image.Image:
     """The panel on its card, blended in linear light."""
     covered = np.flatnonzero(panel.coverage)  # all around is the card alone
-    alpha = panel.coverage.ravel()[covered]
-    planes = []
+    alpha = panel.coverage.ravel().take(covered).astype(np.float32)
+    rest, planes = 1 - alpha, []
     for channel, card in enumerate(_CARD):
-        color = np.clip(panel.color[..., channel].ravel()[covered], 0, 1)
-        linear = alpha * color + (1 - alpha) * srgb_to_linear(card / 255.0)
+        linear = panel.color[..., channel].ravel().take(covered).astype(np.float32)
+        np.clip(linear, 0, 1, out=linear)
+        linear *= alpha
+        linear += rest * np.float32(srgb_to_linear(card / 255.0))
         plane = np.full(panel.coverage.shape, card, np.uint8)
-        plane.ravel()[covered] = srgb_codes(linear)
+        plane.reshape(-1)[covered] = srgb_codes(linear)
         planes.append(plane)
     return Image.fromarray(np.stack(planes, -1))
 

@@ -139,18 +139,19 @@ def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray])
     Panel
         In its own exposure.
     """
-    inside, normal = frame.coverage > 0, unit_normals(small["normal"])
+    inside = frame.coverage > 0
+    reflectance, light = small["reflectance"][inside], small["shading"][inside]
     direction, side = _other_side(d)
     tint = d.shading[d.mask].mean(axis=0, dtype=np.float64)
-    new = DirectionalLight(direction, np.pi * _KEY * tint, _FILL * tint).shading(normal)
-    before, after = (
-        float(luminance(small["reflectance"] * light)[inside].sum())
-        for light in (small["shading"], new)
-    )
-    diffuse = small["reflectance"] * new * (before / max(after, 1e-12))
-    color = diffuse + _highlights(d.brdf, frame, small, VIEW, direction)
+    rig = DirectionalLight(direction, np.pi * _KEY * tint, _FILL * tint)
+    diffuse = reflectance * rig.shading(unit_normals(small["normal"][inside]))
+    before = float(luminance(reflectance * light).sum())
+    diffuse *= before / max(float(luminance(diffuse).sum()), 1e-12)
+    color = _highlights(d.brdf, frame, small, VIEW, direction)
+    color[inside] += diffuse
+    color *= exposure(color[inside])
     return Panel(
-        exposure(color[inside]) * color,
+        color,
         frame.coverage,
         "Relit",
         f"key light from the {side}",
@@ -183,7 +184,7 @@ def _highlights(
     if fit is None or fit.alpha is None or not fit.lights:
         return layer
     lobe, inside = _lobe(fit), frame.coverage > 0
-    normal = unit_normals(small["normal"])[inside]
+    normal = unit_normals(small["normal"][inside])
     directions = np.stack([light.direction for light in fit.lights])
     strengths = np.stack([light.strength_light for light in fit.lights])
     present = radiance(lobe.model, normal, VIEW, DistantLights(directions, strengths))

@@ -95,12 +95,9 @@ class Frame:
         """
         if values.ndim == 3:
             return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
-        weight = self._weight
-        return np.where(
-            weight > 1e-3,
-            self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
-            0,
-        )
+        found = self._resized(np.where(self.mask, values, 0))
+        found *= self._gain
+        return found
 
     def place(self, x: float, y: float) -> tuple[float, float]:
         """Return where a place of the map is in the panel.
@@ -133,6 +130,11 @@ class Frame:
     @cached_property
     def _weight(self) -> np.ndarray:
         return self._resized(self.mask)
+
+    @cached_property
+    def _gain(self) -> np.ndarray:
+        """One over the weight; 0 outside the mask."""
+        return np.where(self._weight > 1e-3, 1 / np.maximum(self._weight, 1e-3), np.float32(0))
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
         first_row, end_row, first_column, end_column = self.box
@@ -168,13 +170,15 @@ def unit_normals(scaled: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    scaled : (N, N, 3) ndarray
+    scaled : (..., 3) ndarray
         As `Frame.scaled` gives them: shorter, and 0 outside the object.
 
     Returns
     -------
-    (N, N, 3) ndarray
+    (..., 3) ndarray
         (0, 0, 1) where they have no length.
     """
-    size = length(scaled)[..., None]
-    return np.where(size > 1e-6, scaled / np.maximum(size, 1e-6), (0.0, 0.0, 1.0))
+    size = length(scaled)
+    unit = scaled / np.maximum(size, 1e-6)[..., None]
+    unit[size <= 1e-6] = 0, 0, 1
+    return unit
