@@ -97,7 +97,7 @@ def decompose(
     settings.check()
     _check_used(settings, inputs, prior_set)
     _check_marks(settings, photo)
-    if not photo.image[photo.mask].any():
+    if _is_black(photo):
         raise InputError(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
         )
@@ -134,6 +134,12 @@ def decompose(
     if maps.mask.size > LARGE:
         give_back_memory()
     return result
+
+
+def _is_black(photo: Photo) -> bool:
+    """Whether the object has no light; in most photos, the first of its rows have."""
+    rows = (block.rows for block in row_blocks(photo.mask.shape))
+    return not any(photo.image[here][photo.mask[here]].any() for here in rows)
 
 
 def _working(photo: Photo, maps: Photo) -> Photo:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.channels import largest, smallest
+from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
@@ -152,7 +153,7 @@ def _photo(
     found = seen if isinstance(seen, FoundMask) else None
     mask = seen.mask if isinstance(seen, FoundMask) else seen
     check_mask(mask, f"{name if mask_raster is None else mask_name}: the mask")
-    _check_not_constant(raster.values[mask], f"{name}: every pixel inside the mask")
+    _check_not_constant(raster.values, f"{name}: every pixel inside the mask", mask)
     cover = None if found is None else found.cover
     if mask_from in ("alpha", "file"):
         cover = soft_cover(raster if mask_raster is None else mask_raster, mask)
@@ -243,14 +244,20 @@ def read_linear(
     return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
 
 
-def _check_not_constant(values: np.ndarray, what: str) -> None:
-    pixels = values.reshape(-1, values.shape[-1])
-    first, parts = pixels[0], (pixels[k : k + _TOGETHER] for k in range(0, len(pixels), _TOGETHER))
-    if all((part == first).all() for part in parts):  # in most photos, the first part differs
-        raise InputError(
-            f"{what} is {'the same' if first.any() else 'black'}: there is nothing to recover; use "
-            "another photo"
-        )
+def _check_not_constant(values: np.ndarray, what: str, mask: np.ndarray | None = None) -> None:
+    first = None
+    for block in row_blocks(values.shape, pixels=_TOGETHER):
+        part = values[block.rows] if mask is None else values[block.rows][mask[block.rows]]
+        part = part.reshape(-1, values.shape[-1])
+        if first is None and len(part):
+            first = part[0]
+        if len(part) and (part != first).any():  # in most photos, already in the first part
+            return
+    black = first is None or not first.any()
+    raise InputError(
+        f"{what} is {'black' if black else 'the same'}: there is nothing to recover; use another "
+        "photo"
+    )
 
 
 def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.ndarray:
