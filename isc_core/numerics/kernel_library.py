@@ -20,7 +20,6 @@ one uses the instructions of x86-64-v3, those of processors since 2013, the othe
 
 import ctypes
 import hashlib
-import operator
 import platform
 import sys
 from collections.abc import Callable, Sequence
@@ -119,14 +118,6 @@ def symbol(function: Callable[..., Any], version: int) -> str:
     return f"isc_{module.replace('.', '_')}_{function.__name__}_{version}"
 
 
-class _Whole:
-    """Converts what counts as an integer, also NumPy's, for ctypes."""
-
-    @staticmethod
-    def from_param(value: Any) -> ctypes.c_int64:
-        return ctypes.c_int64(operator.index(value))
-
-
 class _Truth:
     """Converts a Boolean, also NumPy's."""
 
@@ -135,7 +126,8 @@ class _Truth:
         return ctypes.c_uint8(bool(value))
 
 
-_SCALARS = {"i8": _Whole, "f4": ctypes.c_float, "f8": ctypes.c_double, "b1": _Truth}
+# (ctypes takes what counts as an integer, also NumPy's, and no fractions)
+_SCALARS = {"i8": ctypes.c_int64, "f4": ctypes.c_float, "f8": ctypes.c_double, "b1": _Truth}
 _RESULTS: dict[str, Any] = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
 
 
