@@ -297,11 +297,7 @@ class Minimisation:
     ) -> None:
         self.x, self._function, self._options = x, function, options
         self._memory = PairMemory(options.memory, x.size, x.dtype, algebra)
-        self._direction, self._start, self._old_gradient = (
-            np.empty_like(x),
-            np.empty_like(x),
-            np.empty_like(x),
-        )
+        self._direction = np.empty_like(x)
         self.loss = function(x, self._memory.gradient)
         self._losses, self._evaluations = [self.loss], 1
         self._settled = ""  # reason to stop, once there is one
@@ -343,7 +339,7 @@ class Minimisation:
         """Return why not to take another step, "" for no reason."""
         if self._settled:
             return self._settled
-        if float(np.abs(self._memory.gradient).max()) <= self._options.gradient_tolerance:
+        if _largest(self._memory.gradient) <= self._options.gradient_tolerance:
             return "gradient"
         if self._iterations >= self._options.iterations:
             return "iterations"
@@ -360,23 +356,24 @@ class Minimisation:
             if self._iterations
             else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
         )
-        np.copyto(self._start, self.x)
-        np.copyto(self._old_gradient, memory.gradient)
+        slot = memory.next_slot()
+        step_row, change = memory.vectors[slot], memory.vectors[memory.size + slot]
+        np.copyto(step_row, self.x)  # where the search starts; the step after it
+        np.copyto(change, memory.gradient)
         search = _Search(
-            self._function, self.x, self._start, self._direction, memory.gradient, options
+            self._function, self.x, step_row, self._direction, memory.gradient, options
         )
         step, self.loss = search.run(self.loss, slope, first)
         self._evaluations += search.evaluations
-        slot = memory.next_slot()
-        np.subtract(self.x, self._start, out=memory.vectors[slot])
-        np.subtract(memory.gradient, self._old_gradient, out=memory.vectors[memory.size + slot])
+        np.subtract(self.x, step_row, out=step_row)
+        np.subtract(memory.gradient, change, out=change)
         memory.refresh(slot)
         recent = self._losses[-options.loss_window :]
         settled = all(abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent)
         if len(recent) == options.loss_window and settled:
             self._settled = "loss"
         elif (
-            step * float(np.abs(self._direction).max()) < options.step_tolerance
+            step * _largest(self._direction) < options.step_tolerance
             or abs(recent[-1] - self.loss) < options.step_tolerance
         ):
             self._settled = "step"
@@ -462,7 +459,7 @@ class _Search:
                 if trial.slope * (high.step - low.step) >= 0:
                     high = low
                 low = trial
-            if width * float(np.abs(self._direction).max()) < o.step_tolerance:
+            if width * _largest(self._direction) < o.step_tolerance:
                 break
         return (trial.step, trial.loss) if trial is low else self._settle(low)
 
@@ -479,6 +476,11 @@ class _Search:
         """Return to the best point so far, which need not be the last one evaluated."""
         trial = self._try(best.step)
         return trial.step, trial.loss
+
+
+def _largest(vector: np.ndarray) -> float:
+    """The largest component, whatever its sign."""
+    return max(float(vector.max()), -float(vector.min()))
 
 
 def _cubic_minimum(a: _Trial, b: _Trial) -> float:
