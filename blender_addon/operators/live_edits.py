@@ -13,7 +13,6 @@ that are named after its interface.
 from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import partial
 from threading import Event
 from typing import Any
 
@@ -22,7 +21,6 @@ from bpy.app.handlers import persistent
 
 from ..datablocks.images import ImageFile
 from ..datablocks.provenance import KEY
-from ..scene.color_bake import edited_file
 from ..scene.material import shows_highlights
 from ..scene.material_edits import (
     PendingBake,
@@ -192,7 +190,7 @@ def _bake_when_idle() -> float | None:
 
 def _begin(pending: PendingBake) -> _RunningBake:
     stop, pool = Event(), ThreadPoolExecutor(1)
-    file = pool.submit(partial(edited_file, pending.source, pending.edit, stop.is_set))
+    file = pool.submit(pending.file, stop.is_set)
     pool.shutdown(wait=False)
     return _RunningBake(pending.state, stop, file)
 

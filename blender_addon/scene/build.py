@@ -49,9 +49,11 @@ from .copies import COPY, OBJECT, find_material
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import remember_mesh
 from .material import MaterialMaps, ensure_material
+from .material_edits import GlossBasis
 from .photo_highlights import forget_view
 from .placement import free_place
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
+from .specular_layer import recovered_light
 from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
 
@@ -261,10 +263,10 @@ def _place(
         variation=images.get("specular_variation"),
         normal=images.get("normal_map"),
         alpha=images.get("alpha"),
-        plain=images.get("plain_base_color"),
+        basis=_gloss_basis(result, images),
     )
     material = ensure_material(key, maps, prepared.specular)
-    _remove_unused(key, maps)
+    _remove_unused(key, images)
     is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
     obj = _ensure_object(key, collection, prepared, blocks.take_mesh(), material)
     if options.displacement:
@@ -435,14 +437,24 @@ def _ensure_camera_and_light(
     )
 
 
-def _remove_unused(key: str, maps: MaterialMaps) -> None:
+def _gloss_basis(result: ResultArrays, images: dict[str, bpy.types.Image]) -> GlossBasis | None:
+    if "plain_base_color" not in images:
+        return None
+    return GlossBasis(
+        images["plain_base_color"],
+        images["view_normal"],
+        recovered_light(result).numbers,
+        images.get("specular_variation"),
+    )
+
+
+def _remove_unused(key: str, images: dict[str, bpy.types.Image]) -> None:
     """Remove the textures of an earlier build that this one lacks: its mesh had fewer triangles, or
     a soft rim, or its material gloss.
     """
-    held = {"normal_map": maps.normal, "alpha": maps.alpha, "plain_base_color": maps.plain}
-    for role, image in held.items():
+    for role in ("normal_map", "alpha", "plain_base_color", "view_normal"):
         old = find_tagged(bpy.data.images, key, role)
-        if image is None and old is not None and old.users == 0:
+        if role not in images and old is not None and old.users == 0:
             bpy.data.images.remove(old)
 
 

@@ -1,7 +1,8 @@
 """Edited base colours as a texture.
 
 Equation: base colour = g v rotated(rho; hue, saturation), as the group "ISC Dichromatic" computes
-it, clipped at 1 and coded in 8 bits; see `dichromatic`.
+it, clipped at 1 and coded in 8 bits; see `dichromatic`. Where the gloss is edited, rho is the one
+under the edited `specular_layer`.
 
 Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
 saturation and value).
@@ -23,6 +24,7 @@ from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.io.png import decode_png
 
 from ..datablocks.images import SRGB, ImageFile, coded_file, own_file, scaled_file
+from .specular_layer import SpecularLayer, light_of_numbers, surface_of_codes
 
 UNCHANGED = 1e-6  # as in the group
 _ROWS = 32  # computed between two looks at whether to go on
@@ -89,6 +91,50 @@ class ColorSource:
             return None
         return (255 * self.pixels[::-1, :, :3] + 0.5).astype(np.uint8)
 
+    @property
+    def values(self) -> np.ndarray:
+        """(H, W, 3), row 0 at the top: codes, or linear values where the colors have none."""
+        if (codes := self.codes) is not None:
+            return codes
+        assert self.pixels is not None
+        return self.pixels[::-1, :, :3]
+
+
+@dataclass(frozen=True)
+class GlossEdit:
+    """An edit of the gloss above a base colour, and what the colour below follows from.
+
+    Attributes
+    ----------
+    level, roughness : float
+        As edited.
+    normals : bytes
+        The file of the object's coded normals, see `specular_layer`.
+    light : tuple of float
+        Numbers of its `RecoveredLight`.
+    variation : bytes
+        The file of the spatial factor of the level; b"" if that is one number.
+    """
+
+    level: float
+    roughness: float
+    normals: bytes
+    light: tuple[float, ...]
+    variation: bytes = b""
+
+    def layer(self) -> SpecularLayer | None:
+        """Compute the layer of the edited gloss.
+
+        Returns
+        -------
+        SpecularLayer or None
+            None without gloss.
+        """
+        variation = decode_png(self.variation)[..., 0] if self.variation else None
+        light = light_of_numbers(self.light)
+        surface = surface_of_codes(decode_png(self.normals), light, variation)
+        return surface.layer(self.level, self.roughness)
+
 
 def color_source(image: bpy.types.Image) -> ColorSource:
     """Return the colours of an image, without its pixels where its file is known.
@@ -109,7 +155,10 @@ def color_source(image: bpy.types.Image) -> ColorSource:
 
 
 def edited_file(
-    source: ColorSource, edit: ColorEdit, stopped: Callable[[], bool] = lambda: False
+    source: ColorSource,
+    edit: ColorEdit,
+    stopped: Callable[[], bool] = lambda: False,
+    gloss: GlossEdit | None = None,
 ) -> ImageFile | None:
     """Return edited colours; this may run in another thread.
 
@@ -121,25 +170,26 @@ def edited_file(
         Their edit.
     stopped : callable, optional
         Whether they are no longer needed.
+    gloss : GlossEdit, optional
+        The edit of the gloss above; then the colours are those without a layer above.
 
     Returns
     -------
     ImageFile or None
         PNG in sRGB; None if stopped.
     """
-    codes = source.codes
-    if codes is not None and edit.only_scales:
+    if gloss is None and edit.only_scales and (codes := source.codes) is not None:
         return None if stopped() else scaled_file(codes, edit.gain)
-    table = srgb_to_linear(np.arange(256) / 255)
-    given = codes if codes is not None or source.pixels is None else source.pixels[::-1, :, :3]
-    assert given is not None
+    given, layer = source.values, None if gloss is None else gloss.layer()
     edited = np.empty(given.shape, np.uint8)
     for top in range(0, len(given), _ROWS):
         if stopped():
             return None
-        rows = given[top : top + _ROWS]
-        colors = table[rows] if codes is not None else rows.astype(float)
-        edited[top : top + _ROWS] = srgb_codes(recolour_reflectance(colors, *edit.values))
+        rows = slice(top, top + _ROWS)
+        colors = _linear(given[rows])
+        if layer is not None:
+            colors = layer.rows_under(colors, top)
+        edited[rows] = srgb_codes(recolour_reflectance(colors, *edit.values))
     return coded_file(edited)
 
 
@@ -192,6 +242,13 @@ def linear_colors(image: bpy.types.Image) -> np.ndarray:
     """
     colors = _pixels(image)[..., :3].astype(float)
     return np.asarray(srgb_to_linear(colors)) if _is_coded(image) else colors
+
+
+def _linear(values: np.ndarray) -> np.ndarray:
+    """Linear colours of sRGB codes, or as they are."""
+    if values.dtype != np.uint8:
+        return values.astype(float)
+    return np.asarray(srgb_to_linear(np.arange(256) / 255)[values])
 
 
 def _pixels(image: bpy.types.Image) -> np.ndarray:

@@ -16,9 +16,11 @@ from ..datablocks.provenance import datablock_name, find_tagged, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .material_edits import (
     BASE_COLOR,
+    FITTED_GLOSS,
     LEVEL_FACTOR,
     OWN_LEVEL,
     SURFACE,
+    GlossBasis,
     bake_edits,
     begin_bake,
     dichromatic_node,
@@ -31,7 +33,6 @@ SpecularSource = Literal["lobe", "image", "none"]
 _EDITED = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Gloss Gain")
 # Values of the fit, the user's where they are no longer what the material stores of the fit.
 _FITTED = ("Specular Level", "Roughness")
-_FIT = "isc_fitted_gloss"
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,8 @@ class MaterialMaps:
         Tangent-space normal map.
     alpha : bpy.types.Image or None
         Opacity; None for an opaque object.
-    plain : bpy.types.Image or None
-        Base colour without a specular layer above; None if it is the same.
+    basis : GlossBasis or None
+        What the base colour under another gloss follows from; None without a specular layer.
     """
 
     base_color: bpy.types.Image
@@ -59,7 +60,7 @@ class MaterialMaps:
     variation: bpy.types.Image | None
     normal: bpy.types.Image | None
     alpha: bpy.types.Image | None = None
-    plain: bpy.types.Image | None = None
+    basis: GlossBasis | None = None
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     _set_values(material, group, specular, kept)
     if maps.specular is not None:
         material["isc_highlights"] = maps.specular
-    remember_base_colors(material, maps.base_color, maps.plain)
+    remember_base_colors(material, maps.base_color, maps.basis)
     if specular.source == "image":
         show_highlights(material)
     if bpy.app.background:
@@ -162,8 +163,8 @@ def _edited_values(material: bpy.types.Material) -> dict[str, float]:
     if node is None:
         return {}
     names = [name for name in _EDITED if name in node.inputs]
-    if _FIT in material:
-        fit = zip(_FITTED, material[_FIT], strict=True)
+    if FITTED_GLOSS in material:
+        fit = zip(_FITTED, material[FITTED_GLOSS], strict=True)
         names += [name for name, value in fit if node.inputs[name].default_value != value]
     return {name: node.inputs[name].default_value for name in names}
 
@@ -180,7 +181,7 @@ def _set_values(
         inputs[name].default_value = value
     if matte:
         inputs["Specular Level"].default_value = 0.0
-    material[_FIT] = [inputs[name].default_value for name in _FITTED]
+    material[FITTED_GLOSS] = [inputs[name].default_value for name in _FITTED]
     for name, value in kept.items():
         if not (matte and name == "Specular Level"):
             inputs[name].default_value = value

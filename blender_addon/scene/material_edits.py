@@ -9,13 +9,15 @@ then `bake_edits` writes the edited colours into a texture and links that. An un
 is the recovered texture itself.
 
 Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
-the specular layer (`specular_layer`); without, or while the photo's are shown, the plain one.
+the fitted specular layer (`specular_layer`); without, or while the photo's are shown, the plain
+one. Edits of the gloss are colour edits, too: under another gloss lies another base colour. Only
+the bake knows it: while such a slider moves, the last colour stays.
 
 Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
 exporters then see the unedited image, or none.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,13 +26,14 @@ import numpy as np
 
 from isc_core.shading.brdf.ggx import F0
 
-from ..datablocks.images import ImageFile, image_name, new_image
+from ..datablocks.images import ImageFile, image_name, new_image, own_file
 from ..datablocks.nodes import add_node
 from ..datablocks.provenance import KEY, ROLE, all_tagged, tag
 from .color_bake import (
     UNCHANGED,
     ColorEdit,
     ColorSource,
+    GlossEdit,
     color_source,
     edited_file,
     recolour_reflectance,
@@ -48,7 +51,10 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
 _UNDER_LAYER, _PLAIN = "isc_base_color", "isc_plain_base_color"
+_NORMALS, _LIGHT, _VARIATION = "isc_normals", "isc_light", "isc_variation"
+FITTED_GLOSS = "isc_fitted_gloss"  # of a material: level and roughness that `_UNDER_LAYER` is for
 _FORMER = "Specular Share"
+_GLOSS_MARK = "\n"  # before the gloss in the text of a state
 _EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
 
 
@@ -90,24 +96,50 @@ def surface_node(material: bpy.types.Material) -> bpy.types.Node | None:
     return node if node is not None and node.type == "BSDF_PRINCIPLED" else None
 
 
+@dataclass(frozen=True)
+class GlossBasis:
+    """What the base colour under another gloss than the fitted one follows from.
+
+    Attributes
+    ----------
+    plain : bpy.types.Image
+        Base colour without a specular layer above.
+    normals : bpy.types.Image
+        Coded normals, see `specular_layer`.
+    light : list of float
+        Numbers of the `RecoveredLight`.
+    variation : bpy.types.Image or None
+        Spatial factor of the specular level.
+    """
+
+    plain: bpy.types.Image
+    normals: bpy.types.Image
+    light: list[float]
+    variation: bpy.types.Image | None = None
+
+
 def remember_base_colors(
-    material: bpy.types.Material, under_layer: bpy.types.Image, plain: bpy.types.Image | None
+    material: bpy.types.Material, under_layer: bpy.types.Image, basis: GlossBasis | None
 ) -> None:
-    """Store the two base colours of a material: `apply_edits` shows the right one.
+    """Store the two base colours of a material, and what others follow from: `apply_edits` shows
+    the right one.
 
     Parameters
     ----------
     material : bpy.types.Material
         A local material of ISC.
     under_layer : bpy.types.Image
-        Under its specular layer.
-    plain : bpy.types.Image or None
-        Without that; None if it is the same.
+        Under its fitted specular layer.
+    basis : GlossBasis or None
+        None if it has no such layer.
     """
-    for name, image in ((_UNDER_LAYER, under_layer), (_PLAIN, plain)):
+    for name in (_UNDER_LAYER, _PLAIN, _NORMALS, _LIGHT, _VARIATION):
         material.pop(name, None)
-        if plain is not None:
-            material[name] = image
+    if basis is not None:
+        material[_UNDER_LAYER], material[_PLAIN] = under_layer, basis.plain
+        material[_NORMALS], material[_LIGHT] = basis.normals, basis.light
+        if basis.variation is not None:
+            material[_VARIATION] = basis.variation
 
 
 def apply_edits(material: bpy.types.Material) -> bool:
@@ -128,16 +160,18 @@ def apply_edits(material: bpy.types.Material) -> bool:
         return False
     _write_numbers(material, surface, group.inputs)
     _choose_base_color(material, group)
-    if _color_state(group) == material.get(_COLOR):
+    state, shown = _color_state(material, group), material.get(_COLOR)
+    if state == shown:
         return False
     if not _is_ours(surface.inputs["Base Color"], group):
         return False
     can_bake = _can_bake(material, group)
-    image = _find_edited(material, _color_state(group)) if can_bake else None
+    image = _find_edited(material, state) if can_bake else None
     if image is not None:
         _show_edited(material, surface, group, image)
         return False
-    _show_group(surface, group)
+    if not can_bake or shown is None or _without_gloss(shown) != _without_gloss(state):
+        _show_group(surface, group)
     return can_bake
 
 
@@ -153,11 +187,29 @@ class PendingBake:
         The recovered colours.
     edit : ColorEdit
         Their edit.
+    gloss : GlossEdit or None
+        The edit of the gloss above them.
     """
 
     state: str
     source: ColorSource
     edit: ColorEdit
+    gloss: GlossEdit | None = None
+
+    def file(self, stopped: Callable[[], bool] = lambda: False) -> ImageFile | None:
+        """Compute the colours, in any thread.
+
+        Parameters
+        ----------
+        stopped : callable, optional
+            Whether they are no longer needed.
+
+        Returns
+        -------
+        ImageFile or None
+            PNG in sRGB; None if stopped.
+        """
+        return edited_file(self.source, self.edit, stopped, self.gloss)
 
 
 def bake_edits(material: bpy.types.Material) -> None:
@@ -169,7 +221,7 @@ def bake_edits(material: bpy.types.Material) -> None:
         A local material of ISC; nothing changes where there is nothing to write.
     """
     pending = begin_bake(material)
-    if pending is not None and (file := edited_file(pending.source, pending.edit)) is not None:
+    if pending is not None and (file := pending.file()) is not None:
         finish_bake(material, pending.state, file)
 
 
@@ -192,11 +244,14 @@ def begin_bake(material: bpy.types.Material) -> PendingBake | None:
     if surface is None or group is None:
         return None
     tree, edit, target = material.node_tree, _color_edit(group.inputs), surface.inputs["Base Color"]
-    source, state = group.inputs["Base Color"], _color_state(group)
+    source, state = group.inputs["Base Color"], _color_state(material, group)
+    gloss = _gloss_edit(material, group)
     if not source.is_linked:
         color = recolour_reflectance(np.array(source.default_value[:3]), *edit.values)
         tree.links.remove(target.links[0])
         target.default_value = (*np.clip(color, 0, 1), 1.0)
+    elif gloss is not None:
+        return PendingBake(state, color_source(material[_PLAIN]), edit, gloss)
     elif not edit.changes_nothing:
         return PendingBake(state, color_source(source.links[0].from_node.image), edit)
     else:
@@ -269,7 +324,7 @@ def color_state(material: bpy.types.Material) -> str:
         Equal texts mean equal colours; "" without the node of the edits.
     """
     group = dichromatic_node(material)
-    return "" if group is None else _color_state(group)
+    return "" if group is None else _color_state(material, group)
 
 
 def forget_edits(material: bpy.types.Material) -> None:
@@ -330,13 +385,11 @@ def _choose_base_color(material: bpy.types.Material, group: bpy.types.Node) -> N
     """Without highlights of its own, the surface has the base colour without a layer above; images
     that the user has put in their place stay.
     """
-    names = ("Specular Level", "Specular Gain", "Photo Highlights")
-    level, gain, shown = (float(group.inputs[name].default_value) for name in names)
     under, plain = material.get(_UNDER_LAYER), material.get(_PLAIN)
     node = group.id_data.nodes.get(BASE_COLOR)
     if under is None or plain is None or node is None or node.type != "TEX_IMAGE":
         return
-    wanted = under if level * gain * (1 - shown) > 0 else plain
+    wanted = under if _gloss(group.inputs)[0] > 0 else plain
     if node.image in (under, plain) and node.image != wanted:
         node.image = wanted
 
@@ -351,7 +404,7 @@ def _color_edit(inputs: Any) -> ColorEdit:
     return ColorEdit(hue, saturation, value * gain * (1 - shown * share))
 
 
-def _color_state(group: bpy.types.Node) -> str:
+def _color_state(material: bpy.types.Material, group: bpy.types.Node) -> str:
     """What the edited colour depends on."""
     source = group.inputs["Base Color"]
     if not source.is_linked:
@@ -359,11 +412,43 @@ def _color_state(group: bpy.types.Node) -> str:
     else:
         image = getattr(source.links[0].from_node, "image", None)
         base = image.name if image is not None else "nodes"
-    return " ".join(f"{value:.6f}" for value in _color_edit(group.inputs).values) + f" {base}"
+    gloss = _edited_gloss(material, group)
+    parts = (_color_edit(group.inputs).values, () if gloss is None else gloss)
+    colors, above = (" ".join(f"{value:.6f}" for value in part) for part in parts)
+    return f"{colors} {base}" + (_GLOSS_MARK + above if above else "")
 
 
-def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> None:
-    """Write what has changed since the last time: the BSDF's own fields can be edited, too."""
+def _without_gloss(state: str) -> str:
+    return state.partition(_GLOSS_MARK)[0]
+
+
+def _edited_gloss(
+    material: bpy.types.Material, group: bpy.types.Node
+) -> tuple[float, float] | None:
+    """Edited level and roughness, where the base colour has to follow the edit."""
+    source, fitted = group.inputs["Base Color"], material.get(FITTED_GLOSS)
+    images = [material.get(name) for name in (_UNDER_LAYER, _PLAIN, _NORMALS)]
+    if not source.is_linked or fitted is None or None in images:
+        return None
+    if getattr(source.links[0].from_node, "image", None) != images[0]:
+        return None
+    edited = _gloss(group.inputs)
+    is_as_fitted = np.abs(np.subtract(list(fitted), edited)).max() <= UNCHANGED
+    return None if is_as_fitted else edited
+
+
+def _gloss_edit(material: bpy.types.Material, group: bpy.types.Node) -> GlossEdit | None:
+    """None also where the user has painted on the base colour."""
+    gloss = _edited_gloss(material, group)
+    if gloss is None or not own_file(material[_UNDER_LAYER]):
+        return None
+    normals, variation = own_file(material[_NORMALS]), material.get(_VARIATION)
+    varies = b"" if variation is None else own_file(variation)
+    return GlossEdit(*gloss, normals, tuple(material[_LIGHT]), varies) if normals else None
+
+
+def _gloss(inputs: Any) -> tuple[float, float]:
+    """Level and roughness with all edits; no level while the photo's highlights are shown."""
     level, gain, roughness, gloss, shown = (
         float(inputs[name].default_value)
         for name in (
@@ -374,7 +459,13 @@ def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> N
             "Photo Highlights",
         )
     )
-    wanted = [refraction(level * gain * (1 - shown)), min(1.0, roughness / max(gloss, 1e-3))]
+    return level * gain * (1 - shown), min(1.0, roughness / max(gloss, 1e-3))
+
+
+def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> None:
+    """Write what has changed since the last time: the BSDF's own fields can be edited, too."""
+    level, roughness = _gloss(inputs)
+    wanted = [refraction(level), roughness]
     written = material.get(_NUMBERS)
     if written is None or abs(written[0] - wanted[0]) > UNCHANGED:
         surface.inputs["IOR"].default_value = wanted[0]

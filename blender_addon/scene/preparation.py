@@ -4,7 +4,7 @@ images.
 Nothing here touches a datablock, so it may run in another thread while the window is used.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from .camera import eye_of
 from .displacement import displacement_map, flatten
 from .hand_edits import checksum_of
 from .material import SpecularSettings, SpecularSource
-from .specular_layer import SpecularLayer, specular_layer
+from .specular_layer import SpecularLayer, coated_surface, coded_normals
 
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
@@ -159,12 +159,13 @@ def prepare(
     specular = _specular_settings(result, options)
     files = map_files(result, options.all_maps)
     files["environment_map"] = map_file(result.environment_map, COLOR)
-    layer = None
-    if options.specular_from != "none":
-        layer = specular_layer(result, specular.level / _peak(result), specular.roughness)
+    surface = coated_surface(result)
+    is_matt = options.specular_from == "none"
+    layer = None if is_matt else surface.layer(specular.level, specular.roughness)
     files["base_color"] = _base_color(result, layer)
     if layer is not None:
         files["plain_base_color"] = _base_color(result, None)
+        files["view_normal"] = replace(coded_file(coded_normals(surface.normal)), space=DATA)
     if result.specular_variation is not None:
         values = result.specular_variation / _peak(result)
         files["specular_variation"] = texture_file(values, DATA)

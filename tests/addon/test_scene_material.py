@@ -143,14 +143,14 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     """The lobe is that of the fit; of the diffuse light it takes a share that grows sideways."""
-    from blender_addon.scene.specular_layer import specular_layer
+    from blender_addon.scene.specular_layer import coated_surface
 
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
     built = build(replace(result, specular_level=1.0, roughness=0.45))
     lamp(built, direction)
     here = inside(result)
     layers = render(built.scene, tmp_path, samples=16)
-    layer = specular_layer(result, 1.0, 0.45)
+    layer = coated_surface(result).layer(1.0, 0.45)
     assert layer is not None
     under = layer.color_under(result.base_color) * (1 - layer.effect[..., 3:])
     lambert = under[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
@@ -213,9 +213,9 @@ def test_the_object_looks_as_without_a_specular_layer(
 def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
     result: ResultArrays, sharper: int
 ) -> None:
-    from blender_addon.scene.specular_layer import specular_layer
+    from blender_addon.scene.specular_layer import coated_surface
 
-    layer, (rows, columns) = specular_layer(result, 1.0, 0.3), result.mask.shape
+    layer, (rows, columns) = coated_surface(result).layer(1.0, 0.3), result.mask.shape
     assert layer is not None
     codes = np.full((sharper * rows, sharper * columns, 3), (200, 120, 40), np.uint8)
     under = layer.codes_under(codes)
@@ -282,6 +282,70 @@ def test_an_edited_color_is_an_image_and_an_unedited_one_the_original(
     assert color.links[0].from_node.image == original
     assert not built.material.node_tree.nodes.get(EDITED)
     assert "edited_base_color" not in [image.get("isc_role") for image in blender.data.images]
+
+
+def base_color_image(built: Any) -> Any:
+    return surface(built).inputs["Base Color"].links[0].from_node.image
+
+
+@pytest.mark.parametrize("varies", [False, True])
+def test_the_base_color_follows_the_gloss(blender: Any, result: ResultArrays, varies: bool) -> None:
+    """It is that of an object whose fit has the edited gloss; with the fitted gloss again, it is
+    what it was.
+    """
+    from blender_addon.scene.material_edits import apply_edits
+
+    def fitted(level: float, roughness: float, name: str) -> Any:
+        variation = 0.5 * result.confidence + 0.25 if varies else None
+        found = {"specular_level": level, "roughness": roughness, "specular_variation": variation}
+        return build(replace(result, **found), name=name)
+
+    def codes(image: Any) -> np.ndarray:
+        return 255 * pixels(image)[..., :3]
+
+    built = fitted(0.8, 0.4, "edited")
+    under, plain = base_color_image(built), built.material["isc_plain_base_color"]
+    for gain, gloss in ((0.2, 1.0), (3.0, 1.0), (1.0, 0.5), (1.5, 2.0)):
+        edit(built, Specular_Gain=gain, Gloss_Gain=gloss)
+        wanted = base_color_image(fitted(0.8 * gain, 0.4 / gloss, "wanted"))
+        off = np.abs(codes(base_color_image(built)) - codes(wanted))
+        assert off.max() < 2.5 and off.mean() < 0.45
+        assert np.abs(codes(wanted) - codes(under)).mean() > 1
+    shown = base_color_image(built)
+    group_node(built).inputs["Gloss Gain"].default_value = 0.7
+    assert apply_edits(built.material) and base_color_image(built) == shown, (
+        "while the slider moves, the last colour stays"
+    )
+    edit(built, Specular_Gain=0.0)
+    assert base_color_image(built) == plain
+    edit(built, Specular_Gain=1.0, Gloss_Gain=1.0)
+    assert base_color_image(built) == under
+    under.pixels.foreach_set(np.full(4 * under.size[0] * under.size[1], 0.5, np.float32))
+    edit(built, Specular_Gain=0.5)
+    assert base_color_image(built) == under, "what has been painted on it stays"
+
+
+@pytest.mark.parametrize(
+    ("change", "most"), [({"Specular_Gain": 0.25}, 0.5), ({"Gloss_Gain": 0.5}, 0.9)]
+)
+def test_an_object_of_less_gloss_looks_as_without(
+    blender: Any, result: ResultArrays, tmp_path: Path, change: dict[str, float], most: float
+) -> None:
+    here, fitted = inside(result), replace(result, specular_level=1.0, roughness=0.4)
+    built = build(fitted, name="b")
+    under = base_color_image(built)
+
+    def seen(built: Any) -> np.ndarray:
+        layers = render(built.scene, tmp_path, samples=64)
+        return np.asarray(layers["Combined"][here][:, :3])
+
+    plain = seen(build(fitted, specular_from="none", name="a"))
+    edit(built, **change)
+    followed = seen(built)
+    surface(built).inputs["Base Color"].links[0].from_node.image = under
+    left = seen(built)
+    error, before = (np.sqrt(np.square(one / plain - 1).mean()) for one in (followed, left))
+    assert error < most * before
 
 
 def test_own_nodes_and_animated_edits_are_left_alone(blender: Any, result: ResultArrays) -> None:
