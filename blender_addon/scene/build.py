@@ -38,6 +38,7 @@ from ..datablocks.provenance import (
 from ..datablocks.staging import StagedBlocks, completed, stage
 from ..files.result_arrays import ResultArrays
 from .camera import ensure_camera, set_background_photo, set_render_size
+from .coated_surface import recovered_light
 from .collection import (
     ensure_collection,
     ensure_optional_part,
@@ -53,7 +54,6 @@ from .material_edits import GlossBasis
 from .photo_highlights import forget_view
 from .placement import free_place
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
-from .specular_layer import recovered_light
 from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
 

@@ -2,7 +2,7 @@
 
 Equation: base colour = g v rotated(rho; hue, saturation), as the group "ISC Dichromatic" computes
 it, clipped at 1 and coded in 8 bits; see `dichromatic`. Where the gloss is edited, rho is the one
-under the edited `specular_layer`.
+under the edited specular layer, see `isc_core.shading.specular_layer`.
 
 Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
 saturation and value).
@@ -22,9 +22,10 @@ import numpy as np
 
 from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.io.png import decode_png
+from isc_core.shading.specular_layer import SpecularLayer
 
 from ..datablocks.images import SRGB, ImageFile, coded_file, own_file, scaled_file
-from .specular_layer import SpecularLayer, light_of_numbers, surface_of_codes
+from .coated_surface import light_of_numbers, surface_of_codes
 
 UNCHANGED = 1e-6  # as in the group
 _ROWS = 32  # computed between two looks at whether to go on
@@ -109,7 +110,7 @@ class GlossEdit:
     level, roughness : float
         As edited.
     normals : bytes
-        The file of the object's coded normals, see `specular_layer`.
+        The file of the object's coded normals, see `coated_surface`.
     light : tuple of float
         Numbers of its `RecoveredLight`.
     variation : bytes

@@ -27,11 +27,11 @@ from typing import Any
 import bpy
 
 from isc_core.shading.brdf.ggx import F0
+from isc_core.shading.specular_layer import MOST
 
 from ..datablocks.nodes import add_node, connect
 
 VERSION = 4
-MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
 
 

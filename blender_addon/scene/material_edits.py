@@ -9,9 +9,9 @@ then `bake_edits` writes the edited colours into a texture and links that. An un
 is the recovered texture itself.
 
 Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
-the fitted specular layer (`specular_layer`); without, or while the photo's are shown, the plain
-one. Edits of the gloss are colour edits, too: under another gloss lies another base colour. Only
-the bake knows it: while such a slider moves, the last colour stays.
+the fitted specular layer (`isc_core.shading.specular_layer`); without, or while the photo's are
+shown, the plain one. Edits of the gloss are colour edits, too: under another gloss lies another
+base colour. Only the bake knows it: while such a slider moves, the last colour stays.
 
 Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
 exporters then see the unedited image, or none.
@@ -25,6 +25,7 @@ import bpy
 import numpy as np
 
 from isc_core.shading.brdf.ggx import F0
+from isc_core.shading.specular_layer import MOST
 
 from ..datablocks.images import ImageFile, image_name, new_image, own_file
 from ..datablocks.nodes import add_node
@@ -38,7 +39,7 @@ from .color_bake import (
     edited_file,
     recolour_reflectance,
 )
-from .dichromatic import DICHROMATIC, MOST
+from .dichromatic import DICHROMATIC
 
 SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Principled BSDF",
@@ -105,7 +106,7 @@ class GlossBasis:
     plain : bpy.types.Image
         Base colour without a specular layer above.
     normals : bpy.types.Image
-        Coded normals, see `specular_layer`.
+        Coded normals, see `coated_surface`.
     light : list of float
         Numbers of the `RecoveredLight`.
     variation : bpy.types.Image or None

@@ -10,6 +10,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.result_files.solids.back import Back
+from isc_core.shading.specular_layer import SpecularLayer
 
 from ..datablocks.images import (
     COLOR,
@@ -25,10 +26,10 @@ from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arr
 from ..files.result_arrays import ResultArrays
 from .body import body_geometry
 from .camera import eye_of
+from .coated_surface import coated_surface, coded_normals
 from .displacement import displacement_map, flatten
 from .hand_edits import checksum_of
 from .material import SpecularSettings, SpecularSource
-from .specular_layer import SpecularLayer, coated_surface, coded_normals
 
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}

@@ -11,7 +11,8 @@ pickles) holds what such a program needs, float32 unless stated otherwise:
     vertex_normals (V, 3)
     uv (V, 2)                    v counts from the BOTTOM of the texture
     vertex_pixel (V, 2) int32    row and column of each vertex
-    base_color (H, W, 3)         linear, k * reflectance, continued beyond the mask; not clipped
+    base_color (H, W, 3)         linear, k * reflectance, continued beyond the mask; not clipped;
+                                 without gloss above, unlike that of mesh files
     normal_map (H, W, 3)         tangent space, green up, [0, 1] stands for [-1, 1]
     reflectance_scale ()         k
     metres_per_pixel ()          size of the mesh
@@ -132,10 +133,32 @@ def mesh_of(
         If the mask is too small for a mesh.
     """
     if gloss is not None:
-        return replace(_surface_of(d, options, cover), gloss=gloss)
+        return _coated(d, _surface_of(d, options, cover), gloss)
     with ThreadPoolExecutor(1) as aside:  # half of the work
         found = aside.submit(bounded_specular, d)
-        return replace(_surface_of(d, options, cover), gloss=found.result())
+        return _coated(d, _surface_of(d, options, cover), found.result())
+
+
+def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResult:
+    """The mesh with its gloss, and with the light that this mirrors, if any."""
+    if not gloss.specular:
+        return replace(built, gloss=gloss)
+    from ..shading.environment_map import environment_from_shading, resampled
+    from ..shading.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
+
+    if d.environment is None:
+        light = environment_from_shading(d.illumination, ENVIRONMENT_ROWS, viewer=d.viewer)
+    else:
+        light = resampled(d.environment, ENVIRONMENT_ROWS)
+    variation, k = gloss.variation, built.reflectance_scale
+    coated = CoatedSurface(
+        np.where(d.mask[..., None], d.normal, 0),
+        d.shading / k,
+        light / k,
+        d.view,
+        None if variation is None else variation / variation.max(),
+    )
+    return replace(built, gloss=gloss, coated=coated)
 
 
 def _surface_of(

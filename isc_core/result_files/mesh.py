@@ -26,7 +26,8 @@ and on a steep rim each step of one pixel sideways would be a tooth of many pixe
 Base colour: k * reflectance, with k such that the 99.5th percentile of the reflectance's largest
 channel becomes 0.9; the matching light is the recovered one divided by k, that is log shading - log
 k. Beyond the mask the texture repeats the nearest colour inside, so that filtering draws no dark
-fringe.
+fringe. Textures of files have the base colour under the gloss of the same file, see
+`shading.specular_layer`; `MeshResult.base_color` is that without gloss.
 
 Gloss: roughness and specular level are given (see `lobe_fitting.specular_upper_bound`), the level
 times k, as the base colour is. A level up to 1, and its variation over the object in a texture's
@@ -61,6 +62,7 @@ from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
+from ..shading.specular_layer import CoatedSurface
 from .glb import TexturedMesh, Veil, encode_glb
 from .mesh_options import MeshOptions
 from .object_cover import ObjectCover
@@ -105,7 +107,7 @@ class MeshResult:
     vertex_pixel : (V, 2) ndarray
         Row and column of each vertex.
     base_color : (H, W, 3) ndarray
-        Linear, k * reflectance, continued beyond the mask.
+        Linear, k * reflectance, continued beyond the mask; without gloss above.
     detail : (H, W, 3) ndarray
         Unit vectors of the normal map in tangent space.
     options : MeshOptions
@@ -118,6 +120,8 @@ class MeshResult:
         Finer base colour in sRGB codes, over the same frame.
     cover : ObjectCover or None
         That the outline follows; None for the steps of the pixels.
+    coated : CoatedSurface or None
+        What the base colour under the gloss follows from; None leaves it as it is.
     """
 
     mesh: TexturedMesh
@@ -134,6 +138,7 @@ class MeshResult:
     eye: np.ndarray | None = None
     texture: np.ndarray | None = None
     cover: ObjectCover | None = None
+    coated: CoatedSurface | None = None
 
     @property
     def bumpy(self) -> bool:
@@ -165,8 +170,26 @@ class MeshResult:
 
     @property
     def base_color_codes(self) -> np.ndarray:
-        """The base colour in sRGB codes, (h, w, 3) uint8: the finer one where there is one."""
-        return color_codes(self.base_color) if self.texture is None else self.texture
+        """The base colour under the gloss in sRGB codes, (h, w, 3) uint8: the finer one where there
+        is one.
+        """
+        layer = None
+        if self.coated is not None and self.has_layer:
+            layer = self.coated.layer(self.specular * self._largest_variation, self.roughness)
+        if self.texture is not None:
+            return self.texture if layer is None else layer.codes_under(self.texture)
+        color = self.base_color if layer is None else layer.color_under(self.base_color)
+        return color_codes(color)
+
+    @property
+    def has_layer(self) -> bool:
+        """Whether the base colour is one under gloss."""
+        return self.coated is not None and self.specular > 0
+
+    @property
+    def _largest_variation(self) -> float:
+        variation = self.gloss.variation
+        return 1.0 if variation is None else float(variation.max())
 
     @property
     def specular(self) -> float:
@@ -231,8 +254,7 @@ class MeshResult:
 
     def _specular_extension(self, first_texture: int) -> tuple[dict[str, Any], list[bytes]]:
         """KHR_materials_specular of the material, and the texture that it refers to, if any."""
-        variation = self.gloss.variation
-        largest = 1.0 if variation is None else float(variation.max())
+        variation, largest = self.gloss.variation, self._largest_variation
         level = self.specular * largest
         extension: dict[str, Any] = {"specularFactor": min(level, 1.0)}
         if level > 1:
@@ -249,6 +271,7 @@ class MeshResult:
             "metres_per_pixel": self.metres_per_pixel,
             "origin": {"column": self.origin[0], "row": self.origin[1], "height": self.origin[2]},
             "stride": self.stride,
+            "base_color": "k * reflectance" + (" under the gloss" if self.has_layer else ""),
             "vertices": len(self.mesh.vertices),
             "faces": len(self.mesh.faces),
             "roughness": {

@@ -143,7 +143,7 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     """The lobe is that of the fit; of the diffuse light it takes a share that grows sideways."""
-    from blender_addon.scene.specular_layer import coated_surface
+    from blender_addon.scene.coated_surface import coated_surface
 
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
     built = build(replace(result, specular_level=1.0, roughness=0.45))
@@ -213,7 +213,7 @@ def test_the_object_looks_as_without_a_specular_layer(
 def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
     result: ResultArrays, sharper: int
 ) -> None:
-    from blender_addon.scene.specular_layer import coated_surface
+    from blender_addon.scene.coated_surface import coated_surface
 
     layer, (rows, columns) = coated_surface(result).layer(1.0, 0.3), result.mask.shape
     assert layer is not None
@@ -231,7 +231,7 @@ def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
 
 def test_at_most_half_of_a_color_is_the_mirrored_environment(result: ResultArrays) -> None:
     """Little is taken off as it is, much no further than to the half; in each channel."""
-    from blender_addon.scene.specular_layer import SpecularLayer
+    from isc_core.shading.specular_layer import SpecularLayer
 
     effect = np.zeros((1, 3, 4), np.float32)
     effect[0, :, :3] = np.array([[0.0], [0.01], [10.0]])
@@ -397,7 +397,7 @@ def mirror(blender: Any) -> Any:
 def test_the_share_is_that_of_blenders_layers(
     blender: Any, mirror: Any, tmp_path: Path, level: float, roughness: float
 ) -> None:
-    from blender_addon.scene.specular_layer import specular_share
+    from isc_core.shading.specular_layer import specular_share
 
     mirror["Specular IOR Level"].default_value = 0.5 * level
     mirror["Roughness"].default_value = roughness

@@ -8,7 +8,8 @@ together, on a flat sheet with the photo's proportions. Base colour, roughness, 
 occlusion serve the mesh, too (its texture coordinates are those of the photo), with `mesh_normal`
 in place of `normal`, which is written where the mesh needs one.
 
-    basecolor             sRGB, 8 bits: k * reflectance as in the mesh; alpha is the object's cover
+    basecolor             sRGB, 8 bits: k * reflectance under the gloss, as in the mesh; alpha is
+                          the object's cover
     normal, mesh_normal   (n + 1) / 2, 8 bits; green upward (OpenGL) or downward (DirectX)
     roughness             8 bits, linear as all that follow
     specular              8 bits; .5 is plastic, f0 = .08 * specular = .04
@@ -248,7 +249,7 @@ def _description(
     d: Decomposition, layers: _Layers, target: str, textures: list[str], name: str
 ) -> dict[str, Any]:
     built = layers.built
-    gloss = built.describe()
+    described = built.describe()
     return {
         "target": target,
         "photo": d.provenance.input.get("name", ""),
@@ -261,10 +262,11 @@ def _description(
         "metres_per_pixel": built.metres_per_pixel,
         "height": {"metres_at_0": 0.0, "metres_at_65535": layers.highest},
         "reflectance_scale": built.reflectance_scale,
+        "basecolor": described["base_color"],
         "roughness": {"value": layers.roughness_value, "source": layers.roughness_source},
         "specular": {
             "value": PLASTIC * built.specular,
-            "source": gloss["specular"]["source"],
+            "source": described["specular"]["source"],
             "convention": "f0 = .08 * specular",
         },
         "metallic": 0.0,

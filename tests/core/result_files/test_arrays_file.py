@@ -16,8 +16,8 @@ from isc_core.cli.main import main
 from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.lobe_fitting.specular_level import fitted_specular
-from isc_core.result_files.arrays_file import ARRAYS, arrays_of
-from isc_core.result_files.mesh import MeshResult, build_mesh
+from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of
+from isc_core.result_files.mesh import MeshResult, build_mesh, color_codes
 from isc_core.result_files.mesh_options import MeshOptions
 from isc_core.result_files.result_folder import load, require_room, save
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
@@ -175,6 +175,27 @@ def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
         and np.isnan(arrays["specular_level"])
         and not arrays["lobe"].any()
     )
+
+
+@pytest.mark.slow
+def test_files_have_the_base_color_under_their_gloss_and_arrays_the_plain_one() -> None:
+    """Under the recovered light what is below the layer is darker by what that mirrors."""
+    d = glossy()
+    built = mesh_of(d)
+    layer = built.coated.layer(built.specular, built.roughness) if built.coated else None
+    assert layer is not None and built.describe()["base_color"].endswith("under the gloss")
+    plain, under = color_codes(built.base_color), built.base_color_codes
+    np.testing.assert_array_equal(under, color_codes(layer.color_under(built.base_color)))
+    facing = d.mask & (d.normal[..., 2] > 0.6)
+    assert under[facing].mean() < plain[facing].mean() - 0.5
+    np.testing.assert_array_equal(
+        arrays_of(d, built)["base_color"], built.base_color.astype(np.float32)
+    )
+    matt = replace(built, gloss=replace(built.gloss, specular=0.0))
+    np.testing.assert_array_equal(matt.base_color_codes, plain)
+    assert matt.describe()["base_color"] == "k * reflectance"
+    finer = replace(built, texture=np.repeat(np.repeat(plain, 2, 0), 2, 1))
+    assert np.abs(finer.base_color_codes[::2, ::2].astype(int) - under)[facing].max() <= 4
 
 
 @pytest.mark.slow

@@ -1,9 +1,9 @@
-"""The base colour under the specular layer of a Principled BSDF.
+"""The base colour under the specular layer of a renderer's surface.
 
 Problem: the recovered base colour rho explains the photo's diffuse image without a layer above it.
-Blender's Principled BSDF gives the diffuse layer only what the specular one does not reflect, and
-adds what that one mirrors of the recovered environment. This broad reflection is in the diffuse
-image already: a separator finds highlights. The object would be too bright in most places.
+Renderers give the diffuse layer only what the specular one does not reflect, and add what that one
+mirrors of the recovered environment. This broad reflection is in the diffuse image already: a
+separator finds highlights. The object would be too bright in most places.
 
 Equation: seen at the angle t, the specular layer reflects the share E(t), its directional albedo:
 GGX with Fresnel's equations for the index of refraction whose reflectance along the normal is
@@ -19,38 +19,26 @@ smoothly, in each channel:  b (1 - E) = rho (1 + exp(-2 M / (rho S))) / 2.
 Citation: the layering is that of B. Burley, "Extending the Disney BRDF to a BSDF with integrated
 subsurface scattering", SIGGRAPH 2015 courses (no DOI).
 
-Where the gloss is edited, b is computed anew, as if the fit had found the edited gloss. For that
-the file keeps the normals, and the light as numbers.
-
 Limits: right in the photo's light and view. Light that is reflected between facets is left out.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from isc_core.imaging.row_blocks import row_blocks
-from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
-from isc_core.imaging.upsampling import enlarged
-from isc_core.inpainting.pull_push import fill
-from isc_core.photo.camera import Camera
-from isc_core.shading.brdf.energy import directional_albedo
-from isc_core.shading.brdf.ggx import F0, Ggx
-from isc_core.shading.environment_map import resampled
-from isc_core.shading.lights import VIEW
-from isc_core.shading.mirrored_environment import MirroredEnvironment
-from isc_core.shading.perspective import view_directions
-from isc_core.shading.spherical_harmonics import real_sh
+from ..imaging.row_blocks import row_blocks
+from ..imaging.srgb import srgb_codes, srgb_to_linear
+from ..imaging.upsampling import enlarged
+from ..inpainting.pull_push import fill
+from .brdf.energy import directional_albedo
+from .brdf.ggx import F0, Ggx
+from .lights import VIEW
+from .mirrored_environment import MirroredEnvironment
 
-from ..files.result_arrays import ResultArrays
-from .camera import camera_of
-from .dichromatic import MOST
-
+MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
+ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth
 _ANGLES, _NODES = 10, 32
 _SMALLEST_ROUGHNESS = 0.05
-_ROWS = 16  # of the environment: the recovered one is smooth
-_COEFFICIENTS = 27  # of the illumination
 _DARKEST = 1e-6
 
 
@@ -133,68 +121,6 @@ class SpecularLayer:
 
 
 @dataclass(frozen=True)
-class RecoveredLight:
-    """What of the recovered light a layer needs.
-
-    Attributes
-    ----------
-    environment : (rows, 2 rows, 3) ndarray
-        Radiance, see `isc_core.shading.environment_map`.
-    illumination : (9, 3) ndarray
-        Log-shading SH coefficients for the base colour.
-    camera : Camera or None
-        The photo's, of the maps; None for an orthographic view.
-    """
-
-    environment: np.ndarray
-    illumination: np.ndarray
-    camera: Camera | None
-
-    @property
-    def numbers(self) -> list[float]:
-        """The same as numbers, which a datablock can store."""
-        camera = self.camera
-        place = [0.0, 0, 0] if camera is None else [camera.focal_length, *camera.principal_point]
-        return [*place, *self.illumination.ravel().tolist(), *self.environment.ravel().tolist()]
-
-
-def light_of_numbers(numbers: Sequence[float]) -> RecoveredLight:
-    """Return the light of `RecoveredLight.numbers`.
-
-    Parameters
-    ----------
-    numbers : sequence of float
-
-    Returns
-    -------
-    RecoveredLight
-    """
-    values = np.array(numbers, float)
-    (focal_length, x, y), illumination, environment = np.split(values, (3, 3 + _COEFFICIENTS))
-    rows = round((len(environment) / 6) ** 0.5)
-    return RecoveredLight(
-        environment.reshape(rows, 2 * rows, 3),
-        illumination.reshape(9, 3),
-        Camera(float(focal_length), (float(x), float(y))) if focal_length > 0 else None,
-    )
-
-
-def recovered_light(result: ResultArrays) -> RecoveredLight:
-    """Return what of the light of a result a layer needs.
-
-    Parameters
-    ----------
-    result : ResultArrays
-
-    Returns
-    -------
-    RecoveredLight
-    """
-    environment = resampled(result.environment_map.astype(float), _ROWS)
-    return RecoveredLight(environment, result.mesh_illumination, camera_of(result))
-
-
-@dataclass(frozen=True)
 class CoatedSurface:
     """A surface in the recovered light, on which a specular layer lies.
 
@@ -204,15 +130,18 @@ class CoatedSurface:
         Unit normals; 0 outside the object.
     shading : (H, W, 3) ndarray
         That of the base colour.
-    light : RecoveredLight
-        The light.
+    environment : (rows, 2 rows, 3) ndarray
+        Radiance of the light, see `environment_map`.
+    view : (3,) or (H, W, 3) ndarray
+        Unit vectors toward the viewer.
     variation : (H, W) ndarray or None
         Spatial factor of the specular level, in [0, 1].
     """
 
     normal: np.ndarray
     shading: np.ndarray
-    light: RecoveredLight
+    environment: np.ndarray
+    view: np.ndarray = field(default_factory=VIEW.copy)
     variation: np.ndarray | None = None
 
     def layer(self, level: float, roughness: float) -> SpecularLayer | None:
@@ -232,11 +161,11 @@ class CoatedSurface:
         """
         if level <= 0:
             return None
-        mask, camera = self.normal.any(-1), self.light.camera
+        mask = self.normal.any(-1)
         normal = self.normal[mask].astype(float)
-        view = VIEW if camera is None else view_directions(camera, mask.shape)[mask]
+        view = self.view if self.view.ndim == 1 else self.view[mask]
         model = _layer(level, roughness)
-        mirrored = MirroredEnvironment(model, self.light.environment).toward(normal, view)
+        mirrored = MirroredEnvironment(model, self.environment).toward(normal, view)
         share = specular_share(level, roughness, (normal * view).sum(-1))[:, None]
         inside = np.concatenate([mirrored / np.maximum(self.shading[mask], _DARKEST), share], -1)
         if self.variation is not None:
@@ -244,65 +173,6 @@ class CoatedSurface:
         effect = np.zeros((*mask.shape, 4), np.float32)
         effect[mask] = inside
         return SpecularLayer(fill(effect, mask))
-
-
-def coated_surface(result: ResultArrays) -> CoatedSurface:
-    """Return the surface of a result.
-
-    Parameters
-    ----------
-    result : ResultArrays
-
-    Returns
-    -------
-    CoatedSurface
-    """
-    variation = result.specular_variation
-    return CoatedSurface(
-        np.where(result.mask[..., None], result.normal, 0),
-        result.shading / result.reflectance_scale,
-        recovered_light(result),
-        None if variation is None else variation / max(1.0, float(variation.max())),
-    )
-
-
-def coded_normals(normal: np.ndarray) -> np.ndarray:
-    """Code normals in 8 bits; 0 outside the object, where they are 0.
-
-    Parameters
-    ----------
-    normal : (H, W, 3) ndarray
-
-    Returns
-    -------
-    (H, W, 3) ndarray of uint8
-    """
-    codes = np.rint(127 * normal + 128).astype(np.uint8)
-    return np.where(normal.any(-1)[..., None], codes, np.uint8(0))
-
-
-def surface_of_codes(
-    normals: np.ndarray, light: RecoveredLight, variation: np.ndarray | None
-) -> CoatedSurface:
-    """Return the surface of `coded_normals`, whose shading is that of the light's illumination.
-
-    Parameters
-    ----------
-    normals : (H, W, 3) ndarray of uint8
-    light : RecoveredLight
-    variation : (H, W) ndarray of uint8 or None
-        Coded factor of the specular level.
-
-    Returns
-    -------
-    CoatedSurface
-    """
-    mask = normals.any(-1)
-    normal, shading = (np.zeros(normals.shape) for _ in range(2))
-    inside = (normals[mask] - 128.0) / 127
-    normal[mask] = inside / np.linalg.norm(inside, axis=-1, keepdims=True)
-    shading[mask] = np.exp(real_sh(normal[mask]) @ light.illumination)
-    return CoatedSurface(normal, shading, light, None if variation is None else variation / 255)
 
 
 def specular_share(level: float, roughness: float, cosines: np.ndarray) -> np.ndarray:
