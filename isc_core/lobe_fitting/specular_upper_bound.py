@@ -46,9 +46,9 @@ def bounded_specular(d: Decomposition) -> SpecularFit:
     gloss = fitted_specular(d)
     if not gloss.specular or gloss.roughness is None:
         return gloss
-    from ..shading.environment_map import environment_from_shading
+    from ..shading.environment_map import recovered_environment
 
-    environment = environment_from_shading(d.illumination, _ROWS, viewer=d.viewer)
+    environment = recovered_environment(d.illumination, _ROWS, viewer=d.viewer)
     most = specular_upper_bound(d, gloss.roughness, environment)
     return (
         gloss

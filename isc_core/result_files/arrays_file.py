@@ -143,11 +143,11 @@ def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResu
     """The mesh with its gloss, and with the light that this mirrors, if any."""
     if not gloss.specular:
         return replace(built, gloss=gloss)
-    from ..shading.environment_map import environment_from_shading, resampled
+    from ..shading.environment_map import recovered_environment, resampled
     from ..shading.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
 
     if d.environment is None:
-        light = environment_from_shading(d.illumination, ENVIRONMENT_ROWS, viewer=d.viewer)
+        light = recovered_environment(d.illumination, ENVIRONMENT_ROWS, viewer=d.viewer)
     else:
         light = resampled(d.environment, ENVIRONMENT_ROWS)
     variation, k = gloss.variation, built.reflectance_scale
@@ -241,11 +241,11 @@ def _camera(built: MeshResult) -> dict[str, np.ndarray]:
 
 def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     from ..lobe_fitting.light_direction import main_light
-    from ..shading.environment_map import environment_from_shading
+    from ..shading.environment_map import recovered_environment
 
     mesh_light, sun = built.illumination(d.illumination), main_light(d)
     if d.environment is None:
-        sky = environment_from_shading(mesh_light, viewer=d.viewer)
+        sky = recovered_environment(mesh_light, viewer=d.viewer)
     else:
         sky = d.environment / built.reflectance_scale
     return {

@@ -12,7 +12,7 @@ from isc_core.lobe_fitting.specular_upper_bound import bounded_specular, specula
 from isc_core.result_files.arrays_file import ARRAYS
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition
-from isc_core.shading.environment_map import environment_from_shading
+from isc_core.shading.environment_map import recovered_environment
 from tests.core.result_files.test_arrays_file import glossy
 
 
@@ -37,7 +37,7 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
     gloss = fitted_specular(d)
     assert gloss.specular is not None and gloss.roughness is not None
     assert bounded_specular(d) == gloss
-    room = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, 16))
+    room = specular_upper_bound(d, gloss.roughness, recovered_environment(d.illumination, 16))
     shown = bounded_specular(stronger(d, 100.0))
     assert gloss.specular < room < 100 * gloss.specular
     assert shown.specular == pytest.approx(room)
@@ -47,7 +47,7 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
 @pytest.mark.slow
 def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     d = glossy()
-    env_map = environment_from_shading(d.illumination, 16)
+    env_map = recovered_environment(d.illumination, 16)
     image = d.image.copy()
     rows, columns = np.nonzero(d.mask)
     image[rows[::8], columns[::8], 2] = 0

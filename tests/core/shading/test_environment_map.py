@@ -1,11 +1,14 @@
 """The recovered light as an environment: same shading, never negative, the right way round."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 from isc_core.shading.environment_map import (
     directions,
     environment_from_shading,
+    recovered_environment,
     resampled,
     shading_under,
     solid_angles,
@@ -42,24 +45,35 @@ def test_a_constant_light_is_a_uniform_sky() -> None:
     )
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [0, 1, 2])
-def test_the_sky_gives_the_recovered_shading(seed: int) -> None:
-    """Lights of the strength that decompositions find.
+def found_light(seed: int) -> np.ndarray:
+    """A light of the strength that decompositions find."""
+    scale = np.array([0.5, *[0.5] * 3, *[0.15] * 5])[:, None]
+    return np.asarray(np.random.default_rng(seed).normal(size=(9, 3)) * scale)
 
-    Not every contrast is within an environment map's reach: some error remains.
-    """
-    light = (
-        np.random.default_rng(seed).normal(size=(9, 3))
-        * np.array([0.5, *[0.5] * 3, *[0.15] * 5])[:, None]
-    )
-    env_map = environment_from_shading(light)
+
+@pytest.mark.slow
+@pytest.mark.parametrize("find", [environment_from_shading, recovered_environment])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_the_sky_gives_the_recovered_shading(
+    seed: int, find: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    """Not every contrast is within an environment map's reach: some error remains."""
+    light = found_light(seed)
+    env_map = find(light)
     normals = facing_normals(400)
     error = np.abs(shading_under(env_map, normals) / np.exp(real_sh(normals) @ light) - 1)
     assert env_map.min() >= 0
     assert np.isfinite(env_map).all()
     assert np.median(error) < 0.02
     assert error.max() < 0.2
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_no_bright_spot_stands_behind_the_object(seed: int) -> None:
+    """Few normals see those directions: what they ask for is no lamp."""
+    light, behind = found_light(seed), directions(16)[..., 2] < -0.9
+    env_map = recovered_environment(light, 16)
+    assert env_map[behind].max() < 2 * env_map.mean() < environment_from_shading(light, 16).max()
 
 
 def test_light_from_the_left_comes_from_the_left() -> None:
