@@ -52,7 +52,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.shading.lights",
         "isc_core.shading.mirrored_environment",
         "isc_core.shading.perspective",
-        "isc_core.shading.specular_layer",
+        "isc_core.lobe_fitting.specular_layer",
         "isc_core.shading.spherical_harmonics",
     }
 )

@@ -1,6 +1,6 @@
 """The surface of an object under its specular layer, from a result or from what a file keeps of it.
 
-Problem: the base colour under gloss (`isc_core.shading.specular_layer`) has to follow when the
+Problem: the base colour under gloss (`isc_core.lobe_fitting.specular_layer`) has to follow when the
 gloss is edited, as if the fit had found that gloss. The file has no result any more.
 
 Equation: normals are codes of 8 bits; the shading is exp(SH(n)) of the light's coefficients, which
@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from isc_core.lobe_fitting.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
 from isc_core.photo.camera import Camera
 from isc_core.shading.environment_map import resampled
 from isc_core.shading.lights import VIEW
 from isc_core.shading.perspective import view_directions
-from isc_core.shading.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
 from isc_core.shading.spherical_harmonics import real_sh
 
 from ..files.result_arrays import ResultArrays

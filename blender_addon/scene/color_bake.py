@@ -2,7 +2,7 @@
 
 Equation: base colour = g v rotated(rho; hue, saturation), as the group "ISC Dichromatic" computes
 it, clipped at 1 and coded in 8 bits; see `dichromatic`. Where the gloss is edited, rho is the one
-under the edited specular layer, see `isc_core.shading.specular_layer`.
+under the edited specular layer, see `isc_core.lobe_fitting.specular_layer`.
 
 Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
 saturation and value).
@@ -22,7 +22,7 @@ import numpy as np
 
 from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.io.png import decode_png
-from isc_core.shading.specular_layer import SpecularLayer
+from isc_core.lobe_fitting.specular_layer import SpecularLayer
 
 from ..datablocks.images import SRGB, ImageFile, coded_file, own_file, scaled_file
 from .coated_surface import light_of_numbers, surface_of_codes

@@ -26,8 +26,8 @@ from typing import Any
 
 import bpy
 
+from isc_core.lobe_fitting.specular_layer import MOST
 from isc_core.shading.brdf.ggx import F0
-from isc_core.shading.specular_layer import MOST
 
 from ..datablocks.nodes import add_node, connect
 

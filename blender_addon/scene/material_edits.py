@@ -9,7 +9,7 @@ then `bake_edits` writes the edited colours into a texture and links that. An un
 is the recovered texture itself.
 
 Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
-the fitted specular layer (`isc_core.shading.specular_layer`); without, or while the photo's are
+the fitted specular layer (`isc_core.lobe_fitting.specular_layer`); without, or while the photo's are
 shown, the plain one. Edits of the gloss are colour edits, too: under another gloss lies another
 base colour. Only the bake knows it: while such a slider moves, the last colour stays.
 
@@ -24,8 +24,8 @@ from typing import Any
 import bpy
 import numpy as np
 
+from isc_core.lobe_fitting.specular_layer import MOST
 from isc_core.shading.brdf.ggx import F0
-from isc_core.shading.specular_layer import MOST
 
 from ..datablocks.images import ImageFile, image_name, new_image, own_file
 from ..datablocks.nodes import add_node

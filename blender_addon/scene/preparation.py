@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.lobe_fitting.specular_layer import SpecularLayer
 from isc_core.result_files.solids.back import Back
-from isc_core.shading.specular_layer import SpecularLayer
 
 from ..datablocks.images import (
     COLOR,

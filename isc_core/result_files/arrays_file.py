@@ -143,8 +143,8 @@ def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResu
     """The mesh with its gloss, and with the light that this mirrors, if any."""
     if not gloss.specular:
         return replace(built, gloss=gloss)
+    from ..lobe_fitting.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
     from ..shading.environment_map import recovered_environment, resampled
-    from ..shading.specular_layer import ENVIRONMENT_ROWS, CoatedSurface
 
     if d.environment is None:
         light = recovered_environment(d.illumination, ENVIRONMENT_ROWS, viewer=d.viewer)

@@ -27,7 +27,7 @@ Base colour: k * reflectance, with k such that the 99.5th percentile of the refl
 channel becomes 0.9; the matching light is the recovered one divided by k, that is log shading - log
 k. Beyond the mask the texture repeats the nearest colour inside, so that filtering draws no dark
 fringe. Textures of files have the base colour under the gloss of the same file, see
-`shading.specular_layer`; `MeshResult.base_color` is that without gloss.
+`lobe_fitting.specular_layer`; `MeshResult.base_color` is that without gloss.
 
 Gloss: roughness and specular level are given (see `lobe_fitting.specular_upper_bound`), the level
 times k, as the base colour is. A level up to 1, and its variation over the object in a texture's
@@ -58,11 +58,11 @@ from ..imaging.bounding_box import mask_slices
 from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_codes
 from ..io.png import encode_png
+from ..lobe_fitting.specular_layer import CoatedSurface
 from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import lifted_points, object_axis, view_directions
-from ..shading.specular_layer import CoatedSurface
 from .glb import TexturedMesh, Veil, encode_glb
 from .mesh_options import MeshOptions
 from .object_cover import ObjectCover

@@ -23,7 +23,7 @@ with c = 0. A direction behind the object is seen by few normals, all near the r
 multiply what these few ask for: up to 80 times the mean light has stood in one pixel right behind
 an object, where a glossy surface mirrors it at its rim. With c of a twentieth of the largest K'(1),
 `recovered_environment` has the same fixed points and as good a shading, and such directions stay
-near the mean light.
+near the mean light. Both are meant for equal solid angles.
 
 Citation: W. H. Richardson 1972, doi:10.1364/JOSA.62.000055; L. B. Lucy 1974, doi:10.1086/111605;
 irradiance as a convolution with the clamped cosine: R. Ramamoorthi, P. Hanrahan 2001,
@@ -126,7 +126,7 @@ def environment_from_shading(
     viewer : (3,) ndarray, optional
         Unit vector from the object toward the viewer, camera frame; z by default.
     inertia : float, optional
-        c over the largest K'(1), 0 or more: holds directions that few normals see.
+        c over the largest K'(1) of a solid angle, 0 or more: holds directions that few normals see.
 
     Returns
     -------
@@ -139,7 +139,8 @@ def environment_from_shading(
     kernel = _kernel(normals, rows)
     wanted = np.exp(real_sh(normals) @ illumination)
     reach = kernel.sum(0)[:, None]
-    held = inertia * reach.max()
+    size = solid_angles(rows).reshape(-1, 1)
+    held = inertia * (reach / size).max() * size
     radiance = np.broadcast_to(wanted.mean(0), (kernel.shape[1], 3)).copy()
     for _ in range(iterations):
         correction = kernel.T @ (wanted / np.maximum(kernel @ radiance, 1e-12))

@@ -231,7 +231,7 @@ def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
 
 def test_at_most_half_of_a_color_is_the_mirrored_environment(result: ResultArrays) -> None:
     """Little is taken off as it is, much no further than to the half; in each channel."""
-    from isc_core.shading.specular_layer import SpecularLayer
+    from isc_core.lobe_fitting.specular_layer import SpecularLayer
 
     effect = np.zeros((1, 3, 4), np.float32)
     effect[0, :, :3] = np.array([[0.0], [0.01], [10.0]])
@@ -397,7 +397,7 @@ def mirror(blender: Any) -> Any:
 def test_the_share_is_that_of_blenders_layers(
     blender: Any, mirror: Any, tmp_path: Path, level: float, roughness: float
 ) -> None:
-    from isc_core.shading.specular_layer import specular_share
+    from isc_core.lobe_fitting.specular_layer import specular_share
 
     mirror["Specular IOR Level"].default_value = 0.5 * level
     mirror["Roughness"].default_value = roughness

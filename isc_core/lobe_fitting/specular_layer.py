@@ -30,10 +30,10 @@ from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_codes, srgb_to_linear
 from ..imaging.upsampling import enlarged
 from ..inpainting.pull_push import fill
-from .brdf.energy import directional_albedo
-from .brdf.ggx import F0, Ggx
-from .lights import VIEW
-from .mirrored_environment import MirroredEnvironment
+from ..shading.brdf.energy import directional_albedo
+from ..shading.brdf.ggx import F0, Ggx
+from ..shading.lights import VIEW
+from ..shading.mirrored_environment import MirroredEnvironment
 
 MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
 ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth

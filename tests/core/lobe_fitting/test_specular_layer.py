@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
-from isc_core.shading.specular_layer import CoatedSurface, specular_share
+from isc_core.lobe_fitting.specular_layer import CoatedSurface, specular_share
 
 
 def dome(size: int = 48) -> tuple[np.ndarray, np.ndarray]:
