@@ -31,6 +31,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.io.npy",
         "isc_core.io.png",
         "isc_core.io.reading_notes",
+        "isc_core.lobe_fitting.specular_layer",
         "isc_core.photo.camera",
         "isc_core.photo.names",
         "isc_core.progress",
@@ -52,7 +53,6 @@ LIGHT_MODULES = frozenset(
         "isc_core.shading.lights",
         "isc_core.shading.mirrored_environment",
         "isc_core.shading.perspective",
-        "isc_core.lobe_fitting.specular_layer",
         "isc_core.shading.spherical_harmonics",
     }
 )

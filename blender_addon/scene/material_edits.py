@@ -9,8 +9,8 @@ then `bake_edits` writes the edited colours into a texture and links that. An un
 is the recovered texture itself.
 
 Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
-the fitted specular layer (`isc_core.lobe_fitting.specular_layer`); without, or while the photo's are
-shown, the plain one. Edits of the gloss are colour edits, too: under another gloss lies another
+the fitted specular layer, see `isc_core.lobe_fitting.specular_layer`; without, or while the photo's
+are shown, the plain one. Edits of the gloss are colour edits, too: under another gloss lies another
 base colour. Only the bake knows it: while such a slider moves, the last colour stays.
 
 Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
