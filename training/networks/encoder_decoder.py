@@ -4,6 +4,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from ..devices import halves_are_fast
 from .blocks import Block, Convolution
 
 _QUIET = 0.1
@@ -52,7 +53,8 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
             memory_format=torch.channels_last
         )
         levels: list[torch.Tensor] = []
-        with torch.autocast(inputs.device.type, torch.bfloat16, enabled=self.training):
+        half = self.training and halves_are_fast(inputs.device.type)
+        with torch.autocast(inputs.device.type, torch.bfloat16, enabled=half):
             for level, block in enumerate(self.down):
                 layer = block(functional.avg_pool2d(layer, 2) if level else layer)
                 levels.append(layer)
