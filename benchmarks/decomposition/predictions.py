@@ -3,11 +3,10 @@
   python -m benchmarks.decomposition.predictions --data ROOT [--weights NPZ] [--json FILE]
 
 For each of the twenty images without highlights: the mean angular error of the normals, the mean
-absolute error of the log shading up to a constant, the root mean square of the light that the log
-ratio would take off (which should be 0), and the error of the light's coefficients without their
-brightness. For the laboratory's photos: the error of the diffuse image relative to the photo's.
-"Within" is the share of pixels within the stated scale: .68 for normals (both components, their
-normal distribution), .63 for the mean absolute error of a Laplace distribution.
+absolute error of the log shading up to a constant, and the error of the light's coefficients
+without their brightness. "Within" is the share of pixels within the stated scale: .68 for normals
+(both components, their normal distribution), .63 for the mean absolute error of a Laplace
+distribution.
 
 Limits: ten objects.
 """
@@ -23,7 +22,6 @@ from isc_core.decomposition.settings import Illumination
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.networks.scene_network import SceneNetwork, predict_scene
-from isc_core.separation.network import separate
 from isc_core.shading.spherical_harmonics import light_from_reference
 
 _LEAST = 1e-4
@@ -52,7 +50,6 @@ def measure(truth: MitBerkeleyObject, network: SceneNetwork | None) -> dict[str,
     off = np.abs(predicted[:, :2] - normal[sure][:, :2]) <= found.normals.deviation[sure, None]
     shading = np.log(np.maximum(truth.shading[sure], _LEAST)) - found.shading.log_shading[sure]
     shading_error = np.abs(shading - np.median(shading))
-    taken = truth.image - separate(truth.image, truth.mask, network=network).diffuse
     light = light_from_reference(truth.light) - found.light.mean
     return {
         "degrees": float(degrees.mean()),
@@ -61,31 +58,8 @@ def measure(truth: MitBerkeleyObject, network: SceneNetwork | None) -> dict[str,
         "shading within": float(
             (shading_error <= found.shading.deviation[sure, None] / np.sqrt(2)).mean()
         ),
-        "taken off": float(
-            np.sqrt(np.square(taken[known]).mean() / np.square(truth.image[known]).mean())
-        ),
         "light": float(np.abs(light[1:]).mean()),
     }
-
-
-def gain_on_photo(root: Path, name: str, network: SceneNetwork | None) -> float:
-    """Return the squared error of the separated diffuse image over that of the photo.
-
-    Parameters
-    ----------
-    root : Path
-    name : str
-    network : SceneNetwork or None
-
-    Returns
-    -------
-    float
-    """
-    photo = load_object(root, name, Illumination.LABORATORY, "original")
-    diffuse = load_object(root, name, Illumination.LABORATORY)
-    left = separate(photo.image, photo.mask, network=network).diffuse - diffuse.image
-    before = photo.image - diffuse.image
-    return float(np.square(left[photo.mask]).sum() / np.square(before[photo.mask]).sum())
 
 
 def main() -> None:
@@ -109,8 +83,6 @@ def main() -> None:
         for name in list_objects(given.data, light):
             truth = load_object(given.data, name, light)
             row = measure(truth, network)
-            if light == Illumination.LABORATORY:
-                row["photo"] = gain_on_photo(given.data, name, network)
             rows[light][name] = row
             print(f"{light:11}{name:10}", *(f"{key} {value:.3f}" for key, value in row.items()))
         means = {key: np.mean([one[key] for one in rows[light].values()]) for key in row}

@@ -6,20 +6,21 @@ that leaves highlights in the diffuse image: shape and light are bent to explain
 reflectance shows them as bright albedo.
 
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
-form shows of highlights (`separation.network`): t is the part of log(I / D) that the scene network
-is sure of, and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being nearly white
-(`separation.support.light_tint`). Colour and form decide together, region by region, what of that
-was a highlight and what was print (`separation.support.highlight_evidence`); the rest is given
-back. Under clipped highlights the paint around is continued (`separation.support.clipped_texture`).
-SIRFS on D_1 gives shape and light. They give a better separation: where the network removed
-much of what colour had left (`ResidualHighlights.unreliable`), too little of the albedo is visible;
-it is continued from the surroundings, in the shading at that place,
+form shows of highlights: t is the part of log(I / D) that the scene network is sure of
+(`separation.support.sure_ratio`), and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being
+nearly white (`separation.support.light_tint`). Colour and form decide together, region by region,
+what of that was a highlight and what was print (`separation.support.highlight_evidence`); the rest
+is given back. Under clipped highlights the paint around is continued
+(`separation.support.clipped_texture`). SIRFS on D_1 gives shape and light. They give a better
+separation: where the network removed much of what colour had left
+(`ResidualHighlights.unreliable`), too little of the albedo is visible; it is continued from the
+surroundings, in the shading at that place,
 
     log R = average of log D_1 - SH(normal) over nearby reliable pixels,
     D = min(D_1, R exp(SH(normal)))
 
 Form adds to colour only where highlights stand out that colour has left
-(`separation.network.highlights_stand_out`).
+(`separation.support.sure_ratio`).
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
 the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
@@ -53,10 +54,10 @@ from ..photo.highlight_marks import HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation import HIGHLIGHT_ODDS
-from ..separation.network import NetworkOptions, highlights_stand_out, sure_ratio
 from ..separation.support.clipped_texture import continue_under_clipped
 from ..separation.support.highlight_evidence import supported
 from ..separation.support.light_tint import limit_tint
+from ..separation.support.sure_ratio import SureRatioOptions, highlights_stand_out, sure_ratio
 from .layers import separated_first, shaded
 from .lobe import fit_specular
 from .shape import Shape, confidence_weight, energy_of, recover_shape
@@ -86,7 +87,7 @@ class JointOptions:
         t above which albedo is unreliable.
     change_of_variables : float
         b of the energy.
-    network : NetworkOptions
+    network : SureRatioOptions
         When light is taken off.
     odds : float
         That removed light was a highlight, to be exceeded; above 0.
@@ -94,7 +95,7 @@ class JointOptions:
 
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
-    network: NetworkOptions = field(default_factory=NetworkOptions)
+    network: SureRatioOptions = field(default_factory=SureRatioOptions)
     odds: float = HIGHLIGHT_ODDS
 
 
@@ -321,12 +322,12 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options = options or JointOptions()
-    expected = sure_ratio(seen or predict_scene(image, mask), options.network)
+    expected = sure_ratio(seen or predict_scene(image, mask), options.network.doubt)
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows
         left[rows] = _left(image[rows], diffuse[rows], expected[rows], mask[rows])
-    if not highlights_stand_out(left, mask, options.network):
+    if not highlights_stand_out(left, mask, options.network.stands_out):
         return None
     much = left.mean(axis=2) > options.unreliable_from
     unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask

@@ -1,4 +1,4 @@
-"""What the networks share: an encoder, a decoder, and an answer about the photo.
+"""What the networks share: an encoder, a decoder, and for some an answer about the photo.
 
 Equation: pixels go in and come out in blocks (space to depth). Each level down is two convolutions
 (`layers`) and half as fine as the one before; each level up sees the level below it, repeated,
@@ -25,8 +25,8 @@ BLOCK = 4  # pixels of a block's side
 
 
 @dataclass(frozen=True)
-class PhotoNetwork(Network):
-    """A network of a whole photo: maps, and an answer. Raises `InputError` where parts do not fit.
+class EncoderDecoder(Network):
+    """A network that gives maps of a photo. Raises `InputError` where parts do not fit.
 
     Attributes
     ----------
@@ -35,24 +35,13 @@ class PhotoNetwork(Network):
     weights : tuple of (9, inputs, outputs) float32 ndarray
         Two for each level down, two for each level up from the coarsest, the output.
     biases : tuple of (outputs,) float32 ndarray
-    coarse : int
-        Levels that the answer is read from, the coarsest ones: two numbers for each channel.
-    answers : int
-        Numbers of the answer.
-    dense : tuple of (inputs, outputs) ndarray
-        The two layers of the answer.
-    offsets : tuple of (outputs,) ndarray
     """
 
     inputs: ClassVar[int]
     outputs: ClassVar[int]
-    coarse: ClassVar[int]
-    answers: ClassVar[int]
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
-    dense: tuple[np.ndarray, ...]
-    offsets: tuple[np.ndarray, ...]
 
     def __post_init__(self) -> None:
         if not self.fits():
@@ -63,9 +52,6 @@ class PhotoNetwork(Network):
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""
-        return self._maps_fit() and self._answer_fits()
-
-    def _maps_fit(self) -> bool:
         if len(self.weights) < 7 or len(self.weights) % 4 != 3:
             return False
         if any(w.ndim != 3 for w in self.weights):
@@ -82,15 +68,6 @@ class PhotoNetwork(Network):
             inputs = width
         shapes.append((9, inputs, BLOCK**2 * self.outputs))
         return is_chain(self.weights, self.biases, shapes)
-
-    def _answer_fits(self) -> bool:
-        if any(m.ndim != 2 for m in self.dense):
-            return False
-        hidden = self.dense[0].shape[-1]
-        answer = [(2 * sum(self.widths[-self.coarse :]), hidden), (hidden, self.answers)]
-        return [m.shape for m in self.dense] == answer and [o.shape for o in self.offsets] == [
-            s[1:] for s in answer
-        ]
 
     @property
     def depth(self) -> int:
@@ -124,6 +101,38 @@ class PhotoNetwork(Network):
         for skip in levels[-2::-1]:
             layer = conv_block(_beside(skip, layer), steps)
         return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
+
+
+@dataclass(frozen=True)
+class PhotoNetwork(EncoderDecoder):
+    """A network that also answers about the photo as a whole.
+
+    Attributes
+    ----------
+    coarse : int
+        Levels that the answer is read from, the coarsest ones: two numbers for each channel.
+    answers : int
+        Numbers of the answer.
+    dense : tuple of (inputs, outputs) ndarray
+        The two layers of the answer.
+    offsets : tuple of (outputs,) ndarray
+    """
+
+    coarse: ClassVar[int]
+    answers: ClassVar[int]
+
+    dense: tuple[np.ndarray, ...]
+    offsets: tuple[np.ndarray, ...]
+
+    def fits(self) -> bool:
+        """Return whether the parts fit each other."""
+        if not super().fits() or any(m.ndim != 2 for m in self.dense):
+            return False
+        hidden = self.dense[0].shape[-1]
+        answer = [(2 * sum(self.widths[-self.coarse :]), hidden), (hidden, self.answers)]
+        return [m.shape for m in self.dense] == answer and [o.shape for o in self.offsets] == [
+            s[1:] for s in answer
+        ]
 
     def answer(self, features: list[np.ndarray]) -> np.ndarray:
         """Answer about the photo as a whole.

@@ -39,7 +39,7 @@ SUMMARIES = {
     "akashi_2016": "sparse non-negative matrix factorisation (Akashi and Okatani 2016)",
     "chaotic_segmentation": "chaotic multilevel thresholds and inpainting (Akbar 2016)",
     "sparse_coding": "sparse coding over specular-free images (Akbar 2016)",
-    "network": "the scene network of this project",
+    "network": "the highlight network of this project",
     "isc": "removes only what colour proves to be a highlight (this project; default)",
 }
 METHODS = tuple(SUMMARIES)

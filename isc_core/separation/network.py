@@ -1,47 +1,42 @@
-"""Separation by what the scene network sees, for photos of any size.
+"""Separation by what the highlight network sees, for photos of any size.
 
 Problem: a highlight on a grey surface has the surface's colour; what reveals it is its form, its
 place on the shape, and the reflectance around it. The network weighs them all, but it also takes
 some bright albedo for highlights. Light that is wrongly taken off does more harm than a highlight
 that stays.
 
-Equation: the network expects y = log(I / D) with a Laplace distribution of scale b. At a pixel,
-t = max(y - d b, 0) is taken off, d = `doubt`: more than what is there is removed with a probability
-of exp(-d) / 2 only, so that the expected error falls. From the photo as a whole nothing is taken
-unless highlights stand out: with t opened, so that texture of a few pixels does not
-count, max t has to exceed the 90th percentile by `stands_out`. D = I exp(-t), and `light_tint`
-limits the colour of the removed light. Confidence is 1 / (1 + e / u) with e = D b, the expected
-error, and u a tenth of the mean light.
+Equation: the network expects specular light s, with a standard deviation
+(`networks.highlight_network`); `doubt` is subtracted from its log odds. Where the odds are right,
+taking s off lowers the expected squared error; s of less than a fifth of a detail stays. From the
+photo as a whole nothing is taken unless t = log(I / (I - s)) stands out (`support.sure_ratio`) by
+`stands_out`. D = I exp(-t), and `light_tint` limits the colour of the removed light. Confidence is
+1 / (1 + e / u), e the deviation and u a tenth of the mean light.
 
-Citation: see `networks.scene_network`; grey opening: J. Serra, "Image Analysis and Mathematical
-Morphology", 1982.
+Citation: see `networks.highlight_network`.
 
-Limits: those of the network; edges of highlights are as sharp as its frame. Clipped pixels: see
-`support.clipped`.
+Limits: those of the network. Clipped pixels: see `support.clipped`.
 """
 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
-from ..imaging.bounding_box import mask_diagonal
-from ..networks.scene_network import (
-    LayerPrediction,
-    SceneNetwork,
-    ScenePrediction,
-    predict_scene,
+from ..networks.highlight_network import (
+    HighlightNetwork,
+    HighlightPrediction,
+    predict_highlights,
 )
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .support.checks import check_arrays
 from .support.layers import diffuse_layers
 from .support.light_tint import limit_tint
+from .support.sure_ratio import highlights_stand_out
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
-_MOST_SHARE = 0.9  # of the pixels show no more than what is usual
-_SPECK = 0.005  # of the object's diagonal
+_MIN_SHARE = 1e-3  # of a channel that stays
+_LEAST_LIKELY = 0.2  # share of a detail that is specular: less joins no regions
 
 
 @dataclass(frozen=True)
@@ -51,14 +46,14 @@ class NetworkOptions:
     Attributes
     ----------
     doubt : float
-        Number of error scales that y has to exceed; not negative.
+        Subtracted from the log odds that a bright detail is a highlight; not negative.
     stands_out : float
         By how much the strongest highlight exceeds what is usual on the object.
     tint : float
         How coloured the removed light may be, see `support.light_tint`; at least 1.
     """
 
-    doubt: float = 1.6
+    doubt: float = 0.0
     stands_out: float = 0.6
     tint: float = 1.5
 
@@ -73,7 +68,7 @@ def separate(
     *,
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
-    network: SceneNetwork | None = None,
+    network: HighlightNetwork | None = None,
 ) -> Separation:
     """Separate a photo into its diffuse and specular layer.
 
@@ -85,7 +80,7 @@ def separate(
     options : NetworkOptions, optional
     clipped : (H, W) bool ndarray, optional
     monitor : Monitor, optional
-    network : SceneNetwork, optional
+    network : HighlightNetwork, optional
         By default the shipped one.
 
     Returns
@@ -106,52 +101,33 @@ def separate(
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
-    seen = predict_scene(image, mask, network)
-    excess = sure_ratio(seen, options)
-    if not highlights_stand_out(excess, mask, options):
+    seen = predict_highlights(image, mask, options.doubt, network)
+    excess = expected_ratio(image, seen)
+    if not highlights_stand_out(excess, mask, options.stands_out):
         excess = np.zeros_like(excess)
     inside = np.where(mask[..., None], image, 0)
     diffuse = limit_tint(inside, inside * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)
     unit = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
-    confidence = 1 / (1 + seen.ratio_scale * split.diffuse.mean(axis=2) / unit)
+    confidence = 1 / (1 + seen.deviation / unit)
     unclipped = mask if clipped is None else mask & ~clipped
     return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))
 
 
-def sure_ratio(seen: ScenePrediction | LayerPrediction, options: NetworkOptions) -> np.ndarray:
-    """Return how much of the predicted log ratio of a photo and its diffuse image is sure.
+def expected_ratio(image: np.ndarray, seen: HighlightPrediction) -> np.ndarray:
+    """Return the log ratio of a photo and of what is left of it without the expected highlights.
 
     Parameters
     ----------
-    seen : ScenePrediction or LayerPrediction
-    options : NetworkOptions
-        `doubt` is used.
+    image : (H, W, 3) ndarray
+    seen : HighlightPrediction
 
     Returns
     -------
     (H, W, 3) float32 ndarray
-        Not negative, 0 outside the mask.
+        Not negative, 0 where there are no highlights, or hardly likely ones.
     """
-    return np.maximum(seen.log_ratio - options.doubt * seen.ratio_scale[..., None], 0)
-
-
-def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, options: NetworkOptions) -> bool:
-    """Decide whether a photo has highlights at all.
-
-    Parameters
-    ----------
-    ratio : (H, W, 3) ndarray
-        Log ratio of the photo and what would be left.
-    mask : (H, W) ndarray of bool
-    options : NetworkOptions
-        `stands_out` is used.
-
-    Returns
-    -------
-    bool
-    """
-    diagonal = mask_diagonal(mask)
-    side = max(3, 2 * round(_SPECK * diagonal) + 1)
-    broad = ndimage.grey_opening(ratio.mean(axis=2), side)[mask]
-    return float(broad.max() - np.quantile(broad, _MOST_SHARE)) > options.stands_out
+    light = np.where(seen.share > _LEAST_LIKELY, seen.specular, 0)[..., None]
+    inside, least = light > 0, np.float32(_MIN_SHARE) * image
+    left = np.where(inside, np.maximum(image - light, least), 1)
+    return np.log(np.where(inside, image, 1) / left).astype(np.float32)

@@ -21,13 +21,12 @@ from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import COARSE, INPUTS, SURENESS, Count
 
-from ..networks.blocks import load_arrays, restore, stored_arrays
+from ..networks.blocks import load_arrays, restore_first, stored_arrays
 from ..networks.encoder_decoder import EncoderDecoderModule, quieten
 from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
 HIDDEN = 64
-_SHARED = 6  # channels of the scene network's first layer: log light, mask, place
 _OUTLINE = 3.0  # weight of pixels near the outline
 _COUNT, _OVERLAP = 0.3, 1.0
 
@@ -135,20 +134,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         arrays : dict of str to ndarray
             Content of the scene network's archive.
         """
-        states, place = arrays["normalisation"], 0
-        with torch.no_grad():
-            for k, (convolution, norm) in enumerate(self.pairs[: 2 * len(self.down)]):
-                weight = arrays[f"weight{k:02d}"]
-                outputs = weight.shape[2]
-                own = convolution.weight.shape
-                if k == 0:  # blocks of pixels of a channel follow each other
-                    grown = np.zeros((9, own[1], outputs), weight.dtype)
-                    grown[:, : _SHARED * BLOCK**2] = weight
-                    weight = grown
-                if weight.shape[1:] != (own[1], own[0]):
-                    return
-                restore(convolution, norm, weight, states[:, place : place + outputs])
-                place += outputs
+        restore_first(self.pairs[: 2 * len(self.down)], arrays)
 
 
 def network_channels(batch: Composite) -> torch.Tensor:

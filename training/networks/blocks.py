@@ -226,3 +226,29 @@ def restore(
         part.copy_(values)
     gain = norm.weight / torch.sqrt(norm.running_var + norm.eps)
     convolution.weight.copy_(kernel_of(weight) / gain[:, None, None, None])
+
+
+def restore_first(
+    pairs: Sequence[tuple[Convolution, nn.BatchNorm2d]], arrays: Mapping[str, np.ndarray]
+) -> None:
+    """Start from the first blocks of a network that sees fewer channels, where shapes agree.
+
+    Parameters
+    ----------
+    pairs : sequence of (Convolution, BatchNorm2d)
+        Changed in place. Channels that only these see begin without effect.
+    arrays : mapping of str to ndarray
+        Content of an archive.
+    """
+    states, place = arrays["normalisation"], 0
+    with torch.no_grad():
+        for k, (convolution, norm) in enumerate(pairs):
+            weight = arrays[f"weight{k:02d}"]
+            _, inputs, outputs = weight.shape
+            own = convolution.weight.shape
+            if k == 0:  # blocks of pixels of a channel follow each other
+                weight = np.pad(weight, ((0, 0), (0, own[1] - inputs), (0, 0)))
+            if weight.shape[1:] != (own[1], own[0]):
+                return
+            restore(convolution, norm, weight, states[:, place : place + outputs])
+            place += outputs

@@ -4,7 +4,7 @@ Limits: views lit together are of about one size, so that lighting wastes little
 them.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,10 +12,12 @@ import numpy as np
 
 from isc_core.errors import InputError
 
+from ..loop import Net, RunOptions, Schedule, fit
 from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
 from ..world.invented_environments import invented_room, invented_sky, studio
 from ..world.lighting import PreparedView, prepared
+from ..world.lit_pictures import LitPictures
 from ..world.pack import read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
@@ -44,6 +46,8 @@ class SceneDraws:
         Photos of a batch.
     shares : Shares
     plain_camera : bool
+    photos : int
+        Taken of each lit view, on average.
     """
 
     views: list[PreparedView]
@@ -52,6 +56,7 @@ class SceneDraws:
     size: int
     shares: Shares
     plain_camera: bool = False
+    photos: int = PHOTOS
 
     def __call__(self, rng: np.random.Generator) -> Draw:
         """Draw a batch.
@@ -64,7 +69,7 @@ class SceneDraws:
         -------
         Draw
         """
-        fresh = max(1, -(-self.size // PHOTOS))
+        fresh = max(1, -(-self.size // self.photos))
         around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, fresh)
         chosen = [self.views[int(k) % len(self.views)] for k in around]
         return draw_batch(
@@ -87,10 +92,18 @@ class SceneBatches:
     bank : Bank
     side : int
         Of the photos, pixels.
+    alter : callable, optional
+        See `Darkroom`.
     """
 
-    def __init__(self, draw: SceneDraws, bank: Bank, side: int = OUTPUT) -> None:
-        self._draw, self._darkroom = draw, Darkroom(bank, POOL, side)
+    def __init__(
+        self,
+        draw: SceneDraws,
+        bank: Bank,
+        side: int = OUTPUT,
+        alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+    ) -> None:
+        self._draw, self._darkroom = draw, Darkroom(bank, POOL, side, alter)
 
     def __call__(self, rng: np.random.Generator) -> Sample:
         """Return the next batch.
@@ -182,3 +195,45 @@ def read_world(
     photographed = np.flatnonzero(~judged[: len(found)])
     learned = np.concatenate([np.flatnonzero(~judged), np.repeat(photographed, _OFTEN)])
     return World(views, atlas, bank, learned, np.flatnonzero(judged))
+
+
+def fit_to_photos(
+    network: Net,
+    draw: SceneDraws,
+    judged: SceneDraws,
+    bank: Bank,
+    side: int,
+    schedule: Schedule,
+    options: RunOptions,
+    alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+) -> None:
+    """Fit a network to photos that are taken while it learns.
+
+    Parameters
+    ----------
+    network : nn.Module
+        A `training.loop.Trainable`, changed in place.
+    draw, judged : SceneDraws
+        What is learned from, and what is measured.
+    bank : Bank
+        On the CPU.
+    side : int
+        Of the photos, pixels.
+    schedule : Schedule
+    options : RunOptions
+    alter : callable, optional
+        See `Darkroom`.
+    """
+    held_out = SceneBatches(judged, bank, side, alter)
+    if options.device == "cpu":
+        fit(network, SceneBatches(draw, bank, side, alter), schedule, options, held_out)
+        return
+    # Workers draw, the device lights: it holds the bank and the pool.
+    darkroom = Darkroom(bank.to(options.device), POOL, side, alter)
+
+    def prepare(drawn: Draw | Sample) -> Sample:
+        if isinstance(drawn, Sample):
+            return drawn.to(options.device)
+        return darkroom(drawn.to(options.device))
+
+    fit(network, draw, schedule, options, held_out, prepare)

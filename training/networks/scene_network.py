@@ -26,11 +26,11 @@ import torch
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
 
-from ..loop import Schedule, add_run_arguments, fit, run_options
+from ..loop import Schedule, add_run_arguments, run_options
 from ..world.files import Split
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT, Darkroom, Draw, Sample
-from .scene_batches import POOL, SceneBatches, SceneDraws, read_world
+from ..world.samples import OUTPUT
+from .scene_batches import SceneDraws, fit_to_photos, read_world
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
@@ -81,20 +81,7 @@ def main() -> None:
         "camera" in arguments.without,
     )
     judged = replace(draw, views=world.views[Split.BODY], environments=world.judged)
-    side = arguments.side
-    held_out = SceneBatches(judged, world.bank, side)
-    if options.device == "cpu":
-        fit(network, SceneBatches(draw, world.bank, side), schedule, options, held_out)
-        return
-    # Workers draw, the device lights: it holds the bank and the pool.
-    darkroom = Darkroom(world.bank.to(options.device), POOL, side)
-
-    def prepare(drawn: Draw | Sample) -> Sample:
-        if isinstance(drawn, Sample):
-            return drawn.to(options.device)
-        return darkroom(drawn.to(options.device))
-
-    fit(network, draw, schedule, options, held_out, prepare)
+    fit_to_photos(network, draw, judged, world.bank, arguments.side, schedule, options)
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from .patterns import Atlas, PatternKind
 from .random_draws import log_uniform
 
 LAMPS, LAYERS = 4, 3
+_WHITE_BASE = 0.2  # of bodies in white and a strong colour
 
 
 class Kind(IntEnum):
@@ -69,6 +70,9 @@ class Shares:
         Bodies with text, a logo or a label.
     matte, coated : float
         Opaque bodies without gloss, and with a clear coat.
+    white : float
+        Bodies with stripes, dots, checks or patches that are white on a strong colour, or the other
+        way round.
     """
 
     kinds: tuple[float, ...] = (0.9, 0.05, 0.05)
@@ -77,6 +81,7 @@ class Shares:
     printed: float = 0.25
     matte: float = 0.25
     coated: float = 0.12
+    white: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -193,6 +198,9 @@ def _paint(atlas: Atlas, kind: Kind, rng: np.random.Generator, shares: Shares) -
     printed = {Paint.WHITE_WITH_BLACK: 1.0, Paint.STRONG_WITH_WHITE: 0.9, Paint.ONE: 0.0}
     strengths[2] = rng.uniform(0.7, 1) * (rng.random() < printed.get(paint, shares.printed))
     strengths[2] *= shares.printed > 0
+    if shares.white and rng.random() < shares.white:
+        base, inks[1] = _white_on_strong(rng)
+        strengths[:2] = rng.uniform(0, 0.2), rng.uniform(0.7, 1)
     if kind == Kind.MIRROR:
         strengths[:] = 0
     if kind == Kind.GLASS:
@@ -265,6 +273,13 @@ def _palette(paint: Paint, rng: np.random.Generator) -> tuple[np.ndarray, np.nda
             factor = np.exp(rng.normal(0, 0.35, 3) + rng.normal(0, 0.8))
             inks[0] = np.clip(base * factor, 0.02, 0.95)
     return base, inks
+
+
+def _white_on_strong(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Two colours (3,), linear: in one of five cases the white one is the base."""
+    strong = _colour(rng, rng.uniform(0.5, 1), log_uniform(rng, 0.1, 0.8))
+    white = _colour(rng, rng.uniform(0, 0.15), rng.uniform(0.5, 0.92))
+    return (white, strong) if rng.random() < _WHITE_BASE else (strong, white)
 
 
 def _colour(rng: np.random.Generator, saturation: float, value: float | None = None) -> np.ndarray:

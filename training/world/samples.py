@@ -8,6 +8,7 @@ Limits: resampling is bilinear.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -247,10 +248,18 @@ class Darkroom:
         Pictures that are kept; at least as many as one batch lights.
     side : int
         Of the photos, pixels; a multiple of 32.
+    alter : callable, optional
+        Changes pictures of the pool before they are photographed; it returns new ones.
     """
 
-    def __init__(self, bank: Bank, pool: int, side: int = OUTPUT) -> None:
-        self._bank, self._side = bank, side
+    def __init__(
+        self,
+        bank: Bank,
+        pool: int,
+        side: int = OUTPUT,
+        alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+    ) -> None:
+        self._bank, self._side, self._alter = bank, side, alter
         self._pool = Pool[LitPictures](pool)
 
     def __call__(self, draw: Draw) -> Sample:
@@ -266,7 +275,8 @@ class Darkroom:
         Sample
         """
         self._pool.exchange(make_pictures(draw.views, draw.recipes, self._bank))
-        return photograph(self._pool.picked(draw.shares), draw.cameras, draw.placements, self._side)
+        pictures = self._alter(self._pool.picked(draw.shares))
+        return photograph(pictures, draw.cameras, draw.placements, self._side)
 
 
 def photograph(

@@ -1,14 +1,12 @@
-"""The separator that asks the scene network, and when it leaves a photo alone."""
-
-from dataclasses import replace
+"""The separator that asks the highlight network, and when it leaves a photo alone."""
 
 import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.networks.scene_network import predict_scene
+from isc_core.networks.highlight_network import predict_highlights
 from isc_core.separation import separate
-from isc_core.separation.network import NetworkOptions, highlights_stand_out, sure_ratio
+from isc_core.separation.network import expected_ratio
 from isc_core.separation.support.light_tint import limit_tint
 
 
@@ -55,23 +53,13 @@ def test_confidence_sorts_pixels_by_their_error() -> None:
 
 def test_doubt_removes_less() -> None:
     image, _, mask = ball()
-    seen = predict_scene(image, mask)
-    ratios = [sure_ratio(seen, NetworkOptions(doubt=doubt)) for doubt in (0, 1, 3)]
-    np.testing.assert_array_equal(ratios[0], seen.log_ratio)
-    assert ratios[0].sum() > ratios[1].sum() > ratios[2].sum()
-    sure = replace(seen, ratio_scale=np.zeros_like(seen.ratio_scale))
-    np.testing.assert_array_equal(sure_ratio(sure, NetworkOptions(doubt=3)), seen.log_ratio)
-
-
-def test_specks_and_even_layers_do_not_stand_out() -> None:
-    mask, options = np.ones((60, 60), bool), NetworkOptions(stands_out=0.3)
-    flat = np.full((60, 60, 3), 0.8)
-    assert not highlights_stand_out(flat, mask, options)
-    speck, spot = np.zeros_like(flat), np.zeros_like(flat)
-    speck[30, 30], spot[28:34, 28:34] = 1, 1
-    assert not highlights_stand_out(speck, mask, options)
-    assert highlights_stand_out(spot, mask, options)
-    assert not highlights_stand_out(0.2 * spot, mask, options)
+    found = [predict_highlights(image, mask, doubt) for doubt in (0, 1, 3)]
+    ratios = [expected_ratio(image, one) for one in found]
+    assert ratios[0].sum() > ratios[1].sum() > ratios[2].sum() > 0
+    left = (image * np.exp(-ratios[0]))[mask]
+    np.testing.assert_allclose(
+        left, (image - found[0].specular[..., None])[mask], atol=2e-3 * image.max()
+    )
 
 
 @pytest.mark.parametrize("tint", [1.0, 1.5])

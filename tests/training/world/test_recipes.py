@@ -121,3 +121,18 @@ def test_recipes_without_patterns_at_hand_still_work() -> None:
     atlas = Atlas(GREY[:1], np.zeros(1, np.uint8), np.ones(1, bool))
     one = draw_recipe(DIRECTIONS, atlas, np.array([0]), np.random.default_rng(0), Shares())
     assert (one.maps == 0).all()
+
+
+def test_white_lies_on_a_strong_colour_or_the_other_way_round() -> None:
+    def saturation(colour: np.ndarray) -> float:
+        return 1 - float(colour.min() / colour.max())
+
+    recipes = drawn(4, Shares(kinds=(1, 0, 0), white=1.0))
+    pairs = [(one.base, one.colours[1]) for one in recipes]
+    for base, ink in pairs:
+        white, strong = sorted((base, ink), key=saturation)
+        assert saturation(white) < 0.2 and white.max() > 0.45 and saturation(strong) > 0.4
+    assert 0 < sum(saturation(base) < 0.2 for base, _ in pairs) < len(pairs) / 2
+    assert all(one.strengths[1] > 0.6 for one in recipes)
+    for one, other in zip(drawn(5, Shares()), drawn(5, Shares(white=0.0)), strict=True):
+        np.testing.assert_array_equal(one.colours, other.colours)

@@ -1,0 +1,52 @@
+"""Bright details of a map by size: what openings with larger and larger squares remove.
+
+Problem: a highlight, a letter and a stripe are brighter than what is around them. How large such a
+detail is says at which size of an opening it disappears.
+
+Equation: with the opening o_r by a square of 2 r + 1 pixels, o_0 the map itself,
+
+    band_k = o_{r_(k-1)} - o_{r_k} >= 0.
+
+What lies outside the mask is neither bright nor dark: it is left out of minima and maxima.
+
+Citation: granulometry: G. Matheron, "Random Sets and Integral Geometry", 1975; openings: J. Serra,
+"Image Analysis and Mathematical Morphology", 1982.
+
+Limits: squares have corners. A ramp toward the mask's outline counts as a detail.
+"""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+from scipy import ndimage
+
+
+def brightness_bands(
+    values: np.ndarray, mask: np.ndarray, reaches: Sequence[int]
+) -> Iterator[np.ndarray]:
+    """Divide the bright details of a map into bands.
+
+    Parameters
+    ----------
+    values : (H, W) ndarray
+    mask : (H, W) ndarray of bool
+    reaches : sequence of int
+        r_1, r_2, ..., pixels, rising.
+
+    Yields
+    ------
+    (H, W) ndarray
+        One for each reach, the finest details first; not negative, 0 outside the mask.
+    """
+    before = values = np.where(mask, values, 0)
+    for reach in reaches:
+        after = np.minimum(before, _opened(values, mask, 2 * reach + 1))
+        yield before - after
+        before = after
+
+
+def _opened(values: np.ndarray, mask: np.ndarray, side: int) -> np.ndarray:
+    most, least = np.asarray([np.inf, -np.inf], values.dtype)
+    low = ndimage.minimum_filter(np.where(mask, values, most), side, mode="constant", cval=most)
+    high = ndimage.maximum_filter(np.where(mask, low, least), side, mode="constant", cval=least)
+    return np.where(mask, high, 0)

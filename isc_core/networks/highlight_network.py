@@ -1,0 +1,185 @@
+"""Which bright details of a photo are highlights, and which are paint.
+
+Problem: colour tells a highlight on saturated paint, and nothing on white, grey or black. What a
+person sees there is form: a highlight is peaked, follows the shape, and crosses the paint.
+
+Equation: with m the smallest channel, its bright details b_k by size (`imaging.brightness_bands`)
+hold nearly all of a visible highlight, and all white print. An encoder and a decoder of
+convolutions (`encoder_decoder`) see the photo and the b_k, and give for each pixel and size the log
+odds o_k that the detail is specular light:
+
+    s = sum_k b_k / (1 + exp(-o_k)).
+
+Photo and mirror image are averaged. On photos finer than the network's frame the b_k are those of
+the photo, of as large sizes, so that edges are the photo's.
+
+Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28. Weights, training pictures and losses are our own: `python -m
+training.networks.highlight_network`.
+
+Limits: measured in docs/methods/print.md. Specular light without bright details, such as a veil
+over the whole body, is not seen. The light is taken for white.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..imaging.bounding_box import mask_slices
+from ..imaging.brightness_bands import brightness_bands
+from ..imaging.channels import smallest
+from ..imaging.smoothing import masked_gaussian
+from .encoder_decoder import EncoderDecoder
+from .frame import at_full_size, framed
+from .layers import DARK
+from .loader import Parameters
+from .scene_network import LONG_SIDE, SIDE
+from .scene_network import channels_of as photo_channels_of
+
+REACHES = (2, 5, 11)  # of the sizes, pixels of a frame of `SIDE`
+INPUTS = 6 + len(REACHES)
+_SMOOTH = 0.35  # pixels of the frame: noise has bright details, too
+_SURE = 30.0  # largest log odds
+_LEAST = 1e-6
+
+
+class HighlightNetwork(EncoderDecoder):
+    """The highlight network."""
+
+    title = "highlight network"
+    file = "highlight_network.npz"
+    inputs, outputs = INPUTS, len(REACHES)
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "HighlightNetwork":
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        HighlightNetwork
+
+        Raises
+        ------
+        InputError
+            If the parameters do not fit.
+        """
+        return cls(parameters.weights, parameters.biases)
+
+
+@dataclass(frozen=True)
+class HighlightPrediction:
+    """What the network says of a photo's highlights.
+
+    Attributes
+    ----------
+    specular : (H, W) float32 ndarray
+        s, in every channel; at most the photo's smallest channel, 0 outside the mask.
+    deviation : (H, W) float32 ndarray
+        Of s: with p_k = 1 / (1 + exp(-o_k)), the root of sum_k b_k^2 p_k (1 - p_k).
+    share : (H, W) float32 ndarray
+        s over the sum of the b_k, in [0, 1]; 0 where there are no details.
+    """
+
+    specular: np.ndarray
+    deviation: np.ndarray
+    share: np.ndarray
+
+
+def predict_highlights(
+    image: np.ndarray,
+    mask: np.ndarray,
+    doubt: float = 0.0,
+    network: HighlightNetwork | None = None,
+) -> HighlightPrediction:
+    """Predict the highlights of a photo.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) ndarray of bool
+    doubt : float
+        Subtracted from the log odds.
+    network : HighlightNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    HighlightPrediction
+        That of the mirrored photo is mirrored.
+    """
+    network = network or HighlightNetwork.shipped()
+    frame = framed(image, mask, SIDE, LONG_SIDE)
+    direct, _ = network.walked(channels_of(frame.image, frame.mask))
+    mirrored, _ = network.walked(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
+    odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
+    box, scale = mask_slices(mask), 1 / frame.factor
+    inside, odds = mask[box], odds[box]
+    values = smallest(np.where(inside[..., None], image[box], 0)).astype(np.float32)
+    if scale > 1:
+        values = masked_gaussian(values, inside, _SMOOTH * scale)
+    light, details, variance = (np.zeros_like(values) for _ in range(3))
+    for k, band in enumerate(brightness_bands(values, inside, reaches_at(scale))):
+        probability = 1 / (1 + np.exp(np.clip(doubt - odds[..., k], -_SURE, _SURE)))
+        light += band * probability
+        details += band
+        variance += np.square(band) * (probability * (1 - probability))
+    share = light / np.maximum(details, _LEAST * max(float(values.max()), _LEAST))
+    np.minimum(light, smallest(np.where(inside[..., None], image[box], 0)), out=light)
+    return HighlightPrediction(
+        *(_uncropped(one, box, mask.shape) for one in (light, np.sqrt(variance), share))
+    )
+
+
+def _uncropped(values: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:
+    found = np.zeros(shape, np.float32)
+    found[box] = values
+    return found
+
+
+def reaches_at(scale: float) -> list[int]:
+    """Return the reaches of the bands in a photo.
+
+    Parameters
+    ----------
+    scale : float
+        Its pixels over those of the network's frame.
+
+    Returns
+    -------
+    list of int
+    """
+    return [max(1, round(reach * scale)) for reach in REACHES]
+
+
+def channels_of(
+    image: np.ndarray, mask: np.ndarray, reaches: Sequence[int] = REACHES
+) -> np.ndarray:
+    """Return the channels of the first layer.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, 0 outside the mask.
+    mask : (H, W) ndarray of bool
+    reaches : sequence of int
+        Of the bands.
+
+    Returns
+    -------
+    (H, W, INPUTS) float32 ndarray
+        Those of the scene network, then log(1 + b_k / (.03 mean light)).
+    """
+    photo = photo_channels_of(image, mask)
+    mean = float(image[mask].mean(dtype=float)) if mask.any() else 0.0
+    values = smallest(image).astype(np.float32)
+    bands = np.stack(list(brightness_bands(values, mask, reaches)), axis=2)
+    return np.concatenate(
+        [photo, np.log1p(bands / np.float32(DARK * max(mean, _LEAST)))], axis=2, dtype=np.float32
+    )

@@ -1,0 +1,81 @@
+"""How much of what the scene network expects of highlights is sure, and whether a photo has any.
+
+Problem: the network also takes some bright albedo for highlights, and light that is wrongly taken
+off does more harm than a highlight that stays.
+
+Equation: the network expects y = log(I / D) with a Laplace distribution of scale b. At a pixel,
+t = max(y - d b, 0) is sure, d = `doubt`: more than what is there is removed with a probability of
+exp(-d) / 2 only, so that the expected error falls. Highlights stand out in a photo if t, opened so
+that texture of a few pixels does not count, exceeds its 90th percentile by `stands_out` somewhere.
+
+Citation: see `networks.scene_network`; grey opening: J. Serra, "Image Analysis and Mathematical
+Morphology", 1982.
+
+Limits: those of the network.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...imaging.bounding_box import mask_diagonal
+from ...networks.scene_network import LayerPrediction, ScenePrediction
+
+_MOST_SHARE = 0.9  # of the pixels show no more than what is usual
+_SPECK = 0.005  # of the object's diagonal
+
+
+@dataclass(frozen=True)
+class SureRatioOptions:
+    """When light is taken off.
+
+    Attributes
+    ----------
+    doubt : float
+        Number of error scales that y has to exceed; not negative.
+    stands_out : float
+        By how much the strongest highlight exceeds what is usual on the object.
+    tint : float
+        How coloured the removed light may be, see `light_tint`; at least 1.
+    """
+
+    doubt: float = 1.6
+    stands_out: float = 0.6
+    tint: float = 1.5
+
+
+def sure_ratio(seen: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
+    """Return how much of the predicted log ratio of a photo and its diffuse image is sure.
+
+    Parameters
+    ----------
+    seen : ScenePrediction or LayerPrediction
+    doubt : float
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        Not negative, 0 outside the mask.
+    """
+    return np.maximum(seen.log_ratio - doubt * seen.ratio_scale[..., None], 0)
+
+
+def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, stands_out: float) -> bool:
+    """Decide whether a photo has highlights at all.
+
+    Parameters
+    ----------
+    ratio : (H, W, 3) ndarray
+        Log ratio of the photo and what would be left.
+    mask : (H, W) ndarray of bool
+    stands_out : float
+
+    Returns
+    -------
+    bool
+    """
+    diagonal = mask_diagonal(mask)
+    side = max(3, 2 * round(_SPECK * diagonal) + 1)
+    broad = ndimage.grey_opening(ratio.mean(axis=2), side)[mask]
+    return float(broad.max() - np.quantile(broad, _MOST_SHARE)) > stands_out

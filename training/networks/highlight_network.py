@@ -1,0 +1,118 @@
+"""Fit the network of `isc_core.networks.highlight_network`.
+
+  python -m training.networks.highlight_network WORLD... [--panoramas DIR] [--weights NPZ]
+  [--minutes N] -o HIGHLIGHT.npz
+
+WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are taken while the
+network learns: of opaque bodies, most of them with print, often white on a strong colour. For each
+photo the specular light is as strong as the recipe says, times a random factor, or absent; colour
+channels are exchanged. The fit starts from the scene network's levels down, or with `--weights`
+from an archive that an earlier run wrote; `--resume` continues an interrupted one, `--side 96` sees
+photos smaller. Held-out bodies under held-out panoramas are measured every thousand steps.
+
+Equation: see `training.networks.highlight_module`.
+
+Citation: see `training.loop`.
+
+Limits: print lies on bodies as `training.world.recipes` puts it.
+"""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import torch
+
+from isc_core.errors import InputError
+from isc_core.io.npy import read_arrays
+from isc_core.networks import scene_network
+
+from ..loop import Schedule, add_run_arguments, run_options
+from ..world.files import Split
+from ..world.lit_pictures import LitPictures
+from ..world.recipes import Shares
+from ..world.samples import OUTPUT
+from .highlight_module import HighlightNetworkModule
+from .scene_batches import SceneDraws, fit_to_photos, read_world
+
+SCHEDULE = Schedule(rate=1.5e-3, weight_decay=1e-2, average_limit=0.995)
+SHARES = Shares(
+    kinds=(1, 0, 0),
+    paints=(0.2, 0.15, 0.1, 0.1, 0.3, 0.15),
+    lights=(0.06, 0.3, 0.34, 0.15, 0.15),
+    printed=0.5,
+    matte=0.0,
+    coated=0.1,
+    white=0.45,
+)
+_SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
+_PHOTOS = 8  # of each lit view: their gloss and colours differ, too
+_MATT = 0.35  # share of photos without gloss
+_GAIN = (0.3, 0.6)  # mean and deviation of the factor's logarithm
+_BRIGHTEST = 6e4  # of half floats
+
+
+def varied(pictures: LitPictures) -> LitPictures:
+    """Return pictures with other strengths of specular light and other orders of channels.
+
+    Parameters
+    ----------
+    pictures : LitPictures
+
+    Returns
+    -------
+    LitPictures
+    """
+    layers = pictures.layers.float()
+    count = len(layers)
+    gain = torch.exp(_GAIN[0] + _GAIN[1] * torch.randn(count))
+    gain = torch.where(torch.rand(count) < _MATT, 0.0, gain).to(layers.device)
+    order = torch.rand(count, 3).argsort(1).to(layers.device)
+    order = order[..., None, None].expand(-1, -1, *layers.shape[2:])
+    diffuse, gloss, rest = layers[:, :3], layers[:, 3:6], layers[:, 6:]
+    gloss = gloss.gather(1, order) * gain[:, None, None, None]
+    altered = torch.cat([diffuse.gather(1, order), gloss.clamp(max=_BRIGHTEST), rest], 1)
+    return replace(pictures, layers=altered)
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    add = parser.add_argument
+    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
+    add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
+    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
+    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
+    add_run_arguments(parser, steps=20_000, batch=32)
+    arguments = parser.parse_args()
+    options = run_options(arguments)
+    torch.manual_seed(options.seed)
+    try:
+        start = None if arguments.weights is None else dict(read_arrays(arguments.weights))
+        splits = (Split.TRAIN, Split.BODY)
+        world = read_world(arguments.worlds, arguments.panoramas, splits, options.seed)
+    except InputError as error:
+        parser.error(str(error))
+    network = HighlightNetworkModule()
+    if start is None:
+        network.start_from_scene(dict(read_arrays(_SCENE)))
+    else:
+        network.load_arrays(start)
+    draw = SceneDraws(
+        world.views[Split.TRAIN],
+        world.atlas,
+        world.learned,
+        options.batch,
+        SHARES,
+        photos=_PHOTOS,
+    )
+    judged = replace(draw, views=world.views[Split.BODY], environments=world.judged)
+    schedule = replace(SCHEDULE, rate=arguments.rate)
+    fit_to_photos(network, draw, judged, world.bank, arguments.side, schedule, options, varied)
+
+
+if __name__ == "__main__":
+    main()
