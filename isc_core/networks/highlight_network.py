@@ -17,16 +17,14 @@ Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28. Weights, training pictures and losses are our own: `python -m
 training.networks.highlight_network`.
 
-Limits: measured in docs/methods/print.md. Specular light without bright details, such as a veil
-over the whole body, is not seen. The light is taken for white.
+Limits: measured in docs/methods/highlight_network.md. Specular light without bright details, such
+as a veil over the whole body, is not seen. The light is taken for white.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..imaging.bounding_box import mask_slices
 from ..imaging.brightness_bands import brightness_bands
 from ..imaging.channels import smallest
 from ..imaging.smoothing import masked_gaussian
@@ -119,48 +117,22 @@ def predict_highlights(
     direct, _ = network.walked(channels_of(frame.image, frame.mask))
     mirrored, _ = network.walked(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
     odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
-    box, scale = mask_slices(mask), 1 / frame.factor
-    inside, odds = mask[box], odds[box]
-    values = smallest(np.where(inside[..., None], image[box], 0)).astype(np.float32)
+    scale = 1 / frame.factor
+    values = least = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)
     if scale > 1:
-        values = masked_gaussian(values, inside, _SMOOTH * scale)
+        values = masked_gaussian(values, mask, _SMOOTH * scale)
     light, details, variance = (np.zeros_like(values) for _ in range(3))
-    for k, band in enumerate(brightness_bands(values, inside, reaches_at(scale))):
+    reaches = [max(1, round(reach * scale)) for reach in REACHES]
+    for k, band in enumerate(brightness_bands(values, mask, reaches)):
         probability = 1 / (1 + np.exp(np.clip(doubt - odds[..., k], -_SURE, _SURE)))
         light += band * probability
         details += band
         variance += np.square(band) * (probability * (1 - probability))
     share = light / np.maximum(details, _LEAST * max(float(values.max()), _LEAST))
-    np.minimum(light, smallest(np.where(inside[..., None], image[box], 0)), out=light)
-    return HighlightPrediction(
-        *(_uncropped(one, box, mask.shape) for one in (light, np.sqrt(variance), share))
-    )
+    return HighlightPrediction(np.minimum(light, least), np.sqrt(variance), share)
 
 
-def _uncropped(values: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:
-    found = np.zeros(shape, np.float32)
-    found[box] = values
-    return found
-
-
-def reaches_at(scale: float) -> list[int]:
-    """Return the reaches of the bands in a photo.
-
-    Parameters
-    ----------
-    scale : float
-        Its pixels over those of the network's frame.
-
-    Returns
-    -------
-    list of int
-    """
-    return [max(1, round(reach * scale)) for reach in REACHES]
-
-
-def channels_of(
-    image: np.ndarray, mask: np.ndarray, reaches: Sequence[int] = REACHES
-) -> np.ndarray:
+def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Return the channels of the first layer.
 
     Parameters
@@ -168,8 +140,6 @@ def channels_of(
     image : (H, W, 3) ndarray
         Linear, 0 outside the mask.
     mask : (H, W) ndarray of bool
-    reaches : sequence of int
-        Of the bands.
 
     Returns
     -------
@@ -179,7 +149,7 @@ def channels_of(
     photo = photo_channels_of(image, mask)
     mean = float(image[mask].mean(dtype=float)) if mask.any() else 0.0
     values = smallest(image).astype(np.float32)
-    bands = np.stack(list(brightness_bands(values, mask, reaches)), axis=2)
+    bands = np.stack(list(brightness_bands(values, mask, REACHES)), axis=2)
     return np.concatenate(
         [photo, np.log1p(bands / np.float32(DARK * max(mean, _LEAST)))], axis=2, dtype=np.float32
     )

@@ -36,7 +36,7 @@ from .support.sure_ratio import highlights_stand_out
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
 _MIN_SHARE = 1e-3  # of a channel that stays
-_LEAST_LIKELY = 0.2  # share of a detail that is specular: less joins no regions
+_LEAST_LIKELY = 0.2  # share of a detail that is specular: less stays
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import COARSE, INPUTS, SURENESS, Count
 
-from ..networks.blocks import load_arrays, restore_first, stored_arrays
+from ..networks.blocks import load_arrays, stored_arrays
 from ..networks.encoder_decoder import EncoderDecoderModule, quieten
 from .composites import Composite
 
@@ -125,16 +125,6 @@ class MaskNetworkModule(EncoderDecoderModule):
             As `arrays` returns them.
         """
         load_arrays(self.pairs, self.out, self._dense, arrays)
-
-    def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take what the scene network knows: the levels down whose channels agree.
-
-        Parameters
-        ----------
-        arrays : dict of str to ndarray
-            Content of the scene network's archive.
-        """
-        restore_first(self.pairs[: 2 * len(self.down)], arrays)
 
 
 def network_channels(batch: Composite) -> torch.Tensor:

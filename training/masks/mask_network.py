@@ -23,7 +23,6 @@ import torch
 
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
-from isc_core.networks import scene_network
 from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
@@ -31,7 +30,6 @@ from .composites import Composites
 from .ingredients import Ingredients
 from .mask_module import MaskNetworkModule
 
-_SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
 SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
 
 
@@ -56,10 +54,7 @@ def main() -> None:
     except InputError as error:
         parser.error(str(error))
     network = MaskNetworkModule()
-    if weights is None:
-        network.start_from_scene(read_arrays(_SCENE))
-    else:
-        network.load_arrays(weights)
+    network.begin(weights)
     fit(
         network,
         Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),

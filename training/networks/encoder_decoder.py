@@ -1,13 +1,20 @@
 """The trainable encoder and decoder; the counterpart of `isc_core.networks.encoder_decoder`."""
 
+from pathlib import Path
+
+import numpy as np
 import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.io.npy import read_arrays
+from isc_core.networks import scene_network
+
 from ..devices import halves_are_fast
-from .blocks import Block, Convolution
+from .blocks import Block, Convolution, restore_first
 
 _QUIET = 0.1
+_SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
 
 
 class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
@@ -63,6 +70,29 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
                 layer = block(torch.cat([skip, finer], 1))
             maps = functional.pixel_shuffle(self.out(layer), self.block).float()
         return maps, levels
+
+    def begin(self, weights: dict[str, np.ndarray] | None) -> None:
+        """Start from weights, or without, from the shipped scene network's levels down.
+
+        Parameters
+        ----------
+        weights : dict of str to ndarray or None
+            Content of an archive of this network.
+        """
+        if weights is None:
+            self.start_from_scene(read_arrays(_SCENE))
+        else:
+            self.load_arrays(weights)
+
+    def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
+        """Take what the scene network knows: the levels down whose channels agree.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            Content of the scene network's archive.
+        """
+        restore_first(self.pairs[: 2 * len(self.down)], arrays)
 
     def matrices(self) -> list[nn.Parameter]:
         """Return the weights of the blocks."""

@@ -25,7 +25,7 @@ from isc_core.networks.layers import DARK
 from isc_core.networks.scene_network import SIDE
 
 from ..world.samples import Sample
-from .blocks import load_arrays, restore_first, stored_arrays
+from .blocks import load_arrays, stored_arrays
 from .encoder_decoder import EncoderDecoderModule, quieten
 from .scene_module import network_channels as photo_channels
 
@@ -91,9 +91,7 @@ class HighlightNetworkModule(EncoderDecoderModule):
         with torch.no_grad():
             diffuse = photo * torch.exp(-batch.ratio)
             share = (bands - bands_of(diffuse, batch.mask)) / bands.clamp(min=1e-6)
-            mean = (photo * batch.mask).sum((1, 2, 3), keepdim=True) / 3
-            mean = mean / batch.mask.sum((1, 2, 3), keepdim=True).clamp(min=1)
-            weight = bands / (bands + _FAINT * mean.clamp(min=1e-6)) * known
+            weight = bands / (bands + _FAINT * _mean_light(photo, batch.mask)) * known
             true = (photo - diffuse) * known
         entropy = functional.binary_cross_entropy_with_logits(
             odds, share.clamp(0, 1), reduction="none"
@@ -130,20 +128,16 @@ class HighlightNetworkModule(EncoderDecoderModule):
         """
         load_arrays(self.pairs, self.out, {}, arrays)
 
-    def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take what the scene network knows: the levels down whose channels agree.
-
-        Parameters
-        ----------
-        arrays : dict of str to ndarray
-            Content of the scene network's archive.
-        """
-        restore_first(self.pairs[: 2 * len(self.down)], arrays)
-
 
 def _sums(values: torch.Tensor) -> torch.Tensor:
     """Of each photo."""
     return values.sum((1, 2, 3))
+
+
+def _mean_light(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+    """Of each object (B, 1, 1, 1)."""
+    mean = (photo * mask).sum((1, 2, 3), keepdim=True) / 3
+    return (mean / mask.sum((1, 2, 3), keepdim=True).clamp(min=1)).clamp(min=1e-6)
 
 
 def _mean(values: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
@@ -163,9 +157,7 @@ def network_channels(photo: torch.Tensor, mask: torch.Tensor, bands: torch.Tenso
     -------
     (B, INPUTS, H, W) tensor
     """
-    mean = (photo * mask).sum((1, 2, 3), keepdim=True) / 3
-    mean = mean / mask.sum((1, 2, 3), keepdim=True).clamp(min=1)
-    details = torch.log1p(bands / (DARK * mean.clamp(min=1e-6)))
+    details = torch.log1p(bands / (DARK * _mean_light(photo, mask)))
     return torch.cat([photo_channels(photo, mask), details], 1)
 
 

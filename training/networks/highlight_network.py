@@ -25,7 +25,6 @@ import torch
 
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
-from isc_core.networks import scene_network
 
 from ..loop import Schedule, add_run_arguments, run_options
 from ..world.files import Split
@@ -45,7 +44,6 @@ SHARES = Shares(
     coated=0.1,
     white=0.45,
 )
-_SCENE = Path(scene_network.__file__).parent / "data" / scene_network.SceneNetwork.file
 _PHOTOS = 8  # of each lit view: their gloss and colours differ, too
 _MATT = 0.35  # share of photos without gloss
 _GAIN = (0.3, 0.6)  # mean and deviation of the factor's logarithm
@@ -97,10 +95,7 @@ def main() -> None:
     except InputError as error:
         parser.error(str(error))
     network = HighlightNetworkModule()
-    if start is None:
-        network.start_from_scene(dict(read_arrays(_SCENE)))
-    else:
-        network.load_arrays(start)
+    network.begin(start)
     draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,
