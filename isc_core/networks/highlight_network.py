@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.brightness_bands import brightness_bands
-from ..imaging.channels import smallest
+from ..imaging.channels import largest, smallest
 from ..imaging.smoothing import masked_gaussian
 from .encoder_decoder import EncoderDecoder
 from .frame import at_full_size, framed
@@ -36,7 +36,7 @@ from .scene_network import LONG_SIDE, SIDE
 from .scene_network import channels_of as photo_channels_of
 
 REACHES = (2, 5, 11)  # of the sizes, pixels of a frame of `SIDE`
-INPUTS = 6 + len(REACHES)
+INPUTS = 7 + len(REACHES)
 _SMOOTH = 0.35  # pixels of the frame: noise has bright details, too
 _SURE = 30.0  # largest log odds
 _LEAST = 1e-6
@@ -144,12 +144,14 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, INPUTS) float32 ndarray
-        Those of the scene network, then log(1 + b_k / (.03 mean light)).
+        Those of the scene network, log(1 + b_k / (.03 mean light)), and log(C / mean light + .03)
+        with the chroma C, the largest less the smallest channel.
     """
     photo = photo_channels_of(image, mask)
     mean = float(image[mask].mean(dtype=float)) if mask.any() else 0.0
     values = smallest(image).astype(np.float32)
     bands = np.stack(list(brightness_bands(values, mask, REACHES)), axis=2)
-    return np.concatenate(
-        [photo, np.log1p(bands / np.float32(DARK * max(mean, _LEAST)))], axis=2, dtype=np.float32
-    )
+    unit = np.float32(max(mean, _LEAST))
+    details = np.log1p(bands / (np.float32(DARK) * unit))
+    chroma = np.log((largest(image) - values) / unit + np.float32(DARK)) * mask
+    return np.concatenate([photo, details, chroma[..., None]], axis=2, dtype=np.float32)

@@ -1,6 +1,5 @@
 """The trainable highlight network is the one that the core runs; its loss says what it should."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from isc_core.networks.highlight_network import (
     predict_highlights,
 )
 from isc_core.networks.scene_network import SIDE
+from training.networks import highlight_network
 from training.networks.highlight_module import (
     HighlightNetworkModule,
     bands_of,
@@ -104,13 +104,21 @@ def test_the_loss_is_least_at_the_truth(gloss: float) -> None:
     assert truth < loss(torch.full_like(share, 6))[0]
 
 
-def test_pictures_vary_in_gloss_and_in_the_order_of_channels() -> None:
-    torch.manual_seed(0)
-    count = 64
-    layers = torch.rand(count, 13, 4, 4).half()
+def random_pictures(count: int) -> LitPictures:
     blank = {name: torch.zeros(count) for name in LitPictures.__dataclass_fields__}
-    pictures = LitPictures(**{**blank, "layers": layers})
-    found = varied(replace(pictures, layers=layers)).layers
+    layers = torch.rand(count, 13, 4, 4).half()
+    blank |= {"layers": layers, "cover": torch.ones(count, 1, 4, 4)}
+    return LitPictures(**blank | {"strongest": torch.zeros(count, 3)})
+
+
+def test_pictures_vary_in_gloss_and_in_the_order_of_channels(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(highlight_network, "_SHARP", 0.0)
+    torch.manual_seed(0)
+    pictures = random_pictures(64)
+    layers = pictures.layers
+    found = varied(pictures).layers
     before = layers.float()
     assert torch.equal(found[:, 6:], before[:, 6:]) and torch.equal(layers.float(), before)
     assert torch.equal(found[:, :3].sort(1).values, before[:, :3].sort(1).values)
@@ -121,3 +129,11 @@ def test_pictures_vary_in_gloss_and_in_the_order_of_channels() -> None:
     glossy = gain > 0
     assert torch.equal(own.sum((3, 4)).argmin(1)[glossy], order[glossy])
     assert len(order.unique(dim=0)) == 6
+
+
+def test_small_highlights_are_added_to_glossy_pictures_alone() -> None:
+    torch.manual_seed(0)
+    pictures = random_pictures(200)
+    pictures.layers[:, 3:6] = 0
+    found = varied(pictures).layers[:, 3:6].sum((1, 2, 3))
+    assert 0.2 < (found > 0).float().mean() < 0.5

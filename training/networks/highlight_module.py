@@ -157,8 +157,11 @@ def network_channels(photo: torch.Tensor, mask: torch.Tensor, bands: torch.Tenso
     -------
     (B, INPUTS, H, W) tensor
     """
-    details = torch.log1p(bands / (DARK * _mean_light(photo, mask)))
-    return torch.cat([photo_channels(photo, mask), details], 1)
+    mean = _mean_light(photo, mask)
+    details = torch.log1p(bands / (DARK * mean))
+    chroma = photo.amax(1, keepdim=True) - photo.amin(1, keepdim=True)
+    chroma = torch.log(chroma / mean + DARK) * mask
+    return torch.cat([photo_channels(photo, mask), details, chroma], 1)
 
 
 def bands_of(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:

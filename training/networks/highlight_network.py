@@ -19,20 +19,18 @@ Limits: print lies on bodies as `training.world.recipes` puts it.
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 
 import torch
 
 from isc_core.errors import InputError
-from isc_core.io.npy import read_arrays
 
 from ..loop import Schedule, add_run_arguments, run_options
 from ..world.files import Split
 from ..world.lit_pictures import LitPictures
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT
+from ..world.small_highlights import small_highlights
 from .highlight_module import HighlightNetworkModule
-from .scene_batches import SceneDraws, fit_to_photos, read_world
+from .scene_batches import SceneDraws, add_photo_arguments, fit_to_photos, read_given
 
 SCHEDULE = Schedule(rate=1.5e-3, weight_decay=1e-2, average_limit=0.995)
 SHARES = Shares(
@@ -47,6 +45,7 @@ SHARES = Shares(
 _PHOTOS = 8  # of each lit view: their gloss and colours differ, too
 _MATT = 0.35  # share of photos without gloss
 _GAIN = (0.3, 0.6)  # mean and deviation of the factor's logarithm
+_SHARP = 0.6  # share of the others that have small highlights, too
 _BRIGHTEST = 6e4  # of half floats
 
 
@@ -68,7 +67,10 @@ def varied(pictures: LitPictures) -> LitPictures:
     order = torch.rand(count, 3).argsort(1).to(layers.device)
     order = order[..., None, None].expand(-1, -1, *layers.shape[2:])
     diffuse, gloss, rest = layers[:, :3], layers[:, 3:6], layers[:, 6:]
+    sharp = (gain > 0) & (torch.rand(count).to(layers.device) < _SHARP)
+    gain = torch.where(sharp, gain * torch.rand(count).to(layers.device), gain)
     gloss = gloss.gather(1, order) * gain[:, None, None, None]
+    gloss = gloss + small_highlights(pictures) * sharp[:, None, None, None]
     altered = torch.cat([diffuse.gather(1, order), gloss.clamp(max=_BRIGHTEST), rest], 1)
     return replace(pictures, layers=altered)
 
@@ -78,20 +80,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    add = parser.add_argument
-    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
-    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
-    add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
-    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
-    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
+    add_photo_arguments(parser, SCHEDULE.rate)
     add_run_arguments(parser, steps=20_000, batch=32)
     arguments = parser.parse_args()
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     try:
-        start = None if arguments.weights is None else dict(read_arrays(arguments.weights))
-        splits = (Split.TRAIN, Split.BODY)
-        world = read_world(arguments.worlds, arguments.panoramas, splits, options.seed)
+        world, start = read_given(arguments, options.seed)
     except InputError as error:
         parser.error(str(error))
     network = HighlightNetworkModule()

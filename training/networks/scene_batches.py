@@ -4,6 +4,7 @@ Limits: views lit together are of about one size, so that lighting wastes little
 them.
 """
 
+import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.io.npy import read_arrays
 
 from ..loop import Net, RunOptions, Schedule, fit
 from ..world.environments import read_panoramas
@@ -195,6 +197,53 @@ def read_world(
     photographed = np.flatnonzero(~judged[: len(found)])
     learned = np.concatenate([np.flatnonzero(~judged), np.repeat(photographed, _OFTEN)])
     return World(views, atlas, bank, learned, np.flatnonzero(judged))
+
+
+def add_photo_arguments(parser: argparse.ArgumentParser, rate: float) -> None:
+    """Add what networks that learn from photos of worlds have in common to a command line.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    rate : float
+        Default learning rate.
+    """
+    add = parser.add_argument
+    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
+    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
+    add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
+    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
+    add("--rate", type=float, default=rate, help="learning rate (default: %(default)s)")
+
+
+def read_given(
+    arguments: argparse.Namespace, seed: int
+) -> tuple[World, dict[str, np.ndarray] | None]:
+    """Read the world and the weights that a command line names.
+
+    Parameters
+    ----------
+    arguments : argparse.Namespace
+        With what `add_photo_arguments` added.
+    seed : int
+
+    Returns
+    -------
+    world : World
+        Bodies to learn from, and held-out ones.
+    weights : dict of str to ndarray or None
+        What the fit starts from.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, a folder is no world, or there is nothing to learn from.
+    """
+    given: Path | None = arguments.weights
+    weights = None if given is None else dict(read_arrays(given))
+    splits = (Split.TRAIN, Split.BODY)
+    return read_world(arguments.worlds, arguments.panoramas, splits, seed), weights
 
 
 def fit_to_photos(

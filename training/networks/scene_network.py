@@ -18,19 +18,16 @@ Limits: uncertainties are calibrated afterwards, by `training.networks.calibrati
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import torch
 
 from isc_core.errors import InputError
-from isc_core.io.npy import read_arrays
 
 from ..loop import Schedule, add_run_arguments, run_options
 from ..world.files import Split
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT
-from .scene_batches import SceneDraws, fit_to_photos, read_world
+from .scene_batches import SceneDraws, add_photo_arguments, fit_to_photos, read_given
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
@@ -48,22 +45,16 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
+    add_photo_arguments(parser, SCHEDULE.rate)
     add = parser.add_argument
-    add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
-    add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
-    add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--widths", type=int, nargs="+", default=WIDTHS, metavar="N", help="channels by level")
-    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
-    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
     add("--without", nargs="+", default=[], choices=sorted(_ABLATIONS), help="leave out, to ablate")
     add_run_arguments(parser, steps=100_000, batch=32)
     arguments = parser.parse_args()
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     try:
-        start = None if arguments.weights is None else dict(read_arrays(arguments.weights))
-        splits = (Split.TRAIN, Split.BODY)
-        world = read_world(arguments.worlds, arguments.panoramas, splits, options.seed)
+        world, start = read_given(arguments, options.seed)
     except InputError as error:
         parser.error(str(error))
     widths = tuple(arguments.widths)
