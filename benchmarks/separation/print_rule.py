@@ -36,7 +36,7 @@ class Regions:
 
     Attributes
     ----------
-    values : (K, 4) ndarray
+    values : (K, 3) ndarray
         Of `highlight_evidence.Evidence`.
     light, squares : (K,) ndarray
         Light taken off over that of the photo; the same of squares.
@@ -69,7 +69,8 @@ def regions_of(scene: PrintScene) -> Regions:
     diffuse = separate("isc", photo, mask, scene.clipped).diffuse
     residual = detect_residual_highlights(photo, diffuse, mask, seen)
     diffuse = diffuse if residual is None else residual.diffuse
-    found = highlight_evidence(photo, diffuse, mask, seen.log_ratio, seen.ratio_scale)
+    form = seen.log_ratio, seen.ratio_scale
+    found = highlight_evidence(photo, diffuse, mask, *form, scene.clipped)
     removed, truth = (
         np.where(inside, photo - one, 0).astype(float) for one in (diffuse, scene.diffuse)
     )
@@ -94,7 +95,7 @@ def fitted(photos: Sequence[Regions]) -> np.ndarray:
 
     Returns
     -------
-    (5,) ndarray
+    (4,) ndarray
         The constant first.
     """
     values = np.vstack([one.values for one in photos])
@@ -120,7 +121,7 @@ def kept(photos: Sequence[Regions], weights: np.ndarray, odds: float) -> tuple[f
     Parameters
     ----------
     photos : sequence of Regions
-    weights : (5,) ndarray
+    weights : (4,) ndarray
     odds : float
 
     Returns

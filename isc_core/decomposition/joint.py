@@ -241,7 +241,8 @@ def supported_layers(
     options, seen = options or JointOptions(), seen or predict_scene(image, mask)
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
-    kept = supported(image, cleaner, mask, seen.log_ratio, seen.ratio_scale, options.odds, marks)
+    form = seen.log_ratio, seen.ratio_scale
+    kept = supported(image, cleaner, mask, *form, options.odds, marks, clipped)
     split = replace(
         split,
         diffuse=_given_back(split.diffuse, image, kept, mask),

@@ -5,25 +5,27 @@ network that knows form is not sure of them. Each kind of evidence alone takes p
 now and then; light that is wrongly taken off does more harm than a highlight that stays.
 
 Equation: the removed light s = I - D falls into connected regions. With the log ratio y of image
-and diffuse image that the scene network expects, its scale b, and for a map v the step
+and diffuse image that the scene network expects, its scale b, the smallest channel m and the chroma
+C = max I - min I, the log odds that removing s lowers the squared error are
 
-    step(v) = median log v in the region's core - median log v in a ring around it,
+    w_0 + w_1 mean(y) / mean(b) + w_2 mean(saturation of D) + w_3 q (saturation of the ring),
 
-the log odds that taking s off lowers the squared error are
+where means are weighted by s^2 and q, at most 1/2, is the slope of C against m over the region's
+flanks and a ring around it. White light raises all channels alike: where m rises, C stays, and q >= 0. White paint
+replaces the paint around it: where m rises by W - m, C falls by C, so that q < 0. Clipped pixels
+would show a falling C in either case; they and their neighbours are left out. On grey paint, colour
+proves nothing. A region keeps its s where the odds exceed `odds`; otherwise the image is restored,
+bit for bit. Where a person has marked a highlight, or print, the nearest region is what the mark
+says.
 
-    w_0 + w_1 mean(y) / mean(b) + w_2 step(C) + w_3 step(D) + w_4 mean(saturation of D),
+Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. That a
+highlight leaves C unchanged: K.-J. Yoon, Y. Choi, I. S. Kweon 2006, doi:10.1109/ICIP.2006.312650.
+The weights are those of `benchmarks.separation.print_rule --mixed` on rendered objects, half of
+them with print; docs/methods/print.md says how the odds were chosen.
 
-with C = max I - min I, which a highlight leaves and white paint lowers; means are weighted by s^2.
-What is left under a highlight on saturated paint is saturated; on grey, colour proves nothing. A
-region keeps its s where the odds exceed `odds`, and otherwise gives all of it back, bit for bit.
-Where a person has marked a highlight, or paint, the nearest region is what the mark says.
-
-Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. The weights
-are those of `benchmarks.separation.print_rule --mixed` on rendered bodies, half of them with print;
-docs/methods/print.md says how the odds were chosen.
-
-Limits: a region that holds both, a highlight and print, is kept or given back as a whole. Faint and
-broad highlights, of which the network is not sure, are given back, and most on grey and white.
+Limits: a region that contains both a highlight and print is kept or restored as a whole. Pale print
+of the same chroma as the paint around it looks like light. Faint and broad highlights, of which the
+network is not sure, stay in the image, and most on grey and white.
 """
 
 from collections.abc import Sequence
@@ -38,10 +40,12 @@ from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added before logarithms
-_CORE, _RING = 0.5, 0.02  # of a region's peak; distance of the ring, of the object's diagonal
-_LEAST = 6  # pixels of a region that can be judged
-_MOST_STEP = 5.0  # of each number that is weighed
-WEIGHTS = (-1.725, 0.948, 0.602, -0.337, 2.064)
+_CORE, _FLANK = 0.5, 0.2  # of a region's peak
+_RING = 0.02  # distance of the ring, of the object's diagonal
+_LEAST, _FEWEST = 6, 3  # pixels: of a region that can be judged, of its flanks
+_MOST_RATIO = 6.0  # of mean y over mean b
+_SLOPES = (-1.0, 0.5)  # of C against m: above, shading does more than light
+WEIGHTS = (-2.14, 0.706, 2.099, 4.585)
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,8 @@ class Evidence:
         Number of the region at each pixel, from 1 on; 0 outside of all regions.
     numbers : (K,) ndarray of int
         Those of the regions that can be judged.
-    values : (K, 4) ndarray
-        y over b, the steps of C and D, and the saturation of D.
+    values : (K, 3) ndarray
+        y over b, the saturation of D, and the slope of C times the saturation of the ring.
     """
 
     labels: np.ndarray
@@ -69,6 +73,7 @@ def highlight_evidence(
     mask: np.ndarray,
     log_ratio: np.ndarray,
     ratio_scale: np.ndarray,
+    clipped: np.ndarray | None = None,
 ) -> Evidence:
     """Collect what speaks for each region of removed light.
 
@@ -82,6 +87,7 @@ def highlight_evidence(
         y.
     ratio_scale : (H, W) ndarray
         b.
+    clipped : (H, W) ndarray of bool, optional
 
     Returns
     -------
@@ -91,6 +97,7 @@ def highlight_evidence(
     bright = float(np.quantile(mean_channel(image)[mask], 0.99))
     labels, count = ndimage.label(removed > max(_FAINT * bright, 1e-12))
     dark = _DARK * bright + 1e-12
+    clear = mask if clipped is None else mask & ~ndimage.binary_dilation(clipped)
     # whole pixels; the ring beyond it is two wide
     reach = max(2, int(_RING * mask_diagonal(mask)))
     numbers, found = list[int](), list[list[float]]()
@@ -100,50 +107,71 @@ def highlight_evidence(
         if inside.sum() < _LEAST:
             continue
         numbers.append(k)
-        maps = _steps_of(image[wide], diffuse[wide], dark)
-        form = _form(diffuse[wide], log_ratio[wide], ratio_scale[wide], dark)
-        found.append(_values(inside, removed[wide], mask[wide], maps, form, reach))
-    return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, 4))
+        areas = _areas(inside, removed[wide], mask[wide], clear[wide], reach)
+        weight = np.square(removed[wide]) * inside
+        form = log_ratio[wide], ratio_scale[wide]
+        found.append(
+            [
+                *_form_and_saturation(weight, diffuse[wide], *form, dark),
+                _chroma_rise(image[wide], areas, dark),
+            ]
+        )
+    return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, len(WEIGHTS) - 1))
 
 
-def _steps_of(image: np.ndarray, diffuse: np.ndarray, dark: float) -> np.ndarray:
-    """Logarithms of C and of D (h, w, 2)."""
-    chroma = largest(image) - smallest(image)
-    return np.stack(
-        [np.log(np.maximum(one, 0) + dark) for one in (chroma, mean_channel(diffuse))], axis=2
-    )
+@dataclass(frozen=True)
+class _Areas:
+    """Where a region is compared with its surroundings, each (h, w) bool.
+
+    `flanks`: unclipped pixels of the region that are not faint; `ring`: around it; `clear`: pixels
+    whose colour can be trusted.
+    """
+
+    flanks: np.ndarray
+    ring: np.ndarray
+    clear: np.ndarray
 
 
-def _form(
-    diffuse: np.ndarray, log_ratio: np.ndarray, ratio_scale: np.ndarray, dark: float
-) -> np.ndarray:
-    """y, b and the saturation of D (h, w, 3)."""
-    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
-    return np.stack([mean_channel(log_ratio), ratio_scale, saturation], axis=2).astype(float)
-
-
-def _values(
-    inside: np.ndarray,
-    removed: np.ndarray,
-    mask: np.ndarray,
-    maps: np.ndarray,
-    form: np.ndarray,
-    reach: int,
-) -> list[float]:
-    """The numbers of one region, `inside` (h, w), on its box."""
-    half = _CORE * float(np.quantile(removed[inside], 0.95))
-    core = inside & (removed > half)
+def _areas(
+    inside: np.ndarray, removed: np.ndarray, mask: np.ndarray, clear: np.ndarray, reach: int
+) -> _Areas:
+    peak = float(np.quantile(removed[inside], 0.95))
+    core = inside & (removed > _CORE * peak)
     near = ndimage.binary_dilation(core, iterations=reach)
-    ring = ndimage.binary_dilation(near, iterations=2) & ~near & mask & (removed < half)
-    ring = ring if ring.sum() >= _LEAST - 1 else mask & ~core
-    weight = np.square(removed) * inside
-    y, b, saturation = (weight[..., None] * form).sum(axis=(0, 1))
-    steps = (
-        np.median(maps[core], axis=0) - np.median(maps[ring], axis=0) if ring.any() else np.zeros(2)
+    ring = ndimage.binary_dilation(near, iterations=2) & ~near & mask & (removed < _CORE * peak)
+    if ring.sum() < _LEAST - 1:
+        ring = mask & ~core
+    flanks = inside & (removed > _FLANK * peak) & clear
+    return _Areas(flanks if flanks.sum() >= _FEWEST else core, ring if ring.any() else mask, clear)
+
+
+def _form_and_saturation(
+    weight: np.ndarray,
+    diffuse: np.ndarray,
+    log_ratio: np.ndarray,
+    ratio_scale: np.ndarray,
+    dark: float,
+) -> tuple[float, float]:
+    """The first two numbers of a region, with weights (h, w)."""
+    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
+    y, b, paint = (
+        float((weight * one).sum()) for one in (mean_channel(log_ratio), ratio_scale, saturation)
     )
-    saturation /= max(float(weight.sum()), 1e-12)
-    values = np.clip([y / max(b, 1e-12), *steps, saturation], -_MOST_STEP, _MOST_STEP)
-    return [float(one) for one in values]
+    ratio = float(np.clip(y / max(b, 1e-12), -_MOST_RATIO, _MOST_RATIO))
+    return ratio, paint / max(float(weight.sum()), 1e-12)
+
+
+def _chroma_rise(image: np.ndarray, areas: _Areas, dark: float) -> float:
+    """The last number of a region: q, limited, times the saturation of the ring."""
+    high, low = largest(image).astype(float), smallest(image).astype(float)
+    saturation = float(np.median(((high - low) / (high + dark))[areas.ring]))
+    used = (areas.flanks | areas.ring) & areas.clear
+    if used.sum() < _LEAST:
+        used = areas.flanks | areas.ring
+    chroma, light = (high - low)[used], low[used]
+    light = light - light.mean()
+    slope = float((light * chroma).sum()) / max(float(np.square(light).sum()), 1e-9)
+    return float(np.clip(slope, *_SLOPES)) * saturation
 
 
 def supported(
@@ -154,6 +182,7 @@ def supported(
     ratio_scale: np.ndarray,
     odds: float,
     marks: HighlightMarks | None = None,
+    clipped: np.ndarray | None = None,
 ) -> np.ndarray:
     """Decide where removed light was a highlight.
 
@@ -171,13 +200,15 @@ def supported(
         To be exceeded; larger ones keep less, 0 keeps every region that can be judged.
     marks : HighlightMarks, optional
         Decide without the odds; paint before highlights.
+    clipped : (H, W) ndarray of bool, optional
+        Pixels whose true value lies above the recorded one.
 
     Returns
     -------
     (H, W) ndarray of bool
         False in regions that give their light back, and outside of all regions.
     """
-    seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale)
+    seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale, clipped)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
     kept = np.isin(seen.labels, seen.numbers[np.exp(score) > odds])
     if marks:

@@ -167,3 +167,27 @@ def test_marks_that_cannot_be_used_are_refused(
     photo, _, mask = ball(gloss=0.4)
     with pytest.raises(InputError, match=words):
         isc_core.decompose(photo, mask, settings=settings, marks=marks)
+
+
+def slope(photo: np.ndarray, diffuse: np.ndarray, mask: np.ndarray, clipped: np.ndarray) -> float:
+    """What the chroma says of the largest region."""
+    found = highlight_evidence(photo, diffuse, mask, *form(photo, diffuse), clipped)
+    sizes = [np.count_nonzero(found.labels == number) for number in found.numbers]
+    return float(found.values[int(np.argmax(sizes)), 2])
+
+
+def test_chroma_stays_under_light_and_falls_under_white_paint() -> None:
+    nowhere = np.zeros((SIDE, SIDE), bool)
+    photo, diffuse, mask = ball(gloss=0.4)
+    assert slope(photo, diffuse, mask, nowhere) > 0
+    photo, _, mask = ball(stripe=0.2)
+    assert slope(photo, np.minimum(photo, ball()[0]), mask, nowhere) < -0.2
+
+
+def test_a_clipped_core_does_not_make_a_highlight_look_like_paint() -> None:
+    photo, diffuse, mask = ball(gloss=1.5)
+    clipped = (photo >= 1).any(axis=2) & mask
+    photo = np.minimum(photo, 1)
+    assert (photo[clipped] >= 1).all(axis=1).any()
+    assert slope(photo, diffuse, mask, np.zeros_like(mask)) < 0
+    assert slope(photo, diffuse, mask, clipped) > 0
