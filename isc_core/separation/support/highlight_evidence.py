@@ -11,12 +11,11 @@ C = max I - min I, the log odds that removing s lowers the squared error are
     w_0 + w_1 mean(y) / mean(b) + w_2 mean(saturation of D) + w_3 q (saturation of the ring),
 
 where means are weighted by s^2 and q, at most 1/2, is the slope of C against m over the region's
-flanks and a ring around it. White light raises all channels alike: where m rises, C stays, and q >= 0. White paint
-replaces the paint around it: where m rises by W - m, C falls by C, so that q < 0. Clipped pixels
-would show a falling C in either case; they and their neighbours are left out. On grey paint, colour
-proves nothing. A region keeps its s where the odds exceed `odds`; otherwise the image is restored,
-bit for bit. Where a person has marked a highlight, or print, the nearest region is what the mark
-says.
+flanks and a ring around it. White light raises all channels alike: where m rises, C stays. White
+paint replaces the paint around it: where m rises, C falls. Clipped pixels would show a falling C in
+either case; they and their neighbours are left out. On grey paint, colour proves nothing. A region
+keeps its s where the odds exceed `odds`; otherwise the image is restored, bit for bit. Where a
+person has marked a highlight, or print, the nearest region is what the mark says.
 
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. That a
 highlight leaves C unchanged: K.-J. Yoon, Y. Choi, I. S. Kweon 2006, doi:10.1109/ICIP.2006.312650.
