@@ -2,7 +2,7 @@
 
 Problem: white letters, stripes and labels on strong colour have the colour of highlights, and a
 network that knows form is not sure of them. Each kind of evidence alone takes print for highlights
-now and then; light that is wrongly taken off does more harm than a highlight that stays.
+now and then; removing paint by mistake does more harm than leaving a highlight.
 
 Equation: the removed light s = I - D falls into connected regions. With the log ratio y of image
 and diffuse image that the scene network expects, its scale b, the smallest channel m and the chroma
@@ -169,7 +169,7 @@ def _chroma_rise(image: np.ndarray, areas: _Areas, dark: float) -> float:
         used = areas.flanks | areas.ring
     chroma, light = (high - low)[used], low[used]
     light = light - light.mean()
-    slope = float((light * chroma).sum()) / max(float(np.square(light).sum()), 1e-9)
+    slope = float((light * chroma).sum()) / max(float(np.square(light).sum()), (1e-3 * dark) ** 2)
     return float(np.clip(slope, *_SLOPES)) * saturation
 
 

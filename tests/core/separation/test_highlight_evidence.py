@@ -191,3 +191,12 @@ def test_a_clipped_core_does_not_make_a_highlight_look_like_paint() -> None:
     assert (photo[clipped] >= 1).all(axis=1).any()
     assert slope(photo, diffuse, mask, np.zeros_like(mask)) < 0
     assert slope(photo, diffuse, mask, clipped) > 0
+
+
+def test_the_exposure_does_not_matter() -> None:
+    photo, diffuse, mask = ball(stripe=0.2, gloss=0.4)
+    seen = form(photo, diffuse)
+    there, darker = (
+        highlight_evidence(k * photo, k * diffuse, mask, *seen).values for k in (1, 2.0**-20)
+    )
+    np.testing.assert_allclose(there, darker, rtol=1e-4)
