@@ -74,6 +74,8 @@ _REACHES = (
     0.25,
 )
 _HALF = 0.5  # of the object unreliable: there is nothing to continue its albedo from
+_SPREAD = 2  # pixels around clipped ones that mix with them
+_MOSTLY = 0.5  # of a clipped hole lies in a kept region
 _ENOUGH = 0.1  # of a neighbourhood known: nearer ones decide
 
 
@@ -243,23 +245,37 @@ def supported_layers(
     cleaner = split.diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale
     kept = supported(image, cleaner, mask, *form, options.odds, marks, clipped)
+    hidden = np.zeros_like(kept) if clipped is None else _hidden(kept, clipped, mask)
+    kept |= hidden
     split = replace(
         split,
         diffuse=_given_back(split.diffuse, image, kept, mask),
         specular=_only(split.specular, kept),
         residual=_only(split.residual, kept),
     )
-    hidden = kept & clipped if clipped is not None else np.zeros_like(kept)
     diffuse = split.diffuse
     if residual is not None:
         diffuse = _given_back(cleaner, image, kept, mask, out=cleaner)
-    if clipped is not None and hidden.any():
-        whole = continue_under_clipped(diffuse, image, clipped, mask, seen.log_shading)
+    if hidden.any():
+        whole = continue_under_clipped(diffuse, image, hidden, mask, seen.log_shading)
         diffuse = diffuse if residual is not None else diffuse.copy()
         np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
         return split, ResidualHighlights(diffuse, residual.unreliable & kept)
     return _with_diffuse(split, diffuse) if hidden.any() else split, None
+
+
+def _hidden(kept: np.ndarray, clipped: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Where highlights hide the paint (H, W) bool: clipped pixels and their neighbours, which mix
+    with them, in holes that belong to kept regions for the larger part.
+    """
+    if not clipped.any():
+        return np.zeros_like(kept)
+    holes = ndimage.binary_dilation(clipped, iterations=_SPREAD) & mask
+    labels, count = ndimage.label(holes, np.ones((3, 3)))
+    shares = np.asarray(ndimage.mean(kept, labels, np.arange(1, count + 1)))
+    belongs = np.concatenate([[False], shares > _MOSTLY])
+    return np.asarray(belongs[labels])
 
 
 def _given_back(

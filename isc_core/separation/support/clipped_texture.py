@@ -10,8 +10,8 @@ Equation: two fills of the clipped pixels from all others,
 D the diffuse layer and S the expected shading, without which patches from brighter places would not
 fit. For each connected hole, both also fill the hole and a ring of known pixels around it. P fills
 the hole if its mean squared error of log D on the ring is below 0.8 of that of A; otherwise, ties
-included, A does. What `clipped` finds from the channels that are left is a second estimate; D
-becomes the mean of the two, at most the image.
+included, A does. The fill is at most the image. What `clipped` finds from the channels that are
+left does not help: the mean of both was worse (docs/methods/print.md).
 
 Citation: Y. Wexler, E. Shechtman and M. Irani 2007, doi:10.1109/TPAMI.2007.60; choice by held-out
 values: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x.
@@ -53,7 +53,7 @@ def continue_under_clipped(
     Parameters
     ----------
     diffuse, image : (H, W, 3) ndarray
-        Linear; `diffuse` is at most `image`, and at clipped pixels what `explain_clipped` finds.
+        Linear; `diffuse` is at most `image`.
     clipped, mask : (H, W) ndarray of bool
     log_shading : (H, W, 3) ndarray
         Expected; read inside the mask.
@@ -71,8 +71,7 @@ def continue_under_clipped(
         shading = np.where(mask[place][..., None], log_shading[place], 0).astype(np.float32)
         given = np.asarray(diffuse[place], np.float32)
         there = _continued(given, known[place], holes[place], shading, dark)
-        mean = 0.5 * (diffuse[place][own] + np.clip(there[own], 0, image[place][own]))
-        filled[place][own] = mean
+        filled[place][own] = np.clip(there[own], 0, image[place][own])
     return filled
 
 

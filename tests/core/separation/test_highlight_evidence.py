@@ -200,3 +200,15 @@ def test_the_exposure_does_not_matter() -> None:
         highlight_evidence(k * photo, k * diffuse, mask, *seen).values for k in (1, 2.0**-20)
     )
     np.testing.assert_allclose(there, darker, rtol=1e-4)
+
+
+def test_paint_is_continued_under_a_clipped_highlight_and_beside_it() -> None:
+    photo, diffuse, mask = ball(gloss=1.5)
+    clipped = (photo >= 1).any(axis=2) & mask
+    photo = np.minimum(photo, 1)
+    start = separate("isc", photo, mask, clipped)
+    split, added = supported_layers(photo, start, mask, clipped=clipped)
+    found = split.diffuse if added is None else added.diffuse
+    bright = (photo - diffuse).sum(axis=2) > 0.6
+    assert (bright & ~clipped).any() and (bright & clipped).any()
+    np.testing.assert_allclose(found[bright], diffuse[bright], atol=0.12)
