@@ -113,7 +113,7 @@ def _add_files(group: argparse._ArgumentGroup) -> None:
     add(
         "--each",
         action="store_true",
-        help="create an object for each separate thing of a photo, in one scene",
+        help="create a Blender object for each separate object in a photo, in one scene",
     )
     add(
         "-o",
@@ -199,7 +199,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         "--highlight-odds",
         default="3",
         choices=("3", "1", "0"),
-        help="highlights to take off: certain ones, likely ones, all, as isc decompose "
+        help="highlights to remove: certain, likely or all, as in isc decompose "
         "(default: %(default)s)",
     )
     add(

@@ -106,10 +106,10 @@ class _Highlights(_Panel):
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context: Any) -> None:
-        """Draw the buttons for saying what is a highlight."""
+        """Draw which highlights are removed, and the buttons that mark highlights and print."""
         settings = context.scene.isc
         if settings.model != "joint":
-            self.layout.label(text="Needs the model Joint", icon="INFO")
+            self.layout.label(text="Requires the Joint model", icon="INFO")
         layout = self.layout.column()
         layout.enabled = settings.model == "joint"
         choice = layout.column()
@@ -117,7 +117,7 @@ class _Highlights(_Panel):
         choice.prop(settings, "highlight_odds")
         row = layout.row(align=True)
         row.operator("isc.mark_highlight", icon="ADD").reject = False
-        row.operator("isc.mark_highlight", text="Not a Highlight", icon="REMOVE").reject = True
+        row.operator("isc.mark_highlight", text="Mark as Print", icon="REMOVE").reject = True
         column = layout.column()
         column.use_property_split = True
         column.prop(settings, "highlights")
@@ -205,7 +205,7 @@ class _Edit(_Panel):
     def _draw_material(self, built: BuiltObject) -> None:
         node = dichromatic_node(built.material)
         if node is None:
-            self.layout.label(text="The material has no node ISC Dichromatic", icon="INFO")
+            self.layout.label(text="Material lacks node ISC Dichromatic", icon="INFO")
             return
         # The sliders would change all of them, and drawing a panel may change nothing.
         if objects_sharing_material(built.object, built.material):
@@ -229,9 +229,9 @@ class _Edit(_Panel):
         gain = node.inputs["Specular Gain"].default_value
         column.operator("isc.dichromatic", text=f"Specular Gain {gain:.2f}")
         if shown:
-            column.label(text="The photo's highlights are shown", icon="INFO")
+            column.label(text="Showing the photo's highlights", icon="INFO")
         elif not gloss.enabled:
-            column.label(text="Without a level there is no gloss", icon="INFO")
+            column.label(text="No gloss at specular level 0", icon="INFO")
         if can_show_highlights(built.material):
             text = f"{'Hide' if shown else 'Show'} Photo Highlights"
             column.operator("isc.photo_highlights", text=text).show = not shown

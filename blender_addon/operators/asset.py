@@ -27,12 +27,12 @@ class ISC_OT_save_asset(bpy.types.Operator):
 
     library: StringProperty(
         name="Library",
-        description="Asset library of the preferences to save into, empty uses the first",
+        description="Asset library to save into; if empty, the first in the preferences",
         options={"SKIP_SAVE"},
     )
     overwrite: BoolProperty(
         name="Overwrite",
-        description="Replace an asset of the same name, otherwise the new one is numbered",
+        description="Replace an asset of the same name instead of numbering the new one",
         default=False,
         options={"SKIP_SAVE"},
     )
@@ -52,7 +52,7 @@ class ISC_OT_save_asset(bpy.types.Operator):
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select an object made by ISC that is not linked")
+            cls.poll_message_set("Select a local object created by ISC")
             return False
         return True
 
@@ -106,7 +106,7 @@ class ISC_OT_save_asset(bpy.types.Operator):
         built = find_built(context.object)
         try:
             if built is None:
-                raise InputError("no object made by ISC is active: select one")
+                raise InputError("no object created by ISC is active: select one")
             path = save_asset(built, library_folder(context, self.library), self.overwrite)
         except InputError as error:
             self.report({"ERROR"}, str(error))

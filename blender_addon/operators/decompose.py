@@ -89,7 +89,7 @@ class _Overwrites(WorkerOperator):
 
     overwrite: BoolProperty(
         name="Overwrite Edits",
-        description="Replace the mesh even if it was edited by hand",
+        description="Replace the mesh, even if it was edited by hand",
         default=False,
         options={"SKIP_SAVE"},
     )
@@ -194,7 +194,7 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
 
     bl_idname = "isc.confirm_overwrite"
     bl_label = "Overwrite"
-    bl_description = "Replace the edited mesh by the one that is created from the photo"
+    bl_description = "Replace the edited mesh by the mesh that is created from the photo"
     bl_options = {"INTERNAL"}
 
     again: StringProperty(name="Operator", description="Operator to start on confirmation")
@@ -220,7 +220,7 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
                 self,
                 event,
                 title="Overwrite Edited Mesh?",
-                message=f"The mesh of {self.edited} was edited by hand. Its edits will be lost.",
+                message=f"The mesh of {self.edited} was edited by hand. These edits will be lost.",
                 confirm_text="Overwrite",
                 icon="WARNING",
             )
@@ -330,7 +330,7 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select an object made by ISC")
+            cls.poll_message_set("Select an object created by ISC")
             return False
         return _is_idle(cls)
 
@@ -354,7 +354,7 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
         """
         built = find_built(context.object)
         if built is None:
-            raise InputError("no object made by ISC is active: select one")
+            raise InputError("no object created by ISC is active: select one")
         if is_copy(built.object):
             original = find_original(built.object)
             instead = "press Create Object" if original is None else f"select {original.name}"

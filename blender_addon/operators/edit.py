@@ -30,7 +30,7 @@ _LIGHTS = (
         "Estimated Sun",
         "One sun along the direction that best explains the photo's shading, and uniform light",
     ),
-    ("CHOSEN", "Custom Direction", "The same sun from another direction"),
+    ("CHOSEN", "Custom Direction", "The same sun and uniform light, from another direction"),
     ("RECOVERED", "Recovered Light", "The recovered environment map without a sun"),
 )
 
@@ -59,7 +59,7 @@ class EditOperator:
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select an object made by ISC")  # type: ignore[attr-defined]
+            cls.poll_message_set("Select an object created by ISC")  # type: ignore[attr-defined]
             return False
         return True
 
@@ -79,7 +79,7 @@ class EditOperator:
         built = find_built(context.object)
         try:
             if built is None:
-                raise InputError("no object made by ISC is active: select one")
+                raise InputError("no object created by ISC is active: select one")
             self.edit(built)
             settle_edits(find_material(built.object) or built.material)
         except InputError as error:
@@ -112,21 +112,21 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
 
     hue: FloatProperty(
         name="Hue",
-        description="Rotation of the hue, 0.5 as in the photo, 0 and 1 the opposite",
+        description="Rotation of the hue; 0.5 is as in the photo, 0 and 1 the opposite hue",
         default=0.5,
         min=0,
         max=1,
     )
     saturation: FloatProperty(
         name="Saturation",
-        description="Factor of the saturation, 0 is gray, 1 as in the photo",
+        description="Factor of the saturation; 0 is gray, 1 is as in the photo",
         default=1,
         min=0,
         max=2,
     )
     value: FloatProperty(
         name="Value",
-        description="Factor of the brightness, 1 as in the photo",
+        description="Factor of the brightness; 1 is as in the photo",
         default=1,
         min=0,
         max=2,
@@ -183,18 +183,18 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
 
     bl_idname = "isc.dichromatic"
     bl_label = "Diffuse and Specular Gain"
-    bl_description = "Scale the object's diffuse and specular light"
+    bl_description = "Scale the object's diffuse and specular reflection"
 
     diffuse_gain: FloatProperty(
         name="Diffuse",
-        description="Factor of the diffuse light",
+        description="Factor of the diffuse reflection",
         default=1,
         min=0,
         max=10,
     )
     specular_gain: FloatProperty(
         name="Specular",
-        description="Factor of the highlights, 0 is diffuse",
+        description="Factor of the highlights; 0 is diffuse",
         default=1,
         min=0,
         max=10,
@@ -249,8 +249,7 @@ class ISC_OT_photo_highlights(EditOperator, bpy.types.Operator):
     bl_idname = "isc.photo_highlights"
     bl_label = "Photo Highlights"
     bl_description = (
-        "Show the photo's own highlights instead of the surface's, until light, camera or object "
-        "move"
+        "Show the photo's highlights instead of the material's until light, camera or object move"
     )
 
     show: BoolProperty(name="Show", description="Show the highlights of the photo", default=True)
@@ -285,7 +284,7 @@ class ISC_OT_own_material(EditOperator, bpy.types.Operator):
 
     bl_idname = "isc.own_material"
     bl_label = "Make Material Single-User"
-    bl_description = "Give the object its own material, so that edits do not change its copies"
+    bl_description = "Give the object its own material, so that edits do not affect its copies"
 
     def edit(self, built: BuiltObject) -> None:
         """Copy the material; see `EditOperator`.
@@ -308,7 +307,7 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
 
     bl_idname = "isc.relight"
     bl_label = "Relight"
-    bl_description = "Light the object by one sun and uniform light, or as in the photo"
+    bl_description = "Light the object with one sun and uniform light, or as in the photo"
 
     light: EnumProperty(
         name="Light", description="Light of the object", items=_LIGHTS, default="OPTIMAL"
@@ -349,7 +348,7 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
         Raises
         ------
         InputError
-            If the object does not store its light, or the direction has no length.
+            If the object does not store its light, or the direction is zero.
         """
         obj = built.object
         if self.light == "RECOVERED":
@@ -363,7 +362,7 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
             direction = np.array([right, up, -away])  # in the camera frame
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
-            raise InputError("the direction has no length: enter another")
+            raise InputError("the direction is zero: enter another")
         ensure_sun(obj[KEY], built.collection, direction / length, self.strength * irradiance)
         set_sun_mix(built.world, self.ambient * ambient, True)
 

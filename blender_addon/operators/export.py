@@ -34,9 +34,9 @@ _MAP_NAMES = {"lobe": "specular_fit", "residual": "difference", "reflectance": "
 # Light and camera are the scene's; textures are the material's.
 _NOT_MAPS = ("environment_map", "photo", "base_color", "edited_base_color", "normal_map")
 _FORMATS = (
-    ("GLB", "glTF Binary (.glb)", "One file with textures, read by most programs and the web"),
+    ("GLB", "glTF Binary (.glb)", "One file with textures, for most programs and the web"),
     ("USD", "USD (.usdc)", "Universal Scene Description with preview surface and textures"),
-    ("FBX", "FBX (.fbx)", "One file with textures, read by most game engines"),
+    ("FBX", "FBX (.fbx)", "One file with textures, for most game engines"),
     ("OBJ", "Wavefront (.obj)", "Geometry, material library and textures"),
 )
 _FILE_FORMATS = (
@@ -120,7 +120,7 @@ class _FolderOperator:
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select an object made by ISC")  # type: ignore[attr-defined]
+            cls.poll_message_set("Select an object created by ISC")  # type: ignore[attr-defined]
             return False
         return True
 
@@ -159,7 +159,7 @@ class _FolderOperator:
         built = find_built(context.object)
         try:
             if built is None or not self.directory:
-                raise InputError("nothing to export: select an object made by ISC, and a folder")
+                raise InputError("nothing to export: select an object created by ISC, and a folder")
             names = self.write(built, Path(bpy.path.abspath(self.directory)))
         except InputError as error:
             self.report({"ERROR"}, str(error))
@@ -195,7 +195,7 @@ class ISC_OT_export(_FolderOperator, bpy.types.Operator):
 
     bl_idname = "isc.export"
     bl_label = "Export Object"
-    bl_description = "Export the object as it is seen, with its edits and textures"
+    bl_description = "Export the object as it is shown, with its edits and textures"
 
     directory: StringProperty(
         name="Folder",
@@ -204,11 +204,11 @@ class ISC_OT_export(_FolderOperator, bpy.types.Operator):
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
     file_format: EnumProperty(
-        name="Format", description="Format of the object's file", items=_FORMATS, default="GLB"
+        name="Format", description="File format of the object", items=_FORMATS, default="GLB"
     )
     maps: BoolProperty(
         name="Recovered Maps",
-        description="Also write albedo, normals, height and the other recovered maps as OpenEXR",
+        description="Also export albedo, normals, height and the other recovered maps as OpenEXR",
         default=False,
     )
 

@@ -140,7 +140,7 @@ def _after_update(scene: Any, depsgraph: Any) -> None:
             if shows_highlights(material) and has_moved(material, scene):
                 hide_highlights(material)
                 settle_edits(material)
-                _tell(f"{material.name}: the photo's highlights are off, as the view has changed")
+                _tell(f"{material.name}: photo highlights turned off, because the view changed")
 
 
 @persistent

@@ -44,7 +44,7 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
 
     bl_idname = "isc.cut_mask"
     bl_label = "Cut Out"
-    bl_description = "Create the mask by segmenting the object inside the box by its colors"
+    bl_description = "Create the mask by segmenting the object inside the box by color"
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -138,7 +138,7 @@ class ISC_OT_take_mask(bpy.types.Operator):
 
     bl_idname = "isc.take_mask"
     bl_label = "Load Mask"
-    bl_description = "Load a mask from a file, pack it, and make it the mask of a photo"
+    bl_description = "Load a mask from a file, pack it, and use it for a photo"
     bl_options = {"UNDO", "INTERNAL"}
 
     filepath: StringProperty(name="File", description="File of the mask", subtype="FILE_PATH")
@@ -181,7 +181,9 @@ class ISC_OT_new_mask(bpy.types.Operator):
 
     bl_idname = "isc.new_mask"
     bl_label = "New Mask to Paint"
-    bl_description = "Create a black image of the photo's size, to paint the object on in white"
+    bl_description = (
+        "Create a black image of the photo's size on which to paint the object in white"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: Any) -> set[str]:
@@ -215,7 +217,9 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
 
     bl_idname = "isc.draw_box"
     bl_label = "Select Box"
-    bl_description = "Cut the object out of a box drawn around it with some background"
+    bl_description = (
+        "Draw a box around the object, with some background, and cut the object out of it"
+    )
 
     _start: tuple[int, int] | None = None
     _end: tuple[int, int] = (0, 0)

@@ -21,16 +21,16 @@ _FIELDS = {
     "--separator": "Separator",
     "--model": "Model",
     "--box": "Box",
-    "--highlight-odds": "Take Off",
+    "--highlight-odds": "Remove Highlights",
     "--highlight": "Highlights",
-    "--not-highlight": "Not Highlights",
+    "--not-highlight": "Print",
     "--point": "Points",
     "--not": "Background",
     "--each": "Each Object",
 }
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
-_THING = re.compile(r"^thing (\d+) of (\d+): ")
+_PART = re.compile(r"^object (\d+) of (\d+): ")
 _MOST_SECONDS = 90  # more are shown in minutes
 _MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 
@@ -157,10 +157,10 @@ def stage_text(stage: str, seconds_left: float | None) -> str:
     Returns
     -------
     str
-        For example "shape and light, about 20 s left"; "thing 2 of 3: " is "2/3: ", for a panel is
-        narrow.
+        For example "shape and light, about 20 s left"; "object 2 of 3: " is "2/3: ", because a
+        panel is narrow.
     """
-    stage = _THING.sub(r"\1/\2: ", stage)
+    stage = _PART.sub(r"\1/\2: ", stage)
     if seconds_left is None:
         return stage
     if seconds_left < _MOST_SECONDS:

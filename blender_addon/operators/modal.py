@@ -262,7 +262,7 @@ class ISC_OT_cancel(bpy.types.Operator):
 
     bl_idname = "isc.cancel"
     bl_label = "Cancel"
-    bl_description = "Cancel the run and discard its work"
+    bl_description = "Cancel the run and discard its result"
     bl_options = {"INTERNAL"}
 
     @classmethod

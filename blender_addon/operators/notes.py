@@ -13,10 +13,10 @@ class ISC_OT_show_notes(bpy.types.Operator):
 
     bl_idname = "isc.show_notes"
     bl_label = "Notes on the Result"
-    bl_description = "What to keep in mind about the last result"
+    bl_description = "Show the notes on the last result"
     bl_options = {"INTERNAL"}
 
-    notes: StringProperty(name="Notes", description="The notes, one a line")
+    notes: StringProperty(name="Notes", description="The notes, one per line")
 
     @classmethod
     def description(cls, context: Any, properties: Any) -> str:

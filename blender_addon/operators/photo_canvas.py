@@ -307,7 +307,7 @@ class ClickOnPhoto(PhotoOperator):
         point = point_at(self._canvas.place(position), self._size)
         self._leave(context, set())
         if point is None:
-            self.report({"WARNING"}, "the point lies outside of the photo: click on the photo")
+            self.report({"WARNING"}, "the point lies outside the photo: click on the photo")
             return {"CANCELLED"}
         self.take(context.scene.isc, f"{point[0]},{point[1]}")
         return {"FINISHED"}

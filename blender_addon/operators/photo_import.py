@@ -34,7 +34,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
     bl_idname = "isc.photo_as_object"
     bl_label = "Photo as 3D Object"
     bl_description = (
-        "Create a mesh with material from a photo of one object, the mask is found if the photo "
+        "Create a mesh with material from a photo of an object; the mask is found if the photo "
         "has no transparency"
     )
     bl_options = {"UNDO"}
@@ -47,7 +47,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
     )
     image: StringProperty(
         name="Image",
-        description="Full name of an image of this file, in place of a file",
+        description="Full name of an image in this .blend file, instead of a file",
         options={"SKIP_SAVE", "HIDDEN"},
     )
     filter_image: BoolProperty(default=True, options={"HIDDEN"}, description="Show images")
@@ -162,7 +162,7 @@ def load_photo(path: Path) -> Any:
 
 
 def _no_photo(path: Path) -> str:
-    return f"{path.name} is no photo that Blender can read: use a JPEG, PNG, TIFF or EXR file"
+    return f"{path.name} is not a photo that Blender can read: use a JPEG, PNG, TIFF or EXR file"
 
 
 def _has_alpha(image: Any) -> bool:

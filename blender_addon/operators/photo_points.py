@@ -22,7 +22,7 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
 
     bl_idname = "isc.auto_mask"
     bl_label = "Auto Mask"
-    bl_description = "Create the mask by finding the object in the photo; points say which it is"
+    bl_description = "Find the object in the photo and make it the mask; points select the object"
 
     @classmethod
     def poll(cls, context: Any) -> bool:
@@ -56,7 +56,7 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         Raises
         ------
         InputError
-            If no photo is selected, it cannot be used, a point is no point, or a run is active.
+            If no photo is selected, it cannot be used, a point is not column,row, or a run is active.
         """
         require_no_active_run()
         settings = context.scene.isc
@@ -77,10 +77,10 @@ class ISC_OT_mark_point(ClickOnPhoto, bpy.types.Operator):
 
     bl_idname = "isc.mark_point"
     bl_label = "Add Point"
-    bl_description = "Click on the object, or on what does not belong to it, and find the mask"
+    bl_description = "Find the mask again with a clicked point of the object or of the background"
 
     background: BoolProperty(
-        name="Background", description="The point does not belong to the object"
+        name="Background", description="Mark a point that does not belong to the object"
     )
 
     def advice(self) -> str:
@@ -132,17 +132,17 @@ class ISC_OT_clear_points(bpy.types.Operator):
 
 
 class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
-    """Mark a highlight, or what looks like one, with a click."""
+    """Mark a highlight, or print that looks like one, with a click."""
 
     bl_idname = "isc.mark_highlight"
-    bl_label = "Add Highlight"
+    bl_label = "Mark as Highlight"
     bl_description = (
-        "Click on a highlight that stayed in the base color, or on print that was taken for one; "
-        "create the object again afterwards"
+        "Mark a highlight that stayed in the base color, or print that was removed as a "
+        "highlight, with a click on the photo. Create the object again afterwards"
     )
     bl_options = {"UNDO"}
 
-    reject: BoolProperty(name="Not a Highlight", description="What is there is no highlight")
+    reject: BoolProperty(name="Print", description="Mark print or paint instead of a highlight")
 
     def advice(self) -> str:
         """Return what to click on; see `ClickOnPhoto`.
@@ -151,7 +151,7 @@ class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
         -------
         str
         """
-        return "Click on what is no highlight" if self.reject else "Click on a highlight"
+        return "Click on print or paint" if self.reject else "Click on a highlight"
 
     def take(self, settings: Any, point: str) -> None:
         """Add the mark; see `ClickOnPhoto`.
@@ -171,7 +171,7 @@ class ISC_OT_clear_highlights(bpy.types.Operator):
 
     bl_idname = "isc.clear_highlights"
     bl_label = "Clear Marks"
-    bl_description = "Remove the marks of highlights; what is one is then decided automatically"
+    bl_description = "Remove all marks; highlights are then detected automatically"
     bl_options = {"UNDO"}
 
     def execute(self, context: Any) -> set[str]:

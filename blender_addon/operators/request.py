@@ -123,7 +123,7 @@ def request_from_json(text: str) -> DecomposeRequest:
         return _from_known_fields(DecomposeRequest, {**stored, **parts})
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
-            "the object does not store how it was made: create it from its photo again"
+            "the object does not store how it was created: create it from its photo again"
         ) from error
 
 
@@ -374,13 +374,13 @@ def parse_points(text: str) -> list[tuple[int, int]]:
     Raises
     ------
     InputError
-        If a word is no point.
+        If a word is not a point.
     """
     points = []
     for word in text.split():
         try:
             x, y = (int(part) for part in word.split(","))
         except ValueError as error:
-            raise InputError(f"{word!r} is no point: write column,row, such as 120,80") from error
+            raise InputError(f"{word!r} is not a point: write column,row, such as 120,80") from error
         points.append((x, y))
     return points

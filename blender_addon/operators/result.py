@@ -117,7 +117,7 @@ class ISC_OT_build_result(bpy.types.Operator):
     bl_idname = "isc.build_result"
     bl_label = "Create Object of Result"
     bl_description = (
-        "Build the object of a result folder, or update the object built from the same photo"
+        "Create the object of a result folder, or update the object created from the same photo"
     )
     bl_options = {"UNDO", "INTERNAL"}
 
@@ -125,7 +125,7 @@ class ISC_OT_build_result(bpy.types.Operator):
         name="Folder", description="Result folder with arrays.npz", subtype="DIR_PATH"
     )
     request: StringProperty(
-        name="Request", description="Request as JSON, empty uses the panel's settings"
+        name="Request", description="Request as JSON; if empty, the panel's settings are used"
     )
 
     def execute(self, context: Any) -> set[str]:
@@ -168,7 +168,7 @@ class ISC_OT_import_result(bpy.types.Operator):
 
     bl_idname = "isc.import_result"
     bl_label = "Import Result"
-    bl_description = "Build the object of a result folder of isc decompose"
+    bl_description = "Create an object from a result folder of isc decompose"
     bl_options = {"REGISTER"}
 
     directory: StringProperty(
@@ -215,7 +215,7 @@ class ISC_OT_import_result(bpy.types.Operator):
         folder = Path(bpy.path.abspath(self.directory))
         if not self.directory or not (folder / DESCRIPTION).is_file():
             self.report(
-                {"ERROR"}, f"{folder} is no result: select a folder that isc decompose has written"
+                {"ERROR"}, f"{folder} is not a result: select a folder written by isc decompose"
             )
             return {"CANCELLED"}
         try:
@@ -231,7 +231,7 @@ class ISC_OT_read_result(WorkerOperator, bpy.types.Operator):
 
     bl_idname = "isc.read_result"
     bl_label = "Read Result"
-    bl_description = "Read a result folder and build its object, in the background"
+    bl_description = "Read a result folder and create its object, in the background"
     bl_options = {"INTERNAL"}
 
     directory: StringProperty(name="Folder", description="Result folder", subtype="DIR_PATH")
@@ -274,7 +274,7 @@ class ISC_OT_return_to_scene(bpy.types.Operator):
 
     bl_idname = "isc.return_to_scene"
     bl_label = "Back to Scene"
-    bl_description = "Show the scene again in which Create Object was pressed, this one is kept"
+    bl_description = "Return to the scene in which Create Object was pressed; this scene is kept"
     bl_options = {"UNDO"}
 
     @classmethod

@@ -109,7 +109,7 @@ def _mark(block: Any) -> None:
     block.asset_mark()
     about = block.asset_data
     about.catalog_id = CATALOG
-    about.description = "Object of a photo, by ISC"
+    about.description = "Object created from a photo by ISC"
     about.tags.new("ISC", skip_if_exists=True)
 
 

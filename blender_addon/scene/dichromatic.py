@@ -71,7 +71,7 @@ _SPECULAR_GAIN = GroupInput(
     1.0,
     0,
     10,
-    "Factor of the highlights, 0 is diffuse, 1 as in the photo",
+    "Factor of the highlights; 0 is diffuse, 1 is as in the photo",
 )
 DICHROMATIC_INPUTS = (
     GroupInput(
@@ -88,7 +88,7 @@ DICHROMATIC_INPUTS = (
         1.0,
         0,
         10,
-        "Factor of the diffuse light, 0 is black, 1 as in the photo",
+        "Factor of the diffuse reflection; 0 is black, 1 is as in the photo",
     ),
     GroupInput(
         "Hue",
@@ -96,7 +96,7 @@ DICHROMATIC_INPUTS = (
         0.5,
         0,
         1,
-        "Rotation of the hue, 0.5 as in the photo, 0 and 1 the opposite",
+        "Rotation of the hue; 0.5 is as in the photo, 0 and 1 the opposite hue",
         factor=True,
     ),
     GroupInput(
@@ -105,26 +105,26 @@ DICHROMATIC_INPUTS = (
         1.0,
         0,
         2,
-        "Factor of the saturation, 0 is gray, 1 as in the photo",
+        "Factor of the saturation; 0 is gray, 1 is as in the photo",
     ),
-    GroupInput("Value", "Float", 1.0, 0, 2, "Factor of the brightness, 1 as in the photo"),
+    GroupInput("Value", "Float", 1.0, 0, 2, "Factor of the brightness; 1 is as in the photo"),
     GroupInput(
         "Specular Level",
         "Float",
         0.0,
         0,
         24,
-        "Strength of the highlights, 0 is diffuse, 1 is plastic (4 % along the normal)",
+        "Strength of the highlights; 0 is diffuse, 1 is plastic (4 % along the normal)",
     ),
     _SPECULAR_GAIN,
-    GroupInput("Roughness", "Float", 0.5, 0, 1, "Width of the highlights, 0 is a mirror", True),
+    GroupInput("Roughness", "Float", 0.5, 0, 1, "Width of the highlights; 0 is a mirror", True),
     GroupInput(
         "Gloss Gain",
         "Float",
         1.0,
         0.1,
         10,
-        "Divides the roughness, above 1 the highlights are sharper, 1 as in the photo",
+        "Divisor of the roughness; above 1, highlights are sharper than in the photo",
     ),
     GroupInput(
         "Photo Highlights",
@@ -132,7 +132,7 @@ DICHROMATIC_INPUTS = (
         0.0,
         0,
         1,
-        "1 while the photo's own highlights replace those of the surface",
+        "1 while the photo's highlights replace those of the material",
         factor=True,
     ),
 )

@@ -198,10 +198,10 @@ def require_options(options: BuildOptions) -> None:
     """
     if not 0 < options.size_metres < 1e6:
         raise InputError(
-            f"a size of {options.size_metres} metres cannot be built: choose one above 0"
+            f"a size of {options.size_metres} metres is not possible: choose one above 0"
         )
     if options.back not in ("", *Back):
-        raise InputError(f"there is no back {options.back!r}: choose {', '.join(Back)}")
+        raise InputError(f"unknown back {options.back!r}: choose {', '.join(Back)}")
     if options.triangles < 0:
         raise InputError("the number of triangles cannot be negative: 0 keeps every pixel")
 

@@ -53,22 +53,22 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
 
     threads: IntProperty(
         name="Threads",
-        description="Number of threads for the worker, 0 uses one per core",
+        description="Number of threads of the worker process (0 uses one per core)",
         default=0,
         min=0,
         max=256,
     )
     cache_folder: StringProperty(
         name="Cache Folder",
-        description="Folder for results, empty uses the extension's own folder",
+        description="Folder for results; if empty, the extension's own folder is used",
         subtype="DIR_PATH",
         default="",
     )
     cache_limit: IntProperty(
         name="Cache Limit",
         description=(
-            "Size in gigabytes of the results that are kept so that the same photo with the same "
-            "settings is ready at once, the oldest are removed first, 0 keeps none"
+            "Maximum size of the cached results in gigabytes (0 caches none). A cached result is "
+            "used again for the same photo and settings; the oldest are deleted first"
         ),
         default=_USUAL_GIGABYTES,
         min=0,
@@ -77,8 +77,8 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
     keep_results: BoolProperty(
         name="Keep Result Folders",
         description=(
-            "Keep the folder of every result (maps, mesh, preview) in the cache folder, "
-            "otherwise it is deleted when Blender exits"
+            "Keep the folder of every result (maps, mesh, preview) in the cache folder instead of "
+            "deleting it when Blender exits"
         ),
         default=False,
     )

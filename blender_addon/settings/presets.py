@@ -34,12 +34,10 @@ class Preset:
 
 
 PRESETS = {
-    "DRAFT": Preset("Draft", "Maps of 256 pixels, in about 10 s on two cores", 256, "joint", 16),
-    "STANDARD": Preset(
-        "Standard", "Maps of 512 pixels, in about 10 s on two cores", 512, "joint", 64
-    ),
-    "HIGH": Preset("High", "Maps of 1024 pixels, in about 20 s on two cores", 1024, "joint", 128),
-    "ULTRA": Preset("Ultra", "Maps of 2048 pixels, in about 40 s on two cores", 2048, "joint", 256),
+    "DRAFT": Preset("Draft", "Maps of 256 pixels, about 10 s on two cores", 256, "joint", 16),
+    "STANDARD": Preset("Standard", "Maps of 512 pixels, about 10 s on two cores", 512, "joint", 64),
+    "HIGH": Preset("High", "Maps of 1024 pixels, about 20 s on two cores", 1024, "joint", 128),
+    "ULTRA": Preset("Ultra", "Maps of 2048 pixels, about 40 s on two cores", 2048, "joint", 256),
 }
 CUSTOM = "CUSTOM"
 

@@ -37,7 +37,7 @@ MODELS = _numbered(
         "joint",
         "Joint",
         "Separate highlights by color and shape, recover shape, light and reflectance, "
-        "and extrapolate the reflectance below the highlights",
+        "and continue the reflectance under the highlights",
     ),
     (
         "mdr",
@@ -51,34 +51,34 @@ MODELS = _numbered(
         "Recover shape, light and reflectance from the photo, then remove highlights from the "
         "reflectance",
     ),
-    ("sirfs", "SIRFS", "Assume that the photo has no highlights"),
+    ("sirfs", "SIRFS", "Recover shape, light and reflectance of a photo without highlights"),
     ("naive", "Naive", "Baseline: flat shape under uniform light"),
     ("retinex", "Retinex", "Baseline: smooth changes are shading, sharp changes are reflectance"),
     ("sfs-tsai-shah", "Tsai-Shah", "Baseline: linear shape from shading"),
     ("sfs-ikeuchi-horn", "Ikeuchi-Horn", "Baseline: regularized shape from shading"),
 )
 HIGHLIGHT_ODDS = _numbered(
-    ("3", "Certain", "What is hardly anything but a highlight: some highlights stay, print stays"),
-    ("1", "Likely", "What is more likely a highlight than print: some print goes with it"),
-    ("0", "All", "All that looks like a highlight, print included"),
+    ("3", "Certain", "Remove certain highlights only; print stays, and some highlights with it"),
+    ("1", "Likely", "Remove what is more likely a highlight than print, including some print"),
+    ("0", "All", "Remove everything that looks like a highlight, including print"),
 )
 SEPARATORS = _numbered(
-    ("isc", "ISC", "This project's method, the most accurate on most photos"),
+    ("isc", "ISC", "Remove only what color proves to be a highlight"),
     (
         "network",
         "Network",
-        "Network trained on rendered glossy objects, also separates highlights from white "
+        "Network trained on rendered glossy objects; also separates highlights from white "
         "reflectance, where color alone cannot",
     ),
     (
         "sparse_coding",
         "Sparse Coding",
-        "Highlights are the part that a dictionary of diffuse patches cannot represent",
+        "Remove the part of the photo that a dictionary of diffuse patches cannot represent",
     ),
     (
         "chaotic_segmentation",
         "Chaotic Segmentation",
-        "Highlights exceed thresholds found by chaotic search, and are inpainted",
+        "Remove what exceeds thresholds found by chaotic search, and inpaint it",
     ),
     ("shen_2013", "Shen 2013", "Real-time: chromaticity ranges by pixel clustering"),
     ("shen_2009", "Shen 2009", "Modified specular-free image"),
@@ -95,72 +95,70 @@ SEPARATORS = _numbered(
     ("none", "None", "Keep the highlights"),
 )
 ILLUMINATIONS = _numbered(
-    ("photo", "Photo", "Any light, in a photo of balanced colors"),
-    ("natural", "Natural", "Smooth light from all directions, of any color"),
+    ("photo", "Photo", "Any light, in a photo with balanced colors"),
+    ("natural", "Natural", "Smooth light of any color from all directions"),
     ("laboratory", "Laboratory", "One strong light source in a dark room"),
 )
 CAMERAS = _numbered(
     (
         "auto",
         "Automatic",
-        "Focal length of the photo's metadata, orthographic where they give none",
+        "Use the focal length in the photo's metadata, or an orthographic camera without one",
     ),
-    ("orthographic", "Orthographic", "Parallel rays"),
-    ("focal_length", "Perspective", "A given focal length"),
+    ("orthographic", "Orthographic", "Assume parallel rays"),
+    ("focal_length", "Perspective", "Use the given focal length"),
 )
 MASK_SOURCES = _numbered(
     (
         "ALPHA",
         "Automatic",
-        "Use the photo's transparency, or its black background, else find the object",
+        "Use the photo's transparency or black background; without either, find the object",
     ),
     (
         "IMAGE",
         "Image",
-        "Use another image, with the object white on black or opaque on transparent",
+        "Use another image, in which the object is white on black or opaque on transparent",
     ),
 )
 SPECULAR_SOURCES = _numbered(
     (
         "lobe",
         "Material",
-        "Use the recovered roughness and specular level, highlights move with light and view",
+        "Use the recovered roughness and specular level; highlights move with light and view",
     ),
-    ("image", "Photo", "Use the photo's own highlights, fixed to the surface"),
+    ("image", "Photo", "Use the photo's highlights, fixed to the surface"),
     ("none", "None", "Create an object without highlights"),
 )
 BACKS = _numbered(
-    ("open", "Open", "No back"),
-    ("flat", "Flat", "A plane, and a wall along the outline, for reliefs"),
-    ("rounded", "Rounded", "A back as round as the outline"),
-    ("mirrored", "Mirrored", "The visible side again"),
+    ("open", "Open", "Build no back"),
+    ("flat", "Flat", "Build a plane, and a wall along the outline, for reliefs"),
+    ("rounded", "Rounded", "Build a back that is as round as the outline"),
+    ("mirrored", "Mirrored", "Mirror the visible side"),
 )
 OWN_SHADOWS_ITEMS = _numbered(
     (
         "auto",
         "Auto",
-        "On in a scene with other objects, off in a new scene, unchanged for an object that is "
-        "updated",
+        "On in a scene with other objects, off in a new scene; an updated object keeps its setting",
     ),
     (
         "on",
         "On",
-        "Cast shadows, also on the object itself, in addition to those that the recovered light "
-        "contains",
+        "Cast shadows, also on the object itself, in addition to those in the recovered light",
     ),
-    ("off", "Off", "Cast no shadows, the object looks as in the photo"),
+    ("off", "Off", "Cast no shadows; the object looks as in the photo"),
 )
 TEXTURE_SIZES = _numbered(
-    ("photo", "Photo", "Resolution of the photo"),
+    ("photo", "Photo", "Use the resolution of the photo"),
     ("4096", "4K", "At most 4096 pixels"),
     ("2048", "2K", "At most 2048 pixels"),
     ("1024", "1K", "At most 1024 pixels"),
-    ("maps", "Maps", "Resolution of shape and highlights, as Size sets it"),
+    ("maps", "Maps", "Use the resolution of the maps, which Size sets"),
 )
 _PRESET_NAMES = (*PRESETS, CUSTOM)
 _PRESET_ITEMS = _numbered(
     *((name, preset.label, preset.description) for name, preset in PRESETS.items()),
-    (CUSTOM, "Custom", "Values set in the panel Method"),
+    (CUSTOM, "Custom", "Use the values in the Method panel"),
 )
 
 
@@ -192,7 +190,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     image: PointerProperty(
         name="Photo",
-        description="Photo of an object: an image file, or any image in this file",
+        description="Photo of an object: an image file, or any image in this .blend file",
         type=bpy.types.Image,
         poll=_is_still_image,
         update=_forget_points,
@@ -205,25 +203,25 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     mask: PointerProperty(
         name="Mask Image",
-        description="Image of the photo's size with the object white on black",
+        description="Image of the same size as the photo, with the object white on black",
         type=bpy.types.Image,
         poll=_is_still_image,
     )
     scale_mask: BoolProperty(
         name="Scale Mask",
-        description="Scale a mask of another size to the photo's size",
+        description="Scale the mask to the size of the photo if the sizes differ",
         default=False,
     )
     each: BoolProperty(
         name="Each Object",
-        description="Create an object for each separate thing in the photo",
+        description="Create a Blender object for each separate object in the photo",
         default=False,
     )
     box: IntVectorProperty(
         name="Box",
         description=(
-            "Left, top, width and height in pixels, from the photo's upper left corner, "
-            "with some background around the object"
+            "Left, top, width and height of a box around the object with some background, in "
+            "pixels from the photo's upper left corner"
         ),
         size=4,
         min=0,
@@ -232,31 +230,33 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     points: StringProperty(
         name="Points",
         description=(
-            "Pixels of the object, as column,row from the photo's upper left corner, "
-            "separated by spaces"
+            "Pixels of the object as column,row from the photo's upper left corner, separated by "
+            "spaces"
         ),
     )
     other_points: StringProperty(
         name="Background",
-        description="Pixels that do not belong to the object, written as Points",
+        description="Pixels that do not belong to the object, in the same format as Points",
     )
     highlights: StringProperty(
         name="Highlights",
         description=(
-            "Pixels of highlights to take off, as column,row from the photo's upper left corner, "
+            "Pixels of highlights to remove, as column,row from the photo's upper left corner, "
             "separated by spaces"
         ),
     )
     not_highlights: StringProperty(
-        name="Not Highlights",
-        description="Pixels of print and paint that look like highlights, written as Highlights",
+        name="Print",
+        description=(
+            "Pixels of print or paint that look like highlights, in the same format as Highlights"
+        ),
     )
 
     preset: EnumProperty(
         name="Preset",
         description=(
-            "Detail of relief and highlights, and the time that it takes, the overall shape is the "
-            "same"
+            "Detail of relief and highlights, and the time it takes; the overall shape is the same "
+            "in all presets"
         ),
         items=_PRESET_ITEMS,
         get=_get_preset,
@@ -265,7 +265,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     model: EnumProperty(
         name="Model",
-        description="How highlights, shape, light and reflectance are recovered",
+        description="Method that recovers highlights, shape, light and reflectance",
         items=MODELS,
         default="joint",
     )
@@ -276,32 +276,32 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         default="isc",
     )
     highlight_odds: EnumProperty(
-        name="Take Off",
-        description="Which highlights leave the base color, where they may be print as well",
+        name="Remove Highlights",
+        description="Which highlights to remove from the base color if they could also be print",
         items=HIGHLIGHT_ODDS,
         default="3",
     )
     refine: BoolProperty(
         name="Refine Gloss",
         description=(
-            "Fit lamps, roughness and a little of the relief to the highlights that are taken off, "
-            "so that they lie where the photo has them, kept only where that explains the photo "
-            "better, takes about 10 seconds more"
+            "Fit lamps, roughness and small changes of the relief to the removed highlights, so "
+            "that the highlights appear where the photo shows them. The fit is kept only if it "
+            "explains the photo better. Takes about 10 seconds more"
         ),
         default=False,
     )
     illumination: EnumProperty(
         name="Light",
-        description="Prior of the light",
+        description="Kind of light in the photo",
         items=ILLUMINATIONS,
         default="photo",
     )
     camera: EnumProperty(
-        name="Camera", description="Camera of the photo", items=CAMERAS, default="auto"
+        name="Camera", description="Projection of the photo", items=CAMERAS, default="auto"
     )
     focal_length: FloatProperty(
         name="Focal Length",
-        description="35 mm equivalent focal length, by the diagonal, in millimeters",
+        description="35 mm equivalent focal length in millimeters, based on the diagonal",
         subtype="DISTANCE_CAMERA",
         default=28.0,
         min=8.0,
@@ -311,8 +311,8 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     max_size: IntProperty(
         name="Size",
         description=(
-            "Longer side of the object in its maps, in pixels, 0 keeps the photo's resolution, "
-            "time grows with the square"
+            "Longer side of the object in its maps, in pixels (0 keeps the photo's resolution); "
+            "the time grows with the square of the size"
         ),
         default=512,
         min=0,
@@ -322,7 +322,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Samples per pixel of renders in a new scene, with Cycles",
+        description="Samples per pixel for Cycles renders in a new scene",
         default=64,
         min=1,
         soft_max=4096,
@@ -330,7 +330,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     texture_size: EnumProperty(
         name="Texture Size",
-        description="Longest side of the base color texture, never smaller than the maps",
+        description="Longest side of the base color texture; it is never smaller than the maps",
         items=TEXTURE_SIZES,
         default="photo",
     )
@@ -345,24 +345,24 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     own_scene: BoolProperty(
         name="New Scene",
         description=(
-            "Create the object in a new scene, in the photo's light and seen by its camera, "
-            "instead of at the 3D cursor of this one"
+            "Create the object in a new scene, with the photo's light and camera, instead of at "
+            "the 3D cursor of this scene"
         ),
         default=False,
     )
     light_and_camera: BoolProperty(
         name="Light and Camera",
         description=(
-            "Add the photo's camera and an estimated sun, in a collection that is unchecked in "
-            "the Outliner until you want it"
+            "Add the photo's camera and an estimated sun in a collection that is excluded from "
+            "the view layer until you check it in the Outliner"
         ),
         default=True,
     )
     set_world: BoolProperty(
-        name="World", description="Replace this scene's world by the recovered light", default=False
+        name="World", description="Replace the scene's world by the recovered light", default=False
     )
     set_camera: BoolProperty(
-        name="Camera", description="Make the photo's camera the active camera", default=False
+        name="Camera", description="Make the photo's camera the scene's camera", default=False
     )
     set_resolution: BoolProperty(
         name="Resolution", description="Set the render resolution to the photo's", default=False
@@ -370,15 +370,15 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     set_view_transform: BoolProperty(
         name="View Transform",
         description=(
-            "Set this scene's view transform to Standard, AgX and Filmic change the photo's colors"
+            "Set the scene's view transform to Standard; AgX and Filmic change the photo's colors"
         ),
         default=False,
     )
     sun: BoolProperty(
         name="Estimated Sun",
         description=(
-            "Add a sun along the photo's main direction of light, the recovered light is then "
-            "uniform"
+            "Add a sun along the main direction of the light, and replace the recovered light by "
+            "uniform light"
         ),
         default=False,
     )
@@ -389,15 +389,15 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     back: EnumProperty(
         name="Back",
-        description="What the object has on the side that the photo does not show",
+        description="Shape of the side that the photo does not show",
         items=BACKS,
         default="rounded",
     )
     triangles: IntProperty(
         name="Triangles",
         description=(
-            "Most triangles of the visible side, finer detail is in the normal map, 0 keeps two "
-            "for each pixel"
+            "Maximum number of triangles of the visible side (0 keeps two for each pixel); finer "
+            "detail is in the normal map"
         ),
         default=50_000,
         min=0,
@@ -406,20 +406,20 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     all_maps: BoolProperty(
         name="All Maps",
         description=(
-            "Also pack the layers and maps that the material does not use into the file, such as "
-            "normals, shading and diffuse light, for compositing"
+            "Also pack the layers and maps that the material does not use, such as normals, "
+            "shading and diffuse light, for compositing"
         ),
         default=False,
     )
     shadows: EnumProperty(
         name="Self-Shadowing",
-        description="Whether the object casts shadows and diffuse light, also on itself, in Cycles",
+        description="Cast shadows and diffuse light, also on the object itself (Cycles)",
         items=OWN_SHADOWS_ITEMS,
         default="auto",
     )
     specular_from: EnumProperty(
         name="Highlights",
-        description="Where the material's highlights come from",
+        description="Source of the material's highlights",
         items=SPECULAR_SOURCES,
         default="lobe",
     )
@@ -430,25 +430,25 @@ class ISC_PG_run(bpy.types.PropertyGroup):
 
     title: StringProperty(name="Run", description="Name of the run", options={"SKIP_SAVE"})
     state: StringProperty(
-        name="State", description="State of the run, empty before the first", options={"SKIP_SAVE"}
+        name="State", description="State of the run; empty before the first", options={"SKIP_SAVE"}
     )
     stage: StringProperty(
         name="Stage", description="Current stage of the worker", options={"SKIP_SAVE"}
     )
     fraction: FloatProperty(
         name="Progress",
-        description="Share of the work that is done",
+        description="Completed fraction of the work",
         min=0,
         max=1,
         options={"SKIP_SAVE"},
     )
     message: StringProperty(name="Message", description="Outcome of the run", options={"SKIP_SAVE"})
     notes: StringProperty(
-        name="Details", description="Notes on the result, one a line", options={"SKIP_SAVE"}
+        name="Details", description="Notes on the result, one per line", options={"SKIP_SAVE"}
     )
     longest_call_ms: FloatProperty(
         name="Longest Call",
-        description="Longest time in milliseconds for which the run has blocked the window",
+        description="Longest time in milliseconds for which the run blocked the window",
         options={"SKIP_SAVE"},
     )
     import_ms: FloatProperty(

@@ -233,7 +233,7 @@ def test_a_request_is_kept_as_text() -> None:
     later = json.loads(asked.to_json()) | {"of_a_later_version": 1}
     assert requests.request_from_json(json.dumps(later)) == asked
     for broken in ("", "null", "[]", "{}", '{"method": 3, "build": {}}'):
-        with pytest.raises(InputError, match="does not store how it was made"):
+        with pytest.raises(InputError, match="does not store how it was created"):
             requests.request_from_json(broken)
 
 
@@ -371,7 +371,7 @@ def test_wrong_points_are_refused(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image = photo()
     settings.points = "12;4"
-    assert "'12;4' is no point" in error_of(addon.ops.isc.auto_mask)
+    assert "'12;4' is not a point" in error_of(addon.ops.isc.auto_mask)
 
 
 @pytest.mark.parametrize(
@@ -503,7 +503,7 @@ def test_a_folder_without_a_result_is_refused(
     addon: Any, tmp_path: Path, bump_folder: Path
 ) -> None:
     before = census(addon)
-    assert "is no result: select a folder that isc decompose has written" in error_of(
+    assert "is not a result: select a folder written by isc decompose" in error_of(
         addon.ops.isc.import_result, directory=str(tmp_path)
     )
     shutil.copytree(bump_folder, tmp_path / "broken")

@@ -175,7 +175,7 @@ def test_an_object_without_a_request_is_not_decomposed_again(
         addon.ops.isc.redo, max_size=64
     )
     del built.object["isc_request"]
-    assert "does not store how it was made" in error_of(addon.ops.isc.redo, max_size=64)
+    assert "does not store how it was created" in error_of(addon.ops.isc.redo, max_size=64)
 
 
 # --- copies ---------------------------------------------------------------------------------------

@@ -68,7 +68,7 @@ def test_the_layer_is_off_as_soon_as_the_view_changes(
     CHANGES[change](built)
     bpy.context.view_layer.update()
     assert not shows_highlights(built.material)
-    assert capsys.readouterr().out.count("the photo's highlights are off") == 1
+    assert capsys.readouterr().out.count("photo highlights turned off") == 1
     surface = surface_node(built.material)
     assert surface is not None and surface.inputs["IOR"].default_value > 1.4, "its own are on"
 

@@ -73,7 +73,7 @@ def test_a_file_that_is_no_photo_is_refused_and_leaves_nothing(addon: Any, tmp_p
     (tmp_path / "list.png").write_text("milk, eggs")
     (tmp_path / "empty.jpg").write_bytes(b"")
     for name in ("list.png", "empty.jpg", "missing.png"):
-        with pytest.raises(RuntimeError, match=f"{name} is no photo that Blender can read"):
+        with pytest.raises(RuntimeError, match=f"{name} is not a photo that Blender can read"):
             addon.ops.isc.photo_as_object(filepath=str(tmp_path / name))
     assert not addon.data.images and addon.context.scene.isc.image is None
 
@@ -86,7 +86,7 @@ def test_an_image_that_was_there_stays_when_its_file_is_no_photo(
     assert photo_import.load_photo(path) == image, "loaded once"
     path.write_text("overwritten")
     image.reload()
-    with pytest.raises(InputError, match="is no photo"):
+    with pytest.raises(InputError, match="is not a photo"):
         photo_import.load_photo(path)
     assert image.name in addon.data.images
 
