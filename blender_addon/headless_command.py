@@ -139,7 +139,7 @@ def _add_files(group: argparse._ArgumentGroup) -> None:
         "--results",
         type=Path,
         metavar="DIR",
-        help="folder to keep the result folders in",
+        help="folder in which to keep the result folders",
     )
 
 
@@ -149,31 +149,31 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         "--model",
         default="joint",
         metavar="NAME",
-        help="model, as of isc decompose (default: %(default)s)",
+        help="model, as in isc decompose (default: %(default)s)",
     )
     add(
         "--separator",
         default="isc",
         metavar="NAME",
-        help="method that removes highlights, as of isc decompose (default: %(default)s)",
+        help="method that removes highlights, as in isc decompose (default: %(default)s)",
     )
     add(
         "--illumination",
         default="photo",
         choices=("photo", "natural", "laboratory"),
-        help="prior of the light (default: %(default)s)",
+        help="kind of photo, as in isc decompose (default: %(default)s)",
     )
     add(
         "--camera",
         default="auto",
         metavar="NAME|MM",
-        help="camera, as of isc decompose (default: %(default)s)",
+        help="camera, as in isc decompose (default: %(default)s)",
     )
     add(
         "--transfer",
         default="auto",
         choices=("auto", "srgb", "linear"),
-        help="coding of the photos (default: %(default)s)",
+        help="transfer curve of the photos (default: %(default)s)",
     )
     add(
         "--max-size",
@@ -181,7 +181,7 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         default=512,
         metavar="N",
         help=(
-            "longer side of the object in pixels, 0 keeps the photo's resolution "
+            "longer side of the object in pixels; 0 keeps the photo's resolution "
             "(default: %(default)s)"
         ),
     )
@@ -191,8 +191,8 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         default="photo",
         metavar="photo|maps|N",
         help=(
-            "longest side of the base color texture, the photo's, that of the maps, or at most N "
-            "pixels (default: %(default)s)"
+            "longest side of the base color texture: that of the photo, that of the maps, or at "
+            "most N pixels (default: %(default)s)"
         ),
     )
     add(
@@ -205,14 +205,14 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     add(
         "--refine",
         action="store_true",
-        help="fit lamps and gloss to where the highlights are, as isc decompose --refine",
+        help="fit lamps and gloss to the highlights, as isc decompose --refine does",
     )
     add(
         "--threads",
         type=count,
         default=0,
         metavar="N",
-        help="number of threads, 0 uses one per core (default: %(default)s)",
+        help="number of threads; 0 uses one per core (default: %(default)s)",
     )
 
 
@@ -246,14 +246,14 @@ def _add_build(group: argparse._ArgumentGroup) -> None:
         "--back",
         default="rounded",
         choices=("open", "flat", "rounded", "mirrored"),
-        help="side that the photo does not show (default: %(default)s)",
+        help="shape of the side that the photo does not show (default: %(default)s)",
     )
     add(
         "--triangles",
         type=count,
         default=50_000,
         metavar="N",
-        help="most triangles of the visible side, 0 keeps two for each pixel "
+        help="maximum number of triangles of the visible side; 0 keeps two for each pixel "
         "(default: %(default)s)",
     )
 

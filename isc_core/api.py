@@ -55,7 +55,7 @@ def decompose(
         Rec.709 floats; or a photo.
     mask : str, Path or (H, W) ndarray, optional
         The object, white on black or True. By default the image's alpha channel, else the pixels
-        inside a black border, else the one thing that stands out.
+        inside a black border, else the one distinct object.
     settings : Settings, optional
         Model and options, such as `Settings(model="sirfs", max_size=256)`.
     known : KnownInputs, optional
@@ -103,8 +103,8 @@ def separate(
     image : str, Path, ndarray or Photo
         As for `decompose`.
     mask : str, Path or (H, W) ndarray, optional
-        As for `decompose`; an image without mask, alpha channel and black border in which no single
-        thing stands out is used as a whole.
+        As for `decompose`; an image without a mask, an alpha channel, a black border or one
+        distinct object is processed as a whole.
     method : str
         One of `isc_core.separation.METHODS`.
     variant : str
@@ -175,7 +175,7 @@ def _photo(
 ) -> Photo:
     if isinstance(image, Photo):
         if mask is not None:
-            raise InputError("a Photo has a mask of its own: give an array or a file with a mask")
+            raise InputError("a Photo already has a mask: give an array or a file with a mask")
         return image
     raster, name = _raster(image, "the image")
     mask_raster, mask_name = (None, "") if mask is None else _raster(mask, "the mask")

@@ -56,7 +56,7 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         Raises
         ------
         InputError
-            If no photo is selected, it cannot be used, a point is not column,row, or a run is active.
+            If no photo is selected, photo or points cannot be used, or a run is active.
         """
         require_no_active_run()
         settings = context.scene.isc

@@ -381,6 +381,6 @@ def parse_points(text: str) -> list[tuple[int, int]]:
         try:
             x, y = (int(part) for part in word.split(","))
         except ValueError as error:
-            raise InputError(f"{word!r} is not a point: write column,row, such as 120,80") from error
+            raise InputError(f"{word!r} is not a point: use column,row, such as 120,80") from error
         points.append((x, y))
     return points

@@ -58,17 +58,17 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     inner = dict(actions_of(parser))
     for name, table in _read(path).items():
         if not isinstance(table, dict):
-            raise InputError(f"{path}: {name!r} is in no table: put it below [decompose]")
+            raise InputError(f"{path}: {name!r} is outside any table: move it below [decompose]")
         if name in inner and inner[name].get_default("run") is not None:
             if not named and (barred := _ONLY_IF_NAMED & table.keys()):
                 raise InputError(
-                    f"{path}: {min(barred)} of [{name}] is accepted only from a file that is "
-                    f"named: use --config {path} if you trust it"
+                    f"{path}: {min(barred)} of [{name}] is only accepted from a file given with "
+                    f"--config: use --config {path} if you trust it"
                 )
             _apply(inner[name], table, path, name)
         elif find_command(name) is None:
             known = [entry.name for entry in all_commands()]
-            raise InputError(f"{path}: there is no command {name!r}: {_advice(name, known)}")
+            raise InputError(f"{path}: unknown command {name!r}: {_advice(name, known)}")
     return path
 
 
@@ -94,7 +94,7 @@ def _read(path: Path) -> dict[str, object]:
     try:
         return tomllib.loads(read_regular(path, None, remedy).decode("utf-8"))
     except UnicodeDecodeError as error:
-        raise InputError(f"{path} is not UTF-8: save it so") from error
+        raise InputError(f"{path} is not UTF-8: save it as UTF-8") from error
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path} is not valid TOML: {error}") from error
 
@@ -134,11 +134,11 @@ def _value(action: argparse.Action, value: object, path: Path, where: str) -> ob
     name = f"{path}: {action.option_strings[-1].removeprefix('--')} of [{where}]"
     if action.nargs == 0:
         if not isinstance(value, bool):
-            raise InputError(f"{name} is true or false, not {value!r}")
+            raise InputError(f"{name} must be true or false, not {value!r}")
         return value if isinstance(action.const, bool) else action.default
     repeated = action.nargs is not None or isinstance(action, argparse._AppendAction)
     if repeated != isinstance(value, list):
-        raise InputError(f"{name} is {'a list' if repeated else 'one value'}, not {value!r}")
+        raise InputError(f"{name} must be {'a list' if repeated else 'one value'}, not {value!r}")
     if isinstance(value, list):
         return [_converted(action, one, path, name) for one in value]
     return _converted(action, value, path, name)
@@ -146,7 +146,7 @@ def _value(action: argparse.Action, value: object, path: Path, where: str) -> ob
 
 def _converted(action: argparse.Action, value: object, path: Path, name: str) -> object:
     if isinstance(value, bool) or not isinstance(value, str | int | float):
-        raise InputError(f"{name} is a text or a number, not {value!r}")
+        raise InputError(f"{name} must be a text or a number, not {value!r}")
     kind = action.type
     try:
         converted = kind(str(value)) if callable(kind) else str(value)

@@ -146,7 +146,7 @@ def _new_lobe(
     """The specular layer at the requested exponent."""
     if not d.specular[d.mask].any():
         notes.append(
-            "the object has no specular light to change: isc edit RESULT highlight gives it some"
+            "the object has no specular light to change: isc edit RESULT highlight adds some"
         )
         return d.specular
     fitted = known_lobe(d)
@@ -157,7 +157,7 @@ def _new_lobe(
         present = fit.exponent
     if present is None:
         notes.append(
-            "no single light and lobe explain the specular layer: the present exponent is a guess"
+            "no single light and lobe explain the specular layer: the current exponent is a guess"
         )
         present = DEFAULT_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)

@@ -133,7 +133,7 @@ def fit_lobe(
         nearness=observed.places is not None,
     )
     fitted = _search(problem, options, fixed, monitor)
-    monitor.report("how sure the gloss is", 0.7)
+    monitor.report("estimating the uncertainty of the gloss", 0.7)
     return _result(observed, problem, fitted, options)
 
 
@@ -168,7 +168,7 @@ def _search(
     pixels = problem.pixels
     best = _first(problem, fixed)
     for count in range(2, options.most_lights + 1 if fixed is None else 2):
-        monitor.report("looking for another light", 0.2 * count)
+        monitor.report("searching for another light", 0.2 * count)
         left = pixels.value - predicted(problem, best.lamps, pixels.normal, pixels.place)
         more = _best_of(
             problem,

@@ -90,16 +90,16 @@ def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SUR
     """
     enough = int(found.mask.sum()) >= MIN_MASK_PIXELS
     if hints:
-        return "" if enough else "no object is found there: put --point on it, or --box around it"
+        return "" if enough else "no object found there: put --point on it, or --box around it"
     several = enough and is_apart(found.mask)
     if enough and found.sureness >= least and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
     if several or kind == Count.SEVERAL:
-        return f"it seems to show several things: {_REMEDY}; --each takes each of them"
+        return f"it seems to show several objects: {_REMEDY}; --each processes each of them"
     if kind == Count.NONE or not enough:
-        return f"no single thing stands out: {_REMEDY}"
-    return f"its mask is uncertain ({found.sureness:.0%} sure): {_REMEDY}"
+        return f"no distinct object found: {_REMEDY}"
+    return f"its mask is uncertain (confidence {found.sureness:.0%}): {_REMEDY}"
 
 
 def is_apart(mask: np.ndarray) -> bool:
@@ -154,7 +154,7 @@ class EachSearch:
         """
         self.found = [one for one in find_masks(light) if int(one.mask.sum()) >= MIN_MASK_PIXELS]
         if not self.found:
-            raise InputError(f"{name}: no things stand out: {_REMEDY}")
+            raise InputError(f"{name}: no distinct objects found: {_REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
         least = min(self.found, key=lambda one: one.sureness)
         return replace(least, cover=cover)
@@ -221,7 +221,7 @@ def photos_of_each(
     else:
         photos = [_alone(photo, one) for one in search.found]
     for number, one in enumerate(photos, 1):
-        check_mask(one.mask, f"{name}: the mask of thing {number}")
+        check_mask(one.mask, f"{name}: the mask of object {number}")
     return photos
 
 

@@ -18,7 +18,9 @@ from ..scene.diagnostics import (
 from .diagnostics_json import diagnostics_from_json
 
 _MOST_LOG = 10.0  # larger errors of the logarithm come from somebody else's file
-STOPPED_EARLY = "the solver reached its limit, so more may be possible: try a cleaner mask"
+STOPPED_EARLY = (
+    "the solver reached its limit of evaluations: a cleaner mask may give a better result"
+)
 STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
 CROPPED = (
     "the photo was cropped, so its focal length does not hold: use the whole photo, or --camera MM"
@@ -30,12 +32,14 @@ _COLOURS = {
         "the photo is grey: the light has no colour, and shape and reflectance are less certain"
     ),
     PhotoColours.TONED: (
-        "the photo is a toned grey one, such as sepia: it is solved as grey, and its tone is in "
+        "the photo is grey with a tone, such as sepia: it is solved as grey, and the tone is in "
         "the reflectance"
     ),
 }
 _JOINT = {
-    JointOutcome.UNCHANGED: "no highlights beyond those that colour shows: the result is mdr's",
+    JointOutcome.UNCHANGED: (
+        "no highlights other than those that colour shows: same result as --model mdr"
+    ),
     JointOutcome.REMOVED: (
         "highlights that colour does not show were removed; continuing the albedo under them did "
         "not lower the energy"
@@ -48,7 +52,7 @@ _JOINT = {
 _LOBE = {
     LobeFitOutcome.DETERMINED: "determined",
     LobeFitOutcome.NO_SPECULAR: "undetermined: there is no specular light",
-    LobeFitOutcome.SMOOTH_LIGHT: "undetermined: the light is smooth, any roughness explains it",
+    LobeFitOutcome.SMOOTH_LIGHT: "undetermined: in smooth light, any roughness explains it",
     LobeFitOutcome.NARROW: "the highlight is narrower than a pixel: only an upper bound",
     LobeFitOutcome.CLIPPED: "the highlight is clipped: only an upper bound",
     LobeFitOutcome.UNEXPLAINED: (
@@ -56,7 +60,7 @@ _LOBE = {
     ),
 }
 _LOBE_STATUS = {
-    LobeStatus.NOT_FITTED: "not fitted: the separator none leaves no highlights to fit it to",
+    LobeStatus.NOT_FITTED: "not fitted: the separator none separates no highlights to fit it to",
     LobeStatus.NO_HIGHLIGHTS: (
         "hardly any highlights: the object is diffuse, or its highlights cannot be distinguished "
         "from its albedo"
@@ -68,11 +72,11 @@ _WARNINGS = {
         "it looks transparent or like a mirror: dull it with matting spray, or use an opaque object"
     ),
     WarningKind.SEVERAL_LIGHTS: (
-        "several lights, or a shadow of another thing: use one light with nothing in its way"
+        "several lights, or a shadow of another object: use one light with nothing in front of it"
     ),
-    WarningKind.CLIPPED: "{share}of the object is clipped, and is a guess there: expose less",
+    WarningKind.CLIPPED: "{share}of the object is clipped, and guessed: reduce the exposure",
     WarningKind.RAGGED_MASK: (
-        "{share}of the mask is too thin or ragged for a mesh, as hair is: fill the mask"
+        "{share}of the mask is too thin or ragged for a mesh, such as hair: fill the mask"
     ),
 }
 

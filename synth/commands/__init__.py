@@ -11,5 +11,5 @@ VALIDATE = CommandEntry(
     "validate", "measure every stage on rendered scenes", f"{__name__}.validate", "synth"
 )
 REFINE = CommandEntry(
-    "refine", "gloss of a result that lies where the highlights are", f"{__name__}.refine", "synth"
+    "refine", "fit light and gloss of a result to its highlights", f"{__name__}.refine", "synth"
 )

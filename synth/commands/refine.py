@@ -27,10 +27,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Fits lamps, roughness, strength and a bounded change of the shape to the highlights that "
-        "were separated, so that rendered highlights lie where the photo shows them. The image and "
-        "its layers stay; gloss, shape, light and reflectance change only if pixels that the fit "
-        "has not seen are explained better.",
+        "Fit lamps, roughness, strength and a bounded change of the shape to the separated "
+        "highlights, so that rendered highlights appear where the photo shows them. The image and "
+        "its layers do not change; gloss, shape, light and reflectance change only if the fit "
+        "explains held-out pixels better.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -45,11 +45,15 @@ def declare(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--light",
         action="store_true",
-        help="then fit an environment whose shadows the shape casts, traced by Mitsuba "
+        help="then fit an environment map, with the shadows that the shape casts traced by Mitsuba "
         "(experimental)",
     )
     parser.add_argument(
-        "--seed", type=count, default=0, metavar="S", help="of the held-out pixels (default: 0)"
+        "--seed",
+        type=count,
+        default=0,
+        metavar="S",
+        help="seed of the held-out pixels (default: 0)",
     )
 
 
@@ -83,7 +87,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
         load_mitsuba()
     if os.path.realpath(options.output) == os.path.realpath(options.result):
-        raise InputError("the refined result cannot replace its start: choose another folder")
+        raise InputError("the refined result cannot replace its input: choose another folder")
     require_writable_result(options.output, inputs=(options.photo,))
     start = load(options.result)
     if options.photo is not None:
@@ -99,7 +103,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         lines.append(
             f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
             if done.kept
-            else "the light stays: a new one does not explain held-out pixels better"
+            else "the light was not refined: held-out pixels are not explained better"
         )
     cover = read_cover(options.result / MASK)
     save(result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))

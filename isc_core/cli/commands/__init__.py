@@ -13,7 +13,7 @@ from .registry import CommandEntry, all_commands, find_command
 
 _EXAMPLES = """examples:
   isc decompose cup.png -o cup                          everything, into the folder cup
-  isc mask photo.jpg --box 120,80,400,360 -o mask.png   first mask the object if needed
+  isc mask photo.jpg --box 120,80,400,360 -o mask.png   mask the object first if needed
   isc decompose photo.jpg --mask mask.png -o result
 `isc COMMAND --help` shows the options of a command."""
 

@@ -28,7 +28,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, "
+        f"Add {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, "
         "for programs that have only NumPy. "
         "isc decompose --arrays writes it directly.",
         examples=_EXAMPLES,

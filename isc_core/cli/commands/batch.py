@@ -27,7 +27,7 @@ from ..interface.values import count, positive
 
 _EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
-  isc batch shelves --each -o results      each thing of each photo: results/shelf/1, /2, ...
+  isc batch shelves --each -o results      each object of each photo: results/shelf/1, /2, ...
   isc batch list.csv -o results --workers 4 --memory 4GB
   isc batch list.jsonl -o /net/results --scheduler tcp://node7:8786
 
@@ -48,7 +48,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Decomposes many photos, one folder each in DIR. Writes summary.html (start here), "
+        "Decompose many photos, each into its own folder in DIR. Writes summary.html (start here), "
         "summary.csv, summary.jsonl and "
         "failures.jsonl next to them.",
         examples=_EXAMPLES,
@@ -95,15 +95,16 @@ def _add_workers(parser: argparse.ArgumentParser) -> None:
     )
     crew.add_argument(
         "--memory", default=defaults.memory, metavar="SIZE",
-        help="memory of each worker, such as 4GB; one that exceeds it is stopped (default: equal)",
+        help="memory limit of each worker, such as 4GB; a worker that exceeds it is stopped "
+        "(default: equal shares)",
     )  # fmt: skip
     crew.add_argument(
         "--scheduler",
         default=defaults.scheduler,
         metavar="ADDRESS",
-        help="use this Dask cluster instead of this machine",
+        help="run on this Dask cluster instead of this machine",
     )
-    add_engine(crew, "threads per image (0: the cores, shared among the workers)")
+    add_engine(crew, "threads per image (0: the cores are shared among the workers)")
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:

@@ -12,7 +12,7 @@ _EXAMPLES = """  isc completion bash > ~/.local/share/bash-completion/completion
   isc completion zsh > ~/.zfunc/_isc      with fpath+=~/.zfunc before compinit in ~/.zshrc
   isc completion fish > ~/.config/fish/completions/isc.fish
 
-The script knows the commands that are installed now: write it again after an update."""
+The script contains the commands that are installed now: write it again after an update."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -26,7 +26,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Prints a script that completes commands, options, their values and file names in a shell.",
+        "Print a script that completes commands, options, their values and file names in a shell.",
         examples=_EXAMPLES,
     )
     parser.add_argument("shell", choices=_SHELLS, metavar="SHELL", help=", ".join(_SHELLS))

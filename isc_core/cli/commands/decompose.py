@@ -47,9 +47,9 @@ from ..interface.viewer import show
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose cup.png jug.png vase.png -o results      one folder each, results/cup and so on
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
-  isc decompose phone.jpg --point 900,1200 -o result     the object is the thing at that pixel
-  isc decompose toy.jpg --highlight 480,215 -o toy       what shines there is a highlight
-  isc decompose shelf.jpg --each -o results              each thing: results/1, results/2, ...
+  isc decompose phone.jpg --point 900,1200 -o result     the object at that pixel
+  isc decompose toy.jpg --highlight 480,215 -o toy       the bright spot there is a highlight
+  isc decompose shelf.jpg --each -o results              each object: results/1, results/2, ...
   isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
   curl -s https://example.org/cup.png | isc decompose - -o cup
 
@@ -72,8 +72,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Decomposes a photo of one glossy object into diffuse and specular light, shape, "
-        "illumination, shading, reflectance. Writes a folder "
+        "Decompose a photo of one glossy object into diffuse and specular light, shape, "
+        "illumination, shading and reflectance. Writes a folder "
         "with preview.png (start here), maps.exr, mesh.glb and decomposition.json.",
         examples=_EXAMPLES,
         more=names_table(),
@@ -89,19 +89,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--refine",
         action="store_true",
-        help="fit lamps and gloss to where the highlights are, see isc refine; kept only where it "
+        help="fit lamps and gloss to the highlights, as isc refine does; kept only if the fit "
         "explains the photo better",
     )
     main.add_argument(
-        "--png", action="store_true", help="write the layers as 8-bit PNG too, beside maps/*.exr"
+        "--png", action="store_true", help="also write the layers as 8-bit PNG, beside maps/*.exr"
     )
     add_triangles(main)
     main.add_argument(
         "--texture-size",
         type=texture_size,
         metavar="photo|maps|N",
-        help="with --arrays: longest side of the base colour there, the photo's, that of the maps, "
-        "or N pixels at most (default maps)",
+        help="with --arrays: longest side of its base colour: that of the photo, that of the maps, "
+        "or at most N pixels (default maps)",
     )
     add_open(main)
     reading = parser.add_argument_group("reading the photo")
@@ -115,8 +115,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--memory",
         type=memory_size,
         metavar="SIZE",
-        help="most memory that the work may need, such as 2GB: a photo that needs more is refused "
-        "with the amount (default: what is free)",
+        help="memory limit, such as 2GB; a photo that needs more is refused with the amount that "
+        "it needs (default: the free memory)",
     )
 
 
@@ -143,14 +143,14 @@ def _add_known_inputs(parser: argparse.ArgumentParser) -> None:
         type=positive,
         default=defaults.depth_sigma,
         metavar="S",
-        help="its standard deviation in photo pixels (default %(default)s)",
+        help="standard deviation of --depth in photo pixels (default %(default)s)",
     )
     group.add_argument(
         "--depth-weight",
         type=positive,
         default=defaults.depth_weight,
         metavar="W",
-        help="its weight (default %(default)s)",
+        help="weight of --depth (default %(default)s)",
     )
     group.add_argument(
         "--height-scale",
@@ -176,17 +176,17 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises
     ------
     Rejected
-        If some of several photos, or of several things, failed.
+        If some of several photos, or of several objects, failed.
     """
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
     if options.texture_size is not None and not options.arrays:
-        raise InputError("--texture-size is that of the arrays: add --arrays, or leave it out")
+        raise InputError("--texture-size applies to the arrays: add --arrays, or leave it out")
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     marked = bool(marks_of(options))
     if marked and (options.each or len(options.photo) > 1):
         raise InputError(
-            "--highlight and --not-highlight belong to one object: give one photo without --each"
+            "--highlight and --not-highlight apply to one object: give one photo without --each"
         )
     if options.each:
         return _decompose_each(options, settings, prior_set, monitor)
@@ -285,22 +285,22 @@ def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomp
 def _decompose_each(
     options: argparse.Namespace, settings: Settings, prior_set: PriorSet | None, monitor: Monitor
 ) -> list[str]:
-    """Decompose each of several things of a photo into a folder of its own; one that fails does not
+    """Decompose each of several objects of a photo into its own folder; one that fails does not
     stop the others.
     """
     hints_of(options)
     for option in ("shape", "depth"):
         if getattr(options, option) is not None:
-            raise InputError(f"--{option} belongs to one thing: leave out --each")
+            raise InputError(f"--{option} applies to one object: leave out --each")
     if len(options.photo) > 1:
-        raise InputError("--each takes the things of one photo: give one")
+        raise InputError("--each applies to one photo: give one photo")
     path: Path = options.photo[0]
-    monitor.report("looking for the things", 0.0)
+    monitor.report("finding the objects", 0.0)
     with photo_file(path, options) as file:
         photos = read_each(file, options.mask, options.transfer, limits_of(options))
     _require_no_other_things(options.output, len(photos))
     works = {
-        f"thing {number} of {len(photos)}": partial(
+        f"object {number} of {len(photos)}": partial(
             _decompose_thing,
             photo,
             path,
@@ -311,16 +311,16 @@ def _decompose_each(
         )
         for number, photo in enumerate(photos, 1)
     }
-    return do_all("things", works, monitor)
+    return do_all("objects", works, monitor)
 
 
 def _require_no_other_things(output: Path, count: int) -> None:
-    """Refuse a folder of more things: programs that read it would take them for this photo's."""
+    """Refuse a folder of more objects: programs that read it would take them for this photo's."""
     for thing in things_in(output):
         if int(thing.name) > count:
             raise InputError(
                 f"{thing} is the result of another run, and this photo has {count} "
-                f"{'thing' if count == 1 else 'things'}: remove it, or choose another folder"
+                f"{'object' if count == 1 else 'objects'}: remove it, or choose another folder"
             )
 
 
@@ -344,11 +344,11 @@ def _decompose_several(
     for option in ("mask", "shape", "depth"):
         if getattr(options, option) is not None:
             raise InputError(
-                f"--{option} belongs to one photo: give one, or list the photos and their masks "
-                "in a manifest (see `isc batch --help`)"
+                f"--{option} applies to one photo: give one photo, or list photos and masks in a "
+                "manifest (see `isc batch --help`)"
             )
     if hints_of(options):
-        raise InputError("--box, --point and --not belong to one photo: give one")
+        raise InputError("--box, --point and --not apply to one photo: give one photo")
     works = {
         path.name: partial(_decompose_one, path, output, options, settings, prior_set)
         for path, output in _outputs(options.photo, options.output)
@@ -363,7 +363,7 @@ def _outputs(photos: list[Path], folder: Path) -> Iterator[tuple[Path, Path]]:
     seen: dict[str, Path] = {}
     for path in photos:
         if path == STDIN:
-            raise InputError("- is one photo from standard input: give it alone")
+            raise InputError("- reads one photo from standard input: give no other photo")
         name = safe_name(path.stem)
         other = seen.setdefault(name.casefold(), path)
         if other is not path:
@@ -395,7 +395,7 @@ def _detail_notes(settings: Settings, length: int, longest: int) -> tuple[str, .
     """
     if settings.detail <= max(length, Settings.detail):
         return ()
-    remedy = "the photo has no more" if length >= longest else "use --max-size 0 for more"
+    remedy = "as in the photo" if length >= longest else "use --max-size 0 for more"
     return (
         f"note: the object is {length} pixels long in the maps, not {settings.detail}: {remedy}",
     )

@@ -38,7 +38,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Prints the errors of height, normals, shading, reflectance and light for each object, "
+        "Print the errors of height, normals, shading, reflectance and light for each object, "
         "and their geometric means.",
         examples=_EXAMPLES,
     )
@@ -47,7 +47,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--dataset", choices=("mit-berkeley",), required=True, help="format of the data set"
     )
-    main.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
+    main.add_argument(
+        "--objects", type=names, metavar="a,b", help="names of the objects (default: all)"
+    )
     main.add_argument(
         "--input",
         choices=INPUTS,
@@ -57,7 +59,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--illumination",
         choices=(*ILLUMINATIONS, "both"),
-        help="default: both, or laboratory for --input original",
+        help="light of the images (default: both, or laboratory for --input original)",
     )
     main.add_argument(
         "--model",
@@ -104,7 +106,7 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         "--priors",
         type=Path,
         metavar="FILE",
-        help="a file of isc fit-priors (default: those of the package)",
+        help="priors written by isc fit-priors (default: those of the package)",
     )
 
 

@@ -45,8 +45,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Writes a result for other programs: --textures a set of textures under the names and in "
-        "the packings that a program expects, --format the mesh with its material.",
+        "Export a result to other programs: --textures writes a texture set with the names and "
+        "packings that a program expects, --format writes the mesh with its material.",
         examples=_EXAMPLES,
     )
     parser.add_argument(
@@ -68,10 +68,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=tuple(SUFFIXES),
         help="write the mesh in this format; obj and usd have their textures beside them, usdz "
-        "(by its suffix) and glb inside",
+        "(chosen by its suffix) and glb include them",
     )
     parser.add_argument(
-        "--name", metavar="NAME", help="begins the textures' names (default: the photo's name)"
+        "--name", metavar="NAME", help="prefix of the texture names (default: the photo's name)"
     )
     parser.add_argument(
         "--roughness",
@@ -84,21 +84,20 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--back",
         choices=tuple(Back),
         default=Back.OPEN,
-        help="with --format: what the mesh has on the side that the photo does not show; all but "
-        "open are closed (default %(default)s)",
+        help="with --format: back of the mesh, which the photo does not show; all except open are "
+        "closed (default %(default)s)",
     )
     fine = parser.add_argument_group("base colour at the photo's resolution")
+    fine.add_argument("--photo", type=Path, metavar="PHOTO", help="the photo that was decomposed")
     fine.add_argument(
-        "--photo", type=Path, metavar="PHOTO", help="the photo that RESULT was made from"
-    )
-    fine.add_argument(
-        "--mask", type=Path, metavar="MASK", help="the mask, where RESULT was made with one"
+        "--mask", type=Path, metavar="MASK", help="the mask that it was decomposed with"
     )
     fine.add_argument(
         "--texture-size",
         type=texture_size,
         metavar="photo|maps|N",
-        help="longest side, the photo's, that of the maps, or N pixels at most (default photo)",
+        help="longest side: that of the photo, that of the maps, or at most N pixels "
+        "(default photo)",
     )
     add_limits(fine)
 
@@ -123,9 +122,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     output: Path = options.output
     if options.photo is None and (options.mask, options.texture_size) != (None, None):
-        raise InputError("--mask and --texture-size need --photo: give it too")
+        raise InputError("--mask and --texture-size require --photo: add it")
     if options.textures is not None and options.back != Back.OPEN:
-        raise InputError("--back is that of a mesh: use it with --format")
+        raise InputError("--back applies to a mesh: add --format, or leave it out")
     if options.format is not None:
         check_mesh_path(output, options.format)
         if options.format == "usd":
@@ -168,7 +167,7 @@ def _fine_texture(d: Decomposition, options: argparse.Namespace) -> np.ndarray |
         d, options.result, options.photo, options.mask, None, limits_of(options)
     )
     if photo.original.sha256 != d.provenance.input.get("sha256"):
-        raise InputError(f"{options.photo} is not the photo of {options.result}: give that one")
+        raise InputError(f"{options.photo} is not the photo of {options.result}: give its photo")
     return full_texture(photo, d, options.texture_size or 0)
 
 

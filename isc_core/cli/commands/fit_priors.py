@@ -28,17 +28,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with "
-        "natural_lights.mat) and writes them to a file "
+        "Fit the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with "
+        "natural_lights.mat) and write them to a file "
         "for --priors.",
         examples=_EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
     chosen = parser.add_mutually_exclusive_group()
     chosen.add_argument(
-        "--objects", type=names, metavar="a,b", help="fit to these (default: to all)"
+        "--objects", type=names, metavar="a,b", help="fit to these objects (default: all)"
     )
-    chosen.add_argument("--leave-out", type=names, metavar="a,b", help="fit to all but these")
+    chosen.add_argument(
+        "--leave-out", type=names, metavar="a,b", help="fit to all objects except these"
+    )
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="FILE", help="the file to write (.npz)"
     )

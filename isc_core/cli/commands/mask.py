@@ -18,8 +18,8 @@ from ..interface.standard_input import photo_file
 
 _SOURCES = {
     "alpha": "from the alpha channel",
-    "black border": "all that is not black",
-    "each": "one of several things",
+    "black border": "all pixels that are not black",
+    "each": "one of several objects",
     "file": "part of a mask",
 }
 _EXAMPLES = """  isc mask photo.jpg --auto -o mask.png
@@ -27,7 +27,7 @@ _EXAMPLES = """  isc mask photo.jpg --auto -o mask.png
   isc mask photo.jpg --box 120,80,400,360 -o mask.png
   isc mask shelf.jpg --each -o mask.png              mask_1.png, mask_2.png and so on
 
---auto refuses a photo in which no single thing stands out; points and a box say which is meant."""
+--auto refuses a photo without one distinct object; --point and --box select the object."""
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -41,21 +41,19 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Finds the object in a photo and writes its mask, white on black. Check it before you "
+        "Find the object in a photo and write its mask, white on black. Check the mask before you "
         "use it.",
         examples=_EXAMPLES,
     )
     add_photo(parser)
-    parser.add_argument(
-        "--auto", action="store_true", help="find the thing that the photo shows by its looks"
-    )
+    parser.add_argument("--auto", action="store_true", help="find the object by its appearance")
     add_hints(parser)
     add_each(parser, "MASK_1.png, MASK_2.png and so on")
     parser.add_argument(
         "--overlay",
         type=Path,
         metavar="PNG",
-        help="also write a small picture of the photo with the mask over it",
+        help="also write a small picture of the photo with the mask overlaid",
     )
     add_transfer(parser)
     add_limits(parser)
@@ -80,14 +78,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises
     ------
     InputError
-        If nothing says where the object is.
+        If no option selects the object.
     """
     del monitor  # one step of a second or two
     given = hints_of(options)
     if not (given or options.auto or options.each):
         raise InputError(
-            "nothing says where the object is: --auto finds it, --box x,y,width,height or "
-            "--point x,y mark it"
+            "no object is selected: find it with --auto, or select it with "
+            "--box x,y,width,height or --point x,y"
         )
     check_mask_path(options.photo, options.output)
     if options.overlay is not None:
@@ -122,5 +120,5 @@ def _write(photo: Photo, path: Path) -> str:
     """Write the mask of a photo; return what to print."""
     write_mask(path, photo.mask if photo.found is None else photo.found.cover)
     pixels, sureness = int(photo.mask.sum()), photo.original.sureness
-    sure = f"{sureness:.0%} sure" if sureness is not None else _SOURCES[photo.original.mask_from]
-    return f"{path}: {pixels} pixels, {sure}; check it before you use it"
+    found = _SOURCES[photo.original.mask_from] if sureness is None else f"confidence {sureness:.0%}"
+    return f"{path}: {pixels} pixels, {found}; check it before you use it"

@@ -43,16 +43,16 @@ def _core(name: str, summary: str, extra: str = "") -> CommandEntry:
 
 
 CORE = (
-    _core("decompose", "everything: layers, shape, light, shading, reflectance, mesh"),
-    _core("separate", "diffuse and specular light only"),
+    _core("decompose", "recover layers, shape, light, shading, reflectance and mesh"),
+    _core("separate", "separate diffuse and specular light only"),
     _core("mask", "find the object in a photo"),
-    _core("edit", "another light, gloss or colour for a decomposed photo"),
-    _core("batch", "isc decompose for many photos, resumable", "batch"),
-    _core("export", "a result as textures or a mesh for other programs"),
-    _core("arrays", "a result as plain NumPy arrays"),
-    _core("evaluate", "accuracy on a data set with ground truth"),
+    _core("edit", "change light, gloss or colour of a decomposed photo"),
+    _core("batch", "decompose many photos in parallel; resumable", "batch"),
+    _core("export", "export a result as textures or a mesh"),
+    _core("arrays", "export a result as plain NumPy arrays"),
+    _core("evaluate", "measure the accuracy on a data set with ground truth"),
     _core("fit-priors", "fit the priors of shape, reflectance and light"),
-    _core("completion", "completion of commands and options for a shell"),
+    _core("completion", "print a completion script for a shell"),
 )
 
 

@@ -47,9 +47,9 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
-        "images of both. A photo without mask, transparency and black border in which no single "
-        "thing stands out is processed as a whole.",
+        "Split a photo into diffuse and specular light. Writes a folder with separation.exr and "
+        "images of both. A photo without a mask, transparency, a black border or one distinct "
+        "object is processed as a whole.",
         examples=_EXAMPLES,
         more=methods_table(),
     )
@@ -59,7 +59,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_mask(main)
     add_hints(main)
     main.add_argument(
-        "--whole", action="store_true", help="process the whole photo; look for no object in it"
+        "--whole", action="store_true", help="process the whole photo; do not search for an object"
     )
     main.add_argument(
         "--method",
@@ -95,8 +95,8 @@ def _add_method_options(group: argparse._ArgumentGroup) -> None:
         "--prior",
         type=Path,
         metavar="FILE",
-        help=f"for {BEST}: a grey image of the photo's size, the probability of a highlight: "
-        "black never, middle grey (0.5) unknown",
+        help=f"for {BEST}: a grey image of the photo's size with the probability of a highlight; "
+        "black is 0, middle grey (0.5) is unknown",
     )
 
 
@@ -120,10 +120,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     given = hints_of(options)
     if given and options.whole:
-        raise InputError("--whole looks for no object: leave out --box, --point and --not")
+        raise InputError("--whole processes the whole photo: leave out --box, --point and --not")
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
-        raise InputError(f"--prior needs the method {BEST}")
+        raise InputError(f"--prior requires --method {BEST}: use it, or leave --prior out")
     require_writable_result(
         options.output, separation=True, inputs=(options.photo, options.mask, options.prior)
     )
@@ -164,12 +164,12 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
     if photo.original.mask_from == "whole frame":
         yield "no mask: the whole image was processed; set one with --mask"
     if options.method != "none" and not layers.specular[~photo.clipped].any():
-        yield f"nothing was taken as a highlight: {_why_unchanged(options.method, photo)}"
+        yield f"no highlight was found: {_why_unchanged(options.method, photo)}"
 
 
 def _why_unchanged(method: str, photo: Photo) -> str:
     if method != BEST:
-        return f"{method} found no pixel that its equation explains by one; try --method {BEST}"
+        return f"the equation of {method} attributes no pixel to one; try --method {BEST}"
     from ...separation.isc import Abstention, abstention
 
     reasons = {
@@ -179,12 +179,12 @@ def _why_unchanged(method: str, photo: Photo) -> str:
         ),
         Abstention.NO_CANDIDATE: "no pixel is paler than the others of its hue",
         Abstention.NEAR_GREY: (
-            "the object is nearly grey, and a highlight has no other colour; "
-            "isc decompose --model joint also uses its shape"
+            "the object is nearly grey, so highlights have the same colour; "
+            "isc decompose --model joint also uses the shape"
         ),
         Abstention.NOT_PROVEN: (
-            "what is pale looks like paint: it has sharp edges, or runs with the object's "
-            "colours; --prior marks highlights by hand"
+            "the pale areas look like paint: their edges are sharp, or they follow the object's "
+            "colours; mark highlights by hand with --prior"
         ),
     }
     return reasons[abstention(photo.image, photo.mask, photo.clipped)]

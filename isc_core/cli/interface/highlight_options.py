@@ -19,11 +19,12 @@ def add_highlight_marks(group: argparse._ArgumentGroup) -> None:
     group : argparse._ArgumentGroup
         Changed in place.
     """
+    add_pixels(group, "--highlight", "highlights", "a highlight to remove (--model joint)")
     add_pixels(
-        group, "--highlight", "highlights", "a highlight, which is taken off (--model joint)"
-    )
-    add_pixels(
-        group, "--not-highlight", "paint", "what only looks like a highlight (--model joint)"
+        group,
+        "--not-highlight",
+        "paint",
+        "print or paint that looks like a highlight (--model joint)",
     )
 
 
@@ -77,8 +78,8 @@ def mark_notes(photo: Photo, result: Decomposition) -> list[str]:
     scale = result.mask.shape[1] / photo.mask.shape[1]
     reach = mark_reach(result.mask)
     return [
-        f"no light was taken off at {int(x)},{int(y)}: neither colour nor form tells a highlight "
-        "from the paint there"
+        f"no highlight was removed at {int(x)},{int(y)}: neither colour nor shape distinguishes it "
+        "from paint"
         for x, y in photo.marks.highlights
         if not _shines_near(result.specular, (scale * x, scale * y), reach)
     ]

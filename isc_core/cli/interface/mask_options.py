@@ -24,7 +24,7 @@ def add_hints(group: Group | argparse.ArgumentParser) -> None:
         "--box",
         type=_box,
         metavar="x,y,w,h",
-        help="left, top, width and height in pixels around the object, with some background",
+        help="box around the object with some background: left, top, width, height in pixels",
     )
     add_pixels(group, "--point", "points", "the object")
     add_pixels(group, "--not", "others", "the background")
@@ -41,7 +41,7 @@ def add_each(group: Group | argparse.ArgumentParser, what: str) -> None:
         Where the results go.
     """
     group.add_argument(
-        "--each", action="store_true", help=f"take each of several separate things: {what}"
+        "--each", action="store_true", help=f"process each of several separate objects: {what}"
     )
 
 
@@ -63,9 +63,9 @@ def hints_of(options: argparse.Namespace) -> Hints:
     """
     hints = Hints(tuple(options.points), tuple(options.others), options.box)
     if hints and getattr(options, "mask", None) is not None:
-        raise InputError("--mask says where the object is: leave out --box, --point and --not")
+        raise InputError("--mask already selects the object: leave out --box, --point and --not")
     if hints and getattr(options, "each", False):
-        raise InputError("--each takes all things: leave out --box, --point and --not")
+        raise InputError("--each processes all objects: leave out --box, --point and --not")
     return hints
 
 
@@ -86,14 +86,14 @@ def mask_notes(photo: Photo) -> list[str]:
     parts = len(separate_parts(photo.mask))
     if parts > 1:
         notes.append(
-            f"the mask has {parts} separate parts, which are taken for one object: --each "
-            "decomposes each of them"
+            f"the mask has {parts} separate parts, which are treated as one object: use --each to "
+            "decompose each of them"
         )
     return notes
 
 
 def how_found(photo: Photo) -> str:
-    """Return how the mask of a photo was found, and how sure it is.
+    """Return how the mask of a photo was found, and its confidence.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def how_found(photo: Photo) -> str:
     Returns
     -------
     str
-        "" for a mask that was given, or that was not asked for its sureness.
+        "" for a mask that was given, or that has no confidence.
     """
     source = photo.original
     if source.sureness is None:
         return ""
     how = "from your hints" if source.mask_from == "hints" else "automatically"
-    return f"the mask was found {how} ({source.sureness:.0%} sure)"
+    return f"the mask was found {how} (confidence {source.sureness:.0%})"
 
 
 def _box(text: str) -> Box:

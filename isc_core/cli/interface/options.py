@@ -35,8 +35,8 @@ def add_photo(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="PHOTO",
         type=Path,
         nargs="+" if several else None,
-        help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy; - reads it from "
-        "standard input",
+        help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy; - reads standard "
+        "input",
     )
 
 
@@ -52,8 +52,8 @@ def add_mask(group: Group) -> None:
         "--mask",
         type=Path,
         metavar="MASK",
-        help="image of the photo's size, the object white on black (default: the photo's alpha "
-        "channel, else the pixels that are not black, else the thing that stands out)",
+        help="image of the photo's size with the object white on black (default: the photo's "
+        "alpha channel, else the pixels that are not black, else the object that is found)",
     )
 
 
@@ -78,7 +78,7 @@ def add_pixels(group: argparse.ArgumentParser | Group, option: str, name: str, o
         default=[],
         dest=name,
         metavar="x,y",
-        help=f"a pixel of {of}; from the top left, can be repeated",
+        help=f"a pixel of {of}, counted from the top left; can be repeated",
     )
 
 
@@ -122,7 +122,7 @@ def add_transfer(parser: argparse.ArgumentParser | Group) -> None:
         "--transfer",
         choices=TRANSFERS,
         default="auto",
-        help="curve of the photo (auto: what the file says, else sRGB; floats are linear)",
+        help="transfer curve of the photo (auto: that of the file, else sRGB; floats are linear)",
     )
 
 
@@ -139,7 +139,7 @@ def add_limits(parser: argparse.ArgumentParser | Group) -> None:
         type=whole,
         default=USUAL.max_pixels,
         metavar="N",
-        help="reject images with more pixels (width x height) before decoding them "
+        help="refuse images with more pixels (width x height) before decoding them "
         "(default %(default)s)",
     )
 
@@ -172,7 +172,7 @@ def add_main_settings(group: Group) -> None:
         "--model",
         default=defaults.model,
         metavar="NAME",
-        help=f"how the photo is explained, see below (default {defaults.model})",
+        help=f"decomposition model, see below (default {defaults.model})",
     )
     group.add_argument(
         "--max-size",
@@ -182,20 +182,20 @@ def add_main_settings(group: Group) -> None:
         help="long side of the object in the maps, in pixels (default %(default)s; 0: the photo's)",
     )
     group.add_argument(
-        "--full-size", action="store_true", help="maps of the photo's size, as --max-size 0"
+        "--full-size", action="store_true", help="maps of the photo's size, like --max-size 0"
     )
     group.add_argument(
         "--detail",
         type=count,
         default=defaults.detail,
         metavar="N",
-        help="long side of the object at which the finest relief is looked for, in pixels, with "
-        "--illumination photo (default %(default)s; 0: the overall shape alone)",
+        help="long side of the object at which the finest relief is recovered, in pixels, with "
+        "--illumination photo (default %(default)s; 0: only the overall shape)",
     )
     group.add_argument(
         "--arrays",
         action="store_true",
-        help="write arrays.npz too: everything as plain NumPy arrays, for other programs",
+        help="also write arrays.npz: everything as plain NumPy arrays, for other programs",
     )
 
 
@@ -212,8 +212,8 @@ def add_triangles(group: Group | argparse.ArgumentParser) -> None:
         type=count,
         default=MeshOptions().triangles,
         metavar="N",
-        help="most triangles of the mesh; the normal map has the rest (default %(default)s; 0: a "
-        "vertex at each pixel)",
+        help="maximum number of triangles of the mesh; finer detail is in the normal map "
+        "(default %(default)s; 0: a vertex at each pixel)",
     )
 
 
@@ -245,9 +245,9 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         type=current_name("light_colour"),
         default=defaults.light_colour,
         metavar="NAME|r,g,b",
-        help="colour of the light: balanced (nearly white, as cameras leave it), estimate (from "
-        "highlights where they determine it), free, toned (a sepia or otherwise toned grey photo), "
-        "or three linear numbers (default %(default)s)",
+        help="colour of the light: balanced (nearly white, after the camera's white balance), "
+        "estimate (from the highlights if they determine it), free, toned (a grey photo with a "
+        "tone, such as sepia), or three linear numbers (default %(default)s)",
     )
     group.add_argument(
         "--light-prior",
@@ -262,27 +262,29 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         type=current_name("shape_prior"),
         choices=SHAPE_PRIORS,
         default=defaults.shape_prior,
-        help="prior of the shape: predicted from the photo, or from its silhouette alone "
+        help="prior of the shape: predicted from the photo, or from its silhouette only "
         "(default %(default)s)",
     )
     group.add_argument(
         "--camera",
         default=defaults.camera,
         metavar="NAME|MM",
-        help="auto (the focal length of the photo's EXIF, orthographic without), orthographic, or "
-        "a focal length in mm, 35-mm equivalent by the diagonal (default %(default)s)",
+        help="auto (the focal length in the photo's EXIF, orthographic without it), orthographic, "
+        "or a 35 mm equivalent focal length in mm, based on the diagonal (default %(default)s)",
     )
     group.add_argument(
         "--highlight-odds",
         type=not_negative,
         default=defaults.highlight_odds,
         metavar="N",
-        help="for joint: odds that light is a highlight and not print, from which it is taken off; "
-        "1: what is more likely one than not, 0: all that colour and form find (default "
-        "%(default)s)",
+        help="for joint: odds of a highlight against print that removed light must exceed; 1: "
+        "remove what is more likely a highlight, 0: remove all that colour and shape find "
+        "(default %(default)s)",
     )
     group.add_argument(
-        "--shading-only", action="store_true", help="shape from shading: the object has one colour"
+        "--shading-only",
+        action="store_true",
+        help="assume that the object has one colour (shape from shading)",
     )
     group.add_argument(
         "--confidence-weights",
@@ -293,7 +295,7 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         "--priors",
         type=Path,
         metavar="FILE",
-        help="a file of isc fit-priors (default: those of the package)",
+        help="priors written by isc fit-priors (default: those of the package)",
     )
     group.add_argument(
         "--seed",

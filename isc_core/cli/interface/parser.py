@@ -8,8 +8,8 @@ from typing import Any, NoReturn
 from ...errors import InputError
 
 EXIT_CODES = (
-    "exit codes: 0 done; 1 done, but with failures (batch, several photos) or outside of bounds\n"
-    "(validate); 2 an input cannot be used, stderr says why; 130 cancelled."
+    "exit codes: 0 success; 1 finished with failures (several photos or objects, batch,\n"
+    "validate); 2 invalid input, stderr names the remedy; 130 cancelled."
 )
 # Where `add_general_options` stores its values.
 GENERAL = ("quiet", "verbose", "progress", "cancel_at_eof", "config", "no_config")
@@ -127,7 +127,7 @@ def add_general_options(parser: argparse.ArgumentParser, *, again: bool = False)
         "--quiet",
         action="store_true",
         default=default(False),
-        help="show no progress and print results only",
+        help="hide progress and print results only",
     )
     add(
         "-v",
@@ -147,13 +147,13 @@ def add_general_options(parser: argparse.ArgumentParser, *, again: bool = False)
         "--cancel-at-eof",
         action="store_true",
         default=default(False),
-        help="with --progress json: the end of stdin cancels, too",
+        help="with --progress json: the end of stdin also cancels",
     )
     add(
         "--config",
         metavar="FILE",
         default=default(None),
-        help="read defaults of options from this TOML file (default: isc.toml, if there is one)",
+        help="read defaults of options from this TOML file (default: isc.toml, if it exists)",
     )
     add("--no-config", action="store_true", default=default(False), help="ignore isc.toml")
     for _, action in actions_of(parser):

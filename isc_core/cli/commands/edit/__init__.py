@@ -55,8 +55,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         run,
-        "Edits a result of isc decompose. Writes a folder with the image (edited.png, "
-        "edited.exr), before_after.png (start here) and edit.json. With --photo the edit "
+        "Edit a result of isc decompose. Writes a folder with the image (edited.png, "
+        "edited.exr), before_after.png (start here) and edit.json. With --photo, the edit "
         "is applied to the photo, at its size and in its encoding.",
         examples=_EXAMPLES,
     )
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     read = (getattr(options, name, None) for name in ("photo", "mask", "region", "light"))
     require_writable_edit(options.output, read)
     if options.photo is None and (options.mask is not None or options.transfer is not None):
-        raise InputError("--mask and --transfer need --photo: give it too")
+        raise InputError("--mask and --transfer require --photo: add it")
     monitor.report("reading", 0.0)
     d = load(options.result)
     if not d.mask.any():

@@ -18,7 +18,7 @@ _LOOKS = {
 def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     preset: dict[str, float] = _LOOKS.get(options.look, {})
     if options.present is not None and options.exponent is None and "sharper" not in preset:
-        raise InputError("--present needs a new sharpness: give --exponent or --look")
+        raise InputError("--present requires a new sharpness: add --exponent or --look")
     if options.exponent is not None and "sharper" in preset:
         raise InputError(
             f"--exponent and --look {options.look} both set the sharpness: give one of them"

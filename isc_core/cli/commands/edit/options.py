@@ -28,13 +28,15 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         "--photo",
         type=Path,
         metavar="PHOTO",
-        help="the photo of RESULT: the edit is applied to it",
+        help="the photo that was decomposed: the edit is applied to it",
     )
     photo.add_argument(
-        "--mask", type=Path, metavar="MASK", help="its mask, if the result was made with one"
+        "--mask", type=Path, metavar="MASK", help="the mask that it was decomposed with"
     )
     photo.add_argument(
-        "--transfer", choices=TRANSFERS, help="its encoding (default: as isc decompose read it)"
+        "--transfer",
+        choices=TRANSFERS,
+        help="transfer curve of the photo (default: as isc decompose read it)",
     )
     add_limits(photo)
     add_output(

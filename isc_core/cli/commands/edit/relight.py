@@ -50,7 +50,7 @@ def _new_light(
     if options.light is not None and options.direction is not None:
         raise InputError("--light and --direction both set the light: give one of them")
     if options.direction is None and (options.color is not None or options.ambient is not None):
-        raise InputError("--colour and --ambient need --direction: give it too")
+        raise InputError("--colour and --ambient require --direction: add it")
     if options.direction is not None:
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient
