@@ -62,7 +62,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
         if name in inner and inner[name].get_default("run") is not None:
             if not named and (barred := _ONLY_IF_NAMED & table.keys()):
                 raise InputError(
-                    f"{path}: {min(barred)} of [{name}] is only accepted from a file given with "
+                    f"{path}: {min(barred)} of [{name}] is accepted only from a file given with "
                     f"--config: use --config {path} if you trust it"
                 )
             _apply(inner[name], table, path, name)

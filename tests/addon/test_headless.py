@@ -169,7 +169,7 @@ def test_a_thing_that_fails_leaves_the_others(tmp_path: Path) -> None:
     (kept / "pair" / "1" / "diary.txt").write_text("mine")
     words = ["--each", "--model", "retinex", "--max-size", "32", "--threads", "1"]
     done = run(tmp_path / "pair.png", "-o", blend, "--results", kept, *words)
-    assert done.returncode == 2 and "thing 1 of 2: " in done.stderr, done.stdout + done.stderr
+    assert done.returncode == 2 and "object 1 of 2: " in done.stderr, done.stdout + done.stderr
     assert scenes_of(blend)[0]["pair"][-1] == 2, "one object and its camera"
     assert [path.name for path in (kept / "pair" / "1").iterdir()] == ["diary.txt"]
 

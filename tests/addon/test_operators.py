@@ -577,7 +577,7 @@ def test_messages_name_images_and_panel_fields() -> None:
         assert translate_message(f"/t/a.npy: no object: {advice}", {"/t/a.npy": "cup"}) == (
             "cup: no object: choose a mask image, or make one with Add Point or Select Box"
         )
-    several = "it seems to show several things: give --mask; --each takes each of them"
+    several = "it seems to show several objects: give --mask; --each processes each of them"
     assert translate_message(several, {}).endswith("or Select Box, or enable Each Object")
 
 

@@ -70,4 +70,4 @@ def test_nothing_is_said_at_the_start() -> None:
 )
 def test_the_time_left_is_written_in_round_numbers(seconds: float | None, text: str) -> None:
     assert stage_text("shape", seconds) == text
-    assert stage_text("thing 2 of 3: shape", seconds) == f"2/3: {text}"
+    assert stage_text("object 2 of 3: shape", seconds) == f"2/3: {text}"

@@ -185,7 +185,7 @@ def test_progress_and_time_left_are_those_of_all_things(addon: Any, shelf: Path)
     shares = [status.fraction for status in seen]
     assert shares == sorted(shares) and shares[-1] == 1
     for number in (1, 2, 3):
-        of = [one for one in seen if one.stage.startswith(f"thing {number} of 3: ")]
+        of = [one for one in seen if one.stage.startswith(f"object {number} of 3: ")]
         assert (number - 1) / 3 < of[0].fraction < of[-1].fraction < (number + 1) / 4 + 0.01
         assert number == 1 or all(one.seconds_left is not None for one in of)
     lefts = [one.seconds_left for one in seen if one.seconds_left is not None]
@@ -193,7 +193,7 @@ def test_progress_and_time_left_are_those_of_all_things(addon: Any, shelf: Path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("when", ["looking for the things", "thing 1", "between", "thing 3"])
+@pytest.mark.parametrize("when", ["finding the objects", "object 1", "between", "object 3"])
 def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: str) -> None:
     """In a thing, between two, and before the first: the worker ends, scene and disk are as before,
     and a later run makes all of them.
@@ -213,7 +213,7 @@ def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: st
     until(lambda: workers() == there and not run.folder.exists())
     assert census(addon) == before
     again = started(addon, shelf, 27)
-    until(lambda: again.step().state != "running" or "thing 1" in again.status.stage, 100)
+    until(lambda: again.step().state != "running" or "object 1" in again.status.stage, 100)
     assert again.status.state == "running", "nothing was kept for it"
     again.cancel()
     until(lambda: workers() == there)
@@ -227,8 +227,8 @@ def test_a_thing_that_fails_leaves_the_others(addon: Any, shelf: Path) -> None:
     while not advance_run(addon.context, run):
         time.sleep(0.02)
     assert run.status.message == "2 objects created at the 3D cursor"
-    assert run.status.notes[0].startswith("note: thing 2 of 3: ")
-    assert run.status.notes[0].endswith("1 of 3 things failed")
+    assert run.status.notes[0].startswith("note: object 2 of 3: ")
+    assert run.status.notes[0].endswith("1 of 3 objects failed")
     assert {one.name for one in addon.data.objects if one.type == "MESH"} == {"shelf 1", "shelf 3"}
     assert addon.ops.isc.decompose() == {"FINISHED"}
     assert addon.data.objects["shelf 2"].type == "MESH", "the next run tries it again"

@@ -320,7 +320,7 @@ OPTIONS = [
     (
         ("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"),
         (),
-        "--prior needs the method isc",
+        "--prior requires --method isc",
     ),
     (MASK, ("--box", "1,2,3"), "x,y,w,h"),
     (MASK, ("--box", "a,b,c,d"), "x,y,w,h"),

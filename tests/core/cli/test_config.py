@@ -60,15 +60,15 @@ def test_lists_of_names_and_repeated_options() -> None:
     ("text", "message"),
     [
         ("[decompose]\nmodell = 'mdr'", "[decompose] has no option 'modell': did you mean model?"),
-        ("[decompos]\n", "there is no command 'decompos': did you mean decompose?"),
-        ("model = 'sirfs'", "'model' is in no table"),
+        ("[decompos]\n", "unknown command 'decompos': did you mean decompose?"),
+        ("model = 'sirfs'", "'model' is outside any table"),
         ("[decompose]\nmax-size = -3", "max-size of [decompose]: '-3' is not a whole number"),
-        ("[decompose]\nmax-size = [3]", "is one value, not [3]"),
-        ('[decompose]\nfull-size = "yes"', "is true or false, not 'yes'"),
+        ("[decompose]\nmax-size = [3]", "must be one value, not [3]"),
+        ('[decompose]\nfull-size = "yes"', "must be true or false, not 'yes'"),
         ('[decompose]\nillumination = "sun"', "unknown 'sun': choose photo, natural, laboratory"),
         ("[decompose]\noutput = 'x'", "has no option 'output'"),
         ("[decompose\n", "is not valid TOML"),
-        ("[decompose]\nmodel = 1979-05-27", "is a text or a number"),
+        ("[decompose]\nmodel = 1979-05-27", "must be a text or a number"),
     ],
 )
 def test_mistakes_name_the_file_and_the_option(text: str, message: str) -> None:

@@ -138,9 +138,9 @@ def test_another_photo_is_refused(
         (["--textures", "unity", "-o", "out"], "no fitted roughness: give one"),
         (["--textures", "unity", "--roughness", "2", "-o", "out"], "not a number from 0 to 1"),
         (["--textures", "unity", "--triangles", "-3", "-o", "out"], "not a whole number, 0 or"),
-        (["--textures", "unity", "--back", "flat", "-o", "out"], "use it with --format"),
+        (["--textures", "unity", "--back", "flat", "-o", "out"], "add --format, or leave it out"),
         (["--format", "glb", "--back", "round", "-o", "out.glb"], "invalid choice: 'round'"),
-        (["--format", "glb", "--texture-size", "90", "-o", "out.glb"], "need --photo"),
+        (["--format", "glb", "--texture-size", "90", "-o", "out.glb"], "require --photo"),
         (
             ["--format", "glb", "--texture-size", "0", "-o", "out.glb"],
             "not photo, maps or a number",

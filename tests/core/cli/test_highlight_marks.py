@@ -1,4 +1,4 @@
-"""`isc decompose --highlight`: what is taken off, noted, and refused."""
+"""`isc decompose --highlight`: what is removed, noted, and refused."""
 
 import json
 from dataclasses import replace
@@ -29,7 +29,7 @@ def test_a_mark_where_there_is_no_highlight_is_noted(
     shading = np.sqrt(np.maximum(24**2 - row**2 - column**2, 0)) / 24
     write_image(photo, np.rint(255 * shading[..., None] * [0.9, 0.3, 0.2]).astype(np.uint8))
     assert decompose(photo, output, "--highlight=30,31") == 0
-    assert "no light was taken off at 30,31" in capsys.readouterr().out
+    assert "no highlight was removed at 30,31" in capsys.readouterr().out
     stored = json.loads((output / "decomposition.json").read_text())["input"]
     assert stored["marked_highlights"] == [[30, 31]] and "marked_paint" not in stored
 

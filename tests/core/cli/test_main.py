@@ -201,7 +201,7 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
 
 
 @pytest.mark.parametrize(
-    ("size", "remedy"), [("0", "the photo has no more"), ("24", "use --max-size 0 for more")]
+    ("size", "remedy"), [("0", "as in the photo"), ("24", "use --max-size 0 for more")]
 )
 def test_relief_finer_than_the_maps_is_not_promised(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], size: str, remedy: str
@@ -410,7 +410,7 @@ def test_a_photo_that_is_left_alone_is_said_to_be(
     assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
     assert "the photo has no colour" in capsys.readouterr().out
     assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
-    assert "nothing was taken" not in capsys.readouterr().out
+    assert "no highlight was found" not in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def test_a_mask_is_found_and_written(tmp_path: Path, capsys: pytest.CaptureFixtu
     path, truth = photo(tmp_path, ONE)
     assert isc("mask", path, "--auto", "-o", tmp_path / "mask.png") == 0
     assert overlap(mask_in(tmp_path / "mask.png"), truth) > 0.95
-    assert "% sure; check it" in capsys.readouterr().out
+    assert "pixels, confidence " in capsys.readouterr().out
     codes = np.unique(np.asarray(Image.open(tmp_path / "mask.png")))
     assert len(codes) > 2, "the rim is soft"
 
@@ -77,7 +77,7 @@ def test_each_thing_gets_a_mask(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ((), "nothing says where the object is: --auto finds it"),
+        ((), "no object is selected: find it with --auto"),
         (("--auto",), "--box"),
         (("--point", "500,3"), "--point 500,3: lies outside of the photo of 200 x 150 pixels"),
         (("--point", "50,80", "--not", "50,80"), "contradict each other"),

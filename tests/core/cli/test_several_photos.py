@@ -76,8 +76,8 @@ def test_a_thing_that_fails_stops_no_other(
     assert isc(*words) == 1
     printed = capsys.readouterr()
     errors = [line for line in printed.err.splitlines() if "rejected" in line]
-    assert "thing 1 of 2: " in errors[0] and str(out / "1") in errors[0]
-    assert errors[1].endswith("1 of 2 things failed") and len(errors) == 2
+    assert "object 1 of 2: " in errors[0] and str(out / "1") in errors[0]
+    assert errors[1].endswith("1 of 2 objects failed") and len(errors) == 2
     assert f"see {out / '2' / 'preview.png'}" in printed.out, "what is done is told"
     assert [path.name for path in (out / "1").iterdir()] == ["diary.txt"]
     assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "all") == 0
@@ -85,7 +85,7 @@ def test_a_thing_that_fails_stops_no_other(
     assert np.array_equal(kept.reflectance, alone.reflectance)
     assert isc(*words, "--progress", "json") == 1
     last = json.loads(capsys.readouterr().out.splitlines()[-1])
-    assert last["event"] == "failed" and last["code"] == 1 and "thing 1 of 2: " in last["message"]
+    assert last["event"] == "failed" and last["code"] == 1 and "object 1 of 2: " in last["message"]
 
 
 def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
@@ -105,7 +105,7 @@ def test_results_of_more_things_in_the_folder_are_refused(
     (out / "3" / "decomposition.json").write_text("{}")
     assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", out) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert f"{out / '3'} is the result of another run, and this photo has 2 things" in line
+    assert f"{out / '3'} is the result of another run, and this photo has 2 objects" in line
     assert [path.name for path in out.iterdir()] == ["3"]
 
 
@@ -119,17 +119,17 @@ def test_want_of_memory_or_room_stops_no_other() -> None:
         return ["done"]
 
     def run(*errors: BaseException | None) -> list[str]:
-        works = {f"thing {i}": partial(work, error) for i, error in enumerate(errors)}
-        return do_all("things", works, Monitor(events.append))
+        works = {f"object {i}": partial(work, error) for i, error in enumerate(errors)}
+        return do_all("objects", works, Monitor(events.append))
 
     full = OSError(errno.ENOSPC, "No space left on device", "a\nb")
     with pytest.raises(Rejected) as rejected:
-        run(MemoryError(), None, full, InputError("thing 3 cannot be used"))
+        run(MemoryError(), None, full, InputError("object 3 cannot be used"))
     lines = str(rejected.value).splitlines()
-    assert lines[0].startswith("thing 0: not enough memory") and rejected.value.lines == ["done"]
-    assert lines[1:3] == ["thing 2: a\\nb: No space left on device", "thing 3 cannot be used"]
-    assert lines[3] == "3 of 4 things failed"
-    assert [event.stage for event in events] == [f"thing {i}: half" for i in range(4)]
+    assert lines[0].startswith("object 0: not enough memory") and rejected.value.lines == ["done"]
+    assert lines[1:3] == ["object 2: a\\nb: No space left on device", "object 3 cannot be used"]
+    assert lines[3] == "3 of 4 objects failed"
+    assert [event.stage for event in events] == [f"object {i}: half" for i in range(4)]
     np.testing.assert_allclose([event.fraction for event in events], np.arange(1, 8, 2) / 8)
     for stopping in (Cancelled("now"), BrokenPipeError(), KeyboardInterrupt()):
         events.clear()
@@ -145,10 +145,10 @@ def test_what_belongs_to_one_photo_is_refused_for_several(
     (tmp_path / "more").mkdir()
     same = shutil.copy(first, tmp_path / "more" / "Ball.jpeg")
     for words, message in (
-        ((first, second, "--mask", first), "--mask belongs to one photo"),
-        ((first, second, "--depth", first), "--depth belongs to one photo"),
+        ((first, second, "--mask", first), "--mask applies to one photo"),
+        ((first, second, "--depth", first), "--depth applies to one photo"),
         ((first, same), "would both be written"),
-        ((first, "-"), "- is one photo from standard input"),
+        ((first, "-"), "- reads one photo from standard input"),
     ):
         assert isc("decompose", *words, "-o", tmp_path / "out") == 2
         assert message in capsys.readouterr().err
