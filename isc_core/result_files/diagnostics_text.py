@@ -18,9 +18,7 @@ from ..scene.diagnostics import (
 from .diagnostics_json import diagnostics_from_json
 
 _MOST_LOG = 10.0  # larger errors of the logarithm come from somebody else's file
-STOPPED_EARLY = (
-    "the solver reached its limit of evaluations: a cleaner mask may give a better result"
-)
+STOPPED_EARLY = "the solver reached its limit of evaluations: try a cleaner mask"
 STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
 CROPPED = (
     "the photo was cropped, so its focal length does not hold: use the whole photo, or --camera MM"
