@@ -157,7 +157,7 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
 def _make_result(
     source: Source, results: Path, options: argparse.Namespace, monitor: Monitor
 ) -> tuple[Path, str]:
-    """The result folder of a source, with arrays; and what failed if some of its things did."""
+    """The result folder of a source, with arrays; and what failed if some of its objects did."""
     environment = worker_environment(read_preferences(bpy.context))
     if source.is_result:
         if not (source.path / ARRAYS).is_file():
@@ -233,7 +233,7 @@ def _write_outputs(
 
 
 def _each(source: Source, options: argparse.Namespace) -> bool:
-    """Whether each thing of a source becomes an object; a result is one thing."""
+    """Whether each object of a source becomes a Blender object; a result is one."""
     return bool(options.each) and not source.is_result
 
 

@@ -1,9 +1,9 @@
 """Intrinsic scene characteristics from one photo of a glossy object.
 
-`decompose`, `separate`, `save` and `load` are the Python interface; `Settings`, `KnownInputs` and
-`Monitor` are what they take, `Photo`, `Decomposition` and `Separation` what they work on, and
-`InputError` and `Cancelled` what they raise. Nothing is imported before it is used, not even
-`typing`: this module runs before the command can handle Ctrl-C.
+The Python interface consists of `decompose`, `separate`, `save` and `load`. They accept `Settings`,
+`KnownInputs` and `Monitor`, work on `Photo`, `Decomposition` and `Separation`, and raise
+`InputError` and `Cancelled`. Nothing is imported before it is used, not even `typing`, because this
+module runs before the command can handle Ctrl-C.
 """
 
 TYPE_CHECKING = False  # type checkers know the name

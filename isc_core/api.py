@@ -63,7 +63,7 @@ def decompose(
     transfer : {"auto", "srgb", "linear"}
         Encoding of the image; "auto": floats are linear, all others sRGB.
     marks : HighlightMarks, optional
-        Places of highlights, and of paint that looks like them; for the model joint.
+        Positions of highlights, and of print or paint that looks like them; for the model joint.
     monitor : Monitor, optional
         Receives progress; can cancel.
 

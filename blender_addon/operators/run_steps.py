@@ -153,9 +153,9 @@ def _things(
     names: Mapping[str, str],
     environment: WorkerEnvironment,
 ) -> RunSteps:
-    """What is built of each thing: of earlier results of the same content, or a worker's.
+    """What is built of each object: of earlier results of the same content, or a worker's.
 
-    Of things that fail there are notes; the next run tries all again.
+    Of objects that fail there are notes; the next run tries all again.
     """
     cache, key, folder = place.cache, "", job.output
     failures: tuple[str, ...] = ()
@@ -366,12 +366,12 @@ def import_steps(result: Path, build: BuildOptions, environment: WorkerEnvironme
 def read_and_prepare(
     folder: Path, build: BuildOptions, *, with_photo: bool = False
 ) -> tuple[PreparedObject, ...]:
-    """Read a result, or those of each thing of a photo, and make in advance what takes time.
+    """Read a result, or those of each object of a photo, and make in advance what takes time.
 
     Parameters
     ----------
     folder : Path
-        A result, or with `build.each` the folder of results of things.
+        A result, or with `build.each` the folder of results of objects.
     build : BuildOptions
         What will be built.
     with_photo : bool, optional
@@ -380,7 +380,7 @@ def read_and_prepare(
     Returns
     -------
     tuple of PreparedObject
-        One object, or one for each thing.
+        One object, or one for each object.
 
     Raises
     ------

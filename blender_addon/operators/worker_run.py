@@ -36,7 +36,7 @@ class RunOutput:
     notes : tuple of str
         Notes on the result; those that advise something begin with "note: ".
     prepared : tuple of PreparedObject
-        What is built of the folder, if it was read: one object, or one for each thing.
+        What is built of the folder, if it was read: one object, or one for each object.
     remark : str
         What the message on the outcome says besides; "" for nothing.
     """

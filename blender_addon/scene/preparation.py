@@ -77,7 +77,7 @@ class BuildOptions:
     name : str
         Name of the object; "" for the result's own.
     each : bool
-        Whether each separate thing of the photo becomes an object.
+        Whether each separate object of the photo becomes a Blender object.
     """
 
     size_metres: float = 0.1

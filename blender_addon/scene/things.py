@@ -1,18 +1,18 @@
-"""Several things of one photo, decomposed one by one: at one scale, side by side, under one light.
+"""Several objects of one photo, decomposed separately: one scale, side by side, under one light.
 
-Problem: each result has a scale, an origin and a light of its own. In one scene, things share them.
+Problem: each result has its own scale, origin and light. In one scene, the objects share them.
 
-Equation: a pixel of the photo has one length everywhere, so that things stand in one plane across
+Equation: a pixel of the photo has one length everywhere, so that objects stand in one plane across
 the view: their depths are not known. With s_i(n) the shading that light i gives a normal n, and b_i
 the base color that goes with it, diffuse light is b_i s_i. Multiplying b_i by g_i and dividing
-light i by it changes nothing. Under the light of the largest thing, 0, thing i is as bright as in
+light i by it changes nothing. Under the light of the largest object, 0, object i is as bright as in
 the photo where
 
     g_i / g_0 = sum_n b_i s_i(n) / sum_n b_i s_0(n),
 
 summed over its pixels; the largest g is 1, so that no base color exceeds what it was.
 
-Limits: one number for each thing. Where the lights that were recovered differ in direction or
+Limits: one number for each object. Where the lights that were recovered differ in direction or
 color, shading differs from the photo's.
 """
 
@@ -35,7 +35,7 @@ from .preparation import BuildOptions, PreparedObject, prepare
 
 _CONSTANT = 0.5 / np.sqrt(np.pi)  # the first spherical harmonic
 _LEAST = 1e-9
-# What of a scene only the first thing changes.
+# What of a scene only the first object changes.
 _SHARED = (
     "own_scene",
     "light_and_camera",
@@ -50,21 +50,21 @@ _SHARED = (
 def prepare_things(
     results: Sequence[ResultArrays], options: BuildOptions, *, with_photo: bool = False
 ) -> list[PreparedObject]:
-    """Make in advance what takes time of several things of a photo.
+    """Make in advance what takes time of several objects of a photo.
 
     Parameters
     ----------
     results : sequence of ResultArrays
         From left to right, in folders 1, 2 and so on, which number the objects.
     options : BuildOptions
-        What will be built; the size is that of the largest thing, the name that of the photo.
+        What will be built; the size is that of the largest object, the name that of the photo.
     with_photo : bool, optional
         Whether the masked photo becomes an image.
 
     Returns
     -------
     list of PreparedObject
-        The largest thing first: scene, light and camera are its own.
+        The largest object first: scene, light and camera are its own.
     """
     lengths = [result.longest_side / result.crop_scale for result in results]
     step = options.size_metres / max(lengths)
@@ -86,12 +86,12 @@ def prepare_things(
 
 
 def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[float, float, float]:
-    """Return where a thing lies from another one of the same photo.
+    """Return where an object lies from another one of the same photo.
 
     Parameters
     ----------
     first, other : ResultArrays
-        The things.
+        The objects.
     step : float
         Metres for a pixel of the photo.
 
@@ -113,7 +113,7 @@ def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[fl
 def stage_things(
     prepared: Sequence[PreparedObject], *, photo: bpy.types.Image | None = None
 ) -> Generator[None, None, list[StagedObject]]:
-    """Make the images and the meshes of things in short steps, see `build.stage_object`.
+    """Make the images and the meshes of objects in short steps, see `build.stage_object`.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def stage_things(
 
 
 def discard(staged: list[StagedObject]) -> None:
-    """Remove the datablocks of staged things that were not placed.
+    """Remove the datablocks of staged objects that were not placed.
 
     Parameters
     ----------
@@ -162,12 +162,12 @@ def place_things(
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
 ) -> list[BuiltObject]:
-    """Put things in a scene as they lie in the photo, in one short call.
+    """Put objects in a scene as they lie in the photo, in one short call.
 
     Parameters
     ----------
     staged : sequence of StagedObject
-        One object, or the things of one photo; their datablocks are used or removed.
+        One object, or the objects of one photo; their datablocks are used or removed.
     scene, photo
         As of `build.build_object`.
 
@@ -199,14 +199,14 @@ def place_things(
 
 
 def _name_scene(built: BuiltObject) -> None:
-    """Name a new scene after the photo, not after its first thing."""
+    """Name a new scene after the photo, not after its first object."""
     key = str(built.object[KEY])
     if built.scene.name == datablock_name(key):
         built.scene.name = datablock_name(key.rpartition(" ")[0])
 
 
 def _room(staged: Sequence[StagedObject]) -> np.ndarray:
-    """The lowest and the highest corner (2, 3) of all things, from the first one's origin."""
+    """The lowest and the highest corner (2, 3) of all objects, from the first one's origin."""
     corners = []
     for one in staged:
         points = one.prepared.mesh.positions.reshape(-1, 3) + np.array(one.prepared.offset)
@@ -224,7 +224,7 @@ def _under_one_light(results: Sequence[ResultArrays], first: int) -> list[Result
 
 
 def _gain(result: ResultArrays, light: np.ndarray) -> float:
-    """What a thing's base color is multiplied with, to be as bright under another light."""
+    """What an object's base color is multiplied with, to be as bright under another light."""
     basis = real_sh(result.normal[result.mask].astype(float))
     color = result.base_color[result.mask].astype(float)
     own, under = (

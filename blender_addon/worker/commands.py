@@ -73,7 +73,7 @@ class DecomposeJob:
     highlights, not_highlights : tuple of (x, y)
         Values of `--highlight` and `--not-highlight`.
     each : bool
-        Whether each thing is decomposed, into the folders 1, 2 and so on of `output`.
+        Whether each object is decomposed, into the folders 1, 2 and so on of `output`.
     refine : bool
         Whether the gloss is refined.
     """

@@ -6,12 +6,12 @@ took when they were measured (two cores, photos of 2,400 pixels). With t(f) thos
 fraction f, T their sum, and e the seconds since the start, the share is t(f) / T, and e (T - t) / t
 are left. While a stage reports nothing, t grows with the time, to at most four fifths of the stage.
 
-Several things of a photo are first found, and their number n is known a time b after the start. The
+Several objects of a photo are found first, so their number n is known a time b after the start. The
 k-th one has a fraction f of its own: t = (k - 1) T + t(f) of n T are over, and (n T - t) (e - b +
 c) / (t + c) are left, with c two seconds at the usual speed. The share is that of e in the sum of
 both.
 
-Limits: things count alike, whatever their size. The time of the solver depends on the photo, by a
+Limits: objects count alike, whatever their size. The time of the solver depends on the photo, by a
 factor of three either way; the estimate corrects itself once the solver is done. Nothing is said
 about the first two seconds.
 """
@@ -48,7 +48,7 @@ class Pace:
     refine : bool
         Whether the gloss is refined.
     several : bool
-        Whether the worker looks for several things.
+        Whether the worker looks for several objects.
     share : float
         Share of the time that is over, in [0, 1]; never falls.
     """
@@ -76,7 +76,7 @@ class Pace:
         WorkerUpdate
             The update with the share of the time for its fraction, and the seconds left.
         """
-        if self.several and update.part is None:  # how many things there are is not yet known
+        if self.several and update.part is None:  # how many objects there are is not yet known
             return replace(update, fraction=self.share)
         if self._begun is None:
             self._begun = elapsed if self.several else 0.0

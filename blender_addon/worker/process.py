@@ -65,7 +65,7 @@ class WorkerUpdate:
     seconds_left : float or None
         Estimate of the time until the end; None if unknown.
     part : (int, int) or None
-        Which of several things the worker is at, from 1 on, and how many there are.
+        Which of several objects the worker is at, from 1 on, and how many there are.
     """
 
     stage: str = ""
@@ -99,7 +99,7 @@ class WorkerProcess:
 
     def __init__(self, command: Sequence[str], output: Path, variables: Mapping[str, str]) -> None:
         self._output = output
-        # Results of several things lie in the output, each with unfinished files beside it.
+        # Results of several objects lie in the output, each with unfinished files beside it.
         self._present = unfinished(output) | frozenset(output.resolve().glob(".*"))
         self._created = [parent for parent in output.parents if not parent.exists()]
         self._update = WorkerUpdate("starting")

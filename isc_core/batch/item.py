@@ -42,7 +42,7 @@ class ImageRecipe:
     transfer : str
         One of `photo.TRANSFERS`.
     each : bool
-        Whether each of several separate things has a result of its own.
+        Whether each of several separate objects has a result of its own.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -147,7 +147,7 @@ class ImageJob:
     recipe : ImageRecipe
     plan : RunPlan
     thing : int
-        Number of the thing, from 1 on, where it is one of several; 0 for the whole photo.
+        Number of the object, from 1 on, where it is one of several; 0 for the whole photo.
     """
 
     number: int
@@ -164,7 +164,7 @@ class ImageJob:
         return self.plan.output / self.name
 
     def of_thing(self, thing: int) -> "ImageJob":
-        """Return the part of the job that is one thing of the photo.
+        """Return the part of the job that is one object of the photo.
 
         Parameters
         ----------
@@ -200,7 +200,7 @@ class ImageOutcome:
     peak_mb: float = 0.0
 
 
-# The outcomes of a job by the names of its results: one, or one for each thing.
+# The outcomes of a job by the names of its results: one, or one for each object.
 Outcomes = dict[str, ImageOutcome]
 
 

@@ -18,7 +18,7 @@ from .run_folder import RunFolder
 
 @dataclass(frozen=True)
 class JournalEntry:
-    """The line of an image, or of one of its things.
+    """The line of an image, or of one of its objects.
 
     Attributes
     ----------
@@ -93,7 +93,7 @@ class Journal:
         Parameters
         ----------
         *entries : JournalEntry
-            All of one image: one, or one for each thing.
+            All of one image: one, or one for each object.
         """
         self._offsets[entries[0].number] = self._all.tell()
         self._all.write(b"".join(_line(entry.row()) for entry in entries))

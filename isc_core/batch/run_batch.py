@@ -82,7 +82,7 @@ def run_batch(
     Returns
     -------
     Counter
-        Number of results by status: of images, or of the things of those that have each.
+        Number of results by status: of images, or of the objects of those that have each.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The output folder of a batch: its lock, its files, and remains of killed runs.
 
     OUT/NAME/                one result each, complete or absent
-    OUT/NAME/1, 2, ...       one result for each thing of a photo
+    OUT/NAME/1, 2, ...       one result for each object of a photo
     OUT/thumbnails/NAME.jpg, thumbnails/each/NAME/1.jpg, ...
     OUT/failures.jsonl       grows during a run
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    written at the end
@@ -32,12 +32,12 @@ def thumbnail_place(name: str) -> str:
     Parameters
     ----------
     name : str
-        Of the result; that of a thing has a "/".
+        Of the result; that of an object has a "/".
 
     Returns
     -------
     str
-        With "/". Things have a folder apart: a photo's name may end with ".jpg", too.
+        With "/". Objects have a folder apart: a photo's name may end with ".jpg", too.
     """
     return "/".join((THUMBNAILS, *((_EACH,) if "/" in name else ()), f"{name}.jpg"))
 
@@ -87,7 +87,7 @@ class RunFolder:
         return self.attempts / name.replace("/", " ")  # names have no spaces
 
     def begin_things(self, name: str) -> None:
-        """Make the folders of a photo with a result for each thing.
+        """Make the folders of a photo with a result for each object.
 
         Parameters
         ----------

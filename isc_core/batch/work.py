@@ -1,7 +1,7 @@
 """The job of one image, as a worker runs it.
 
 A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
-belong to the process. The things of a photo are decomposed one after the other, each an attempt of
+belong to the process. The objects of a photo are decomposed one after the other, each an attempt of
 its own, so that one that fails, hangs or kills its worker does not take the others along.
 """
 
@@ -47,7 +47,7 @@ class _Files:
 
 
 def process(job: ImageJob, work: Work | None = None) -> Outcomes:
-    """Decompose the job's image, or each of its things, unless the results exist.
+    """Decompose the job's image, or each of its objects, unless the results exist.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def process(job: ImageJob, work: Work | None = None) -> Outcomes:
     Returns
     -------
     Outcomes
-        Those of a photo whose things cannot be told are its own.
+        Those of a photo whose objects cannot be told are its own.
     """
     with _process_lock:
         if job.recipe.each and work is None:
@@ -113,7 +113,7 @@ def _process_each(job: ImageJob) -> Outcomes:
 def _find(
     job: ImageJob, monitor: Monitor, stack: ExitStack, things: list[tuple[_Files, Photo | None]]
 ) -> str:
-    """Add the things of a photo; they are not looked for where all results exist."""
+    """Add the objects of a photo; they are not looked for where all results exist."""
     if recorded_input(job.folder):
         raise InputError(
             f"{job.folder} is the result of the whole photo: move it away, or leave out --each"
@@ -130,7 +130,7 @@ def _find(
 
 
 def _finished_things(job: ImageJob, files: _Files) -> int:
-    """How many things the photo has; 0 where the result of one is missing."""
+    """How many objects the photo has; 0 where the result of one is missing."""
     count = recorded_input(job.of_thing(1).folder).get(_THINGS)
     if not isinstance(count, int):
         return 0
@@ -153,7 +153,7 @@ def _decompose_thing(
 
 
 def _remove_further(job: ImageJob, count: int) -> None:
-    """Remove results of more things, which an earlier run found."""
+    """Remove results of more objects, which an earlier run found."""
     number = count + 1
     while recorded_input(folder := job.of_thing(number).folder).get(_THINGS):
         require_writable_result(folder)  # nothing but a result

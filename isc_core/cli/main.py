@@ -1,10 +1,10 @@
 """The command `isc`: runs a sub-command and maps its end to an exit code and at most one line.
 
-0: done. 1: done, but a measurement violates a bound, or some of several photos or things failed;
-stderr names them. 2: an input cannot be used, or the machine has no room for it; one line on stderr
-says what to do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second
-stops it at once). Nothing half-written remains in any case. With `--progress json` the output is
-for a program instead of a person, see `interface.json_progress`.
+0: success. 1: finished, but a measurement violates a bound, or some of several photos or objects
+failed; stderr names them. 2: invalid input, or not enough memory or disk space; one line on stderr
+names the remedy. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the
+second stops it immediately). Nothing half-written remains in any case. With `--progress json` the
+output is for a program instead of a person, see `interface.json_progress`.
 """
 
 import argparse

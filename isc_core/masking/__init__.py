@@ -1,4 +1,4 @@
-"""Finding the mask of the thing that a photo shows: from the photo alone, or from hints."""
+"""Find the mask of the object in a photo, with or without hints."""
 
 from typing import TYPE_CHECKING
 

@@ -1,19 +1,18 @@
-"""How sure a mask is.
+"""The confidence of a mask.
 
-Problem: a photo of no single thing, or of one that the network cannot tell from what is around it,
-should be refused, not masked.
+Problem: a photo without one distinct object, or with one that the network cannot separate from its
+surroundings, should be refused, not masked.
 
-Equation: the log odds of a right mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o) + w_4 l(f_1) +
-w_5 l(f_2) for the log odds l of the probabilities p of one thing at both looks, of their overlap o,
-and of how firm both are, f = 1 - 2 (sum c (1 - c)) / (sum c) for the cover c: 1 where every pixel
-is told with certainty, 0 where all are even odds. w is fitted
-(`training.masks.mask_calibration`).
+Equation: the log odds of a correct mask are w_0 + w_1 l(p_1) + w_2 l(p_2) + w_3 l(o) + w_4 l(f_1) +
+w_5 l(f_2). l is the log odds of the probabilities p of one object in both passes, of the overlap o
+of the passes, and of their decisiveness f = 1 - 2 (sum c (1 - c)) / (sum c) for the coverage c: 1
+if every pixel is certain, 0 if all have even odds. w is fitted (`training.masks.mask_calibration`).
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines", 1999.
 
-Limits: fitted to photos without hints. With hints, the looks have seen them, and the probability is
-multiplied by the share of points that the mask obeys; docs/methods/automatic_mask.md tells what it
-is then worth.
+Limits: fitted to photos without hints. With hints, which both passes receive, the probability is
+multiplied by the fraction of points that the mask satisfies; docs/methods/automatic_mask.md
+reports how accurate it is then.
 """
 
 import math
@@ -36,7 +35,7 @@ def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarra
     first, second : PartPrediction
         At the whole photo and at a part of it.
     before : (height, width) ndarray
-        The first look's cover of that part.
+        Coverage of that part in the first pass.
 
     Returns
     -------
@@ -66,7 +65,7 @@ def of_another_mask(evidence: np.ndarray, looked: np.ndarray, taken: np.ndarray)
     Returns
     -------
     (SURENESS,) ndarray
-        The overlap is that of both, where it is less than that of the looks.
+        The overlap is that of both masks if it is less than that of the passes.
     """
     overlap = _log_odds(np.array([_overlap(looked, taken)]))[1]
     changed = evidence.copy()

@@ -1,4 +1,4 @@
-"""Masks for the reader of photos: found, or refused with what to do."""
+"""Masks for the reader of photos: found, or refused with a remedy."""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -18,7 +18,7 @@ from .search import find_mask, find_masks, separate_parts
 
 SURE = 0.2  # least sureness of a mask that is used without being asked for
 _LIKELY = 0.5  # the same where the whole photo would do as well
-_SEVERAL = 0.3  # of the largest part: a second one as large is another thing
+_SEVERAL = 0.3  # of the largest part: a second one as large is another object
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 
@@ -103,7 +103,7 @@ def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SUR
 
 
 def is_apart(mask: np.ndarray) -> bool:
-    """Return whether a mask shows several things.
+    """Return whether a mask shows several objects.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def is_apart(mask: np.ndarray) -> bool:
 
 
 class EachSearch:
-    """A `photo.found_mask.MaskFinder` that keeps the mask of each of several things.
+    """A `photo.found_mask.MaskFinder` that keeps the mask of each of several objects.
 
     Attributes
     ----------
@@ -133,7 +133,7 @@ class EachSearch:
         self.found: list[FoundMask] = []
 
     def __call__(self, name: str, light: np.ndarray) -> FoundMask:
-        """Find all things of a photo.
+        """Find all objects of a photo.
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class EachSearch:
 def read_each(
     path: Path, mask_path: Path | None, transfer: str = "auto", limits: Limits = USUAL
 ) -> list[Photo]:
-    """Read a photo of several separate things.
+    """Read a photo of several separate objects.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def read_each(
     Returns
     -------
     list of Photo
-        One for each thing, from left to right.
+        One for each object, from left to right.
 
     Raises
     ------
@@ -191,7 +191,7 @@ def read_each(
 def photos_of_each(
     raster: Raster, name: str, mask: Raster | None, mask_name: str, transfer: str
 ) -> list[Photo]:
-    """Make one photo for each separate thing of decoded files.
+    """Make one photo for each separate object of decoded files.
 
     Parameters
     ----------
@@ -200,7 +200,7 @@ def photos_of_each(
     name : str
         Opens the error messages.
     mask : Raster or None
-        A mask of all things.
+        A mask of all objects.
     mask_name : str
     transfer : {"auto", "srgb", "linear"}
 

@@ -44,9 +44,9 @@ class PartPrediction:
     Attributes
     ----------
     cover : (height, width) float32 ndarray
-        Probability of the thing at each pixel of the part.
+        Probability of the object at each pixel of the part.
     counts : (3,) ndarray
-        Probabilities of none, one and several things.
+        Probabilities of none, one and several objects.
     """
 
     cover: np.ndarray

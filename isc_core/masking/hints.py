@@ -1,4 +1,4 @@
-"""What a user says of the mask: points on the thing, points on the background, a box around it."""
+"""A user's hints: points on the object, points on the background, a box around the object."""
 
 from dataclasses import dataclass
 
@@ -15,11 +15,11 @@ class Hints:
     Attributes
     ----------
     points : tuple of (x, y)
-        On the thing.
+        On the object.
     others : tuple of (x, y)
         On the background.
     box : tuple of int or None
-        (x, y, width, height) around the thing: nothing outside belongs to it.
+        (x, y, width, height) around the object: nothing outside belongs to it.
     """
 
     points: tuple[Point, ...] = ()

@@ -1,12 +1,11 @@
 """The outline of a mask at the photo's own pixels.
 
-Problem: the network sees 96 pixels; the outline that it finds is off by one of them.
+Problem: the network sees 96 pixels; the outline that it finds is off by up to one of them.
 
-Equation: pixels that the network is sure of and that lie away from the outline are known, and so is
-the middle line of what it takes for the thing, by which thin parts are kept; the others are not
-known. GrabCut labels these by colours and contrast (`photo.grabcut`). The soft cover a of the rim
-is the guided filter of the labels with the photo as its guide, a = A I + b in windows of a few
-pixels.
+Equation: pixels of which the network is certain and that lie away from the outline are fixed. So is
+the medial axis of the object, so that thin parts are kept. GrabCut labels all other pixels by
+colour and contrast (`photo.grabcut`). The coverage a of the rim is the guided filter of the labels
+with the photo as its guide, a = A I + b in windows of a few pixels.
 
 Citation: C. Rother et al. 2004, doi:10.1145/1015706.1015720; K. He, J. Sun, X. Tang 2013,
 doi:10.1109/TPAMI.2012.213 (section 4, feathering).
@@ -25,7 +24,7 @@ from ..photo.masks import tidy_mask
 
 SIDE = 384
 _SURE = 0.97  # probability from which the network is trusted, away from the outline
-_LIKELY = 0.8  # the same on the middle line of the thing
+_LIKELY = 0.8  # the same on the middle line of the object
 _LINE = 5  # pixels: no point of the middle line lies less deep than others as near
 _BAND = 0.03  # of the part's longer side: as far off as the network's outline may be
 _ITERATIONS = 1

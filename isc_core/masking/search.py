@@ -1,13 +1,14 @@
-"""The mask of the thing that a photo shows.
+"""The mask of the object in a photo.
 
-Problem: a photo without mask, alpha channel or plain border shows a thing before something else.
+Problem: a photo without a mask, an alpha channel or a plain border shows an object in front of
+something else.
 
-Equation: the network (`networks.mask_network`) looks at the whole photo, then at the surroundings
-of what it found, where the thing is larger. The second look is the mean of two, in frames of 96 and
-of 128 pixels: what is large to the one is small to the other, and they err apart. `evidence` tells
-how sure the mask is, and `refinement` brings it to the photo's own pixels.
+Equation: the first pass of the network (`networks.mask_network`) uses the whole photo, the second
+pass a crop around the result, in which the object is larger. The second pass averages two
+predictions, in frames of 96 and of 128 pixels, because their errors differ. `evidence` gives the
+confidence of the mask, and `refinement` brings it to the photo's own pixels.
 
-Citation: see `networks.mask_network` and `refinement`; a thing reaches the sides of its box: V.
+Citation: see `networks.mask_network` and `refinement`; an object reaches the sides of its box: V.
 Lempitsky et al. 2009, doi:10.1109/ICCV.2009.5459262. Where the network's mask does not, the box is
 segmented by colours alone (`photo.grabcut`).
 
@@ -31,17 +32,17 @@ from .hints import Hints
 from .refinement import refined
 
 WORKING = 768  # pixels of the longer side of the photo that is worked on
-_SIDES = (96, 128)  # pixels of the network's frame at the second look
-_MARGIN = 0.25  # of the thing's longer side, around it at the second look
+_SIDES = (96, 128)  # pixels of the network's frame in the second pass
+_MARGIN = 0.25  # of the object's longer side, around it in the second pass
 _FILLED = 0.75  # of the sides of a box: a smaller mask is not what the box was drawn around
 _SEEN = 0.5  # of a mask in a box the network has to have seen: cuts spread among similar colours
-_NOTHING = 0.5  # probability from which a photo shows no things
+_NOTHING = 0.5  # probability from which a photo shows no objects
 
 
 def find_mask(
     light: np.ndarray, hints: Hints | None = None, network: MaskNetwork | None = None
 ) -> FoundMask:
-    """Find the thing that a photo shows.
+    """Find the object in a photo.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ def _obeyed(mask: np.ndarray, hints: Hints) -> float:
 
 
 def _fills(mask: np.ndarray, box: Box) -> bool:
-    """Whether a mask is about as wide and as high as the box that was drawn around the thing."""
+    """Whether a mask is about as wide and as high as the box that was drawn around the object."""
     if not mask.any():
         return False
     width, height = mask_box(mask)[2:]
@@ -86,7 +87,7 @@ def _fills(mask: np.ndarray, box: Box) -> bool:
 
 
 def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[FoundMask]:
-    """Find each of several separate things that a photo shows.
+    """Find each of several separate objects in a photo.
 
     Parameters
     ----------
@@ -97,7 +98,7 @@ def find_masks(light: np.ndarray, network: MaskNetwork | None = None) -> list[Fo
     Returns
     -------
     list of FoundMask
-        From left to right; things that do not touch. Empty, if there is none.
+        From left to right; objects that do not touch. Empty, if there is none.
     """
     small, hints = _working(light, Hints())
     whole = predict_part(small, _all_of(small), hints, network)
@@ -169,7 +170,7 @@ def _at_size(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
 def _second_look(
     light: np.ndarray, first: PartPrediction, hints: Hints, network: MaskNetwork | None
 ) -> FoundMask:
-    """Look closer at what the first look found, and refine its outline."""
+    """Run the second pass on what the first pass found, and refine its outline."""
     inside = _meant(first.cover, hints)
     weights = (network or MaskNetwork.shipped()).sureness
     if not inside.any():

@@ -1,15 +1,15 @@
-"""Which pixels of a photo show the thing that it is a photo of.
+"""The network that finds the object in a photo.
 
-Problem: a photo of a thing before a room or a table has no mask. What stands in front, all of one
-piece, with a shadow of its own, is seen from what things look like, not from colours alone.
+Problem: a photo of an object in front of a room or a table has no mask. Colours alone do not
+separate the object from its surroundings. The method has to recognise what stands in front, forms
+one piece, and casts its own shadow.
 
 Equation: an encoder of convolutions computes feature maps of the photo, each half as fine as the
-one before; a decoder goes back up with the encoder's maps beside it (`encoder_decoder`). Each pixel
-gets the log odds of being part of the thing. Means and maxima of the coarse feature maps give the
-log odds of none, one and several things. Photo and mirror image are averaged. Hints, if there are
-any, are drawn into channels of their own: points on the thing, points on the background, a box.
-What the network says together makes it as sure as a logistic regression on photos that the weights
-have not seen tells.
+one before; a decoder with skip connections predicts the log odds that each pixel belongs to the
+object (`encoder_decoder`). Means and maxima of the coarsest feature maps give the log odds of none,
+one and several objects. The predictions for the photo and its mirror image are averaged. Hints are
+drawn into channels of their own: points on the object, points on the background, a box. A logistic
+regression on held-out photos gives the confidence (`masking.evidence`).
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
@@ -32,13 +32,13 @@ from .loader import Parameters
 SIDE = 96  # pixels of the network's frame
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
-COARSE = 2  # levels that the number of things is read from, the coarsest ones
+COARSE = 2  # levels that the number of objects is read from, the coarsest ones
 SURENESS = 6
 _LEAST = 1e-6
 
 
 class Count(IntEnum):
-    """How many things a photo is of."""
+    """How many objects a photo shows."""
 
     NONE = 0
     ONE = 1
@@ -93,7 +93,7 @@ class MaskNetwork(PhotoNetwork):
         )
 
     def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Predict the mask and the number of things.
+        """Predict the mask and the number of objects.
 
         Parameters
         ----------
@@ -103,7 +103,7 @@ class MaskNetwork(PhotoNetwork):
         Returns
         -------
         odds : (H, W) float32 ndarray
-            Log odds of the thing.
+            Log odds of the object.
         counts : (3,) ndarray
             Log odds of `Count`.
         """
@@ -122,7 +122,7 @@ class MaskPrediction:
     Attributes
     ----------
     cover : (H, W) float32 ndarray
-        Probability of the thing at each pixel of the frame; 0 outside of the photo.
+        Probability of the object at each pixel of the frame; 0 outside of the photo.
     counts : (3,) ndarray
         Probabilities of `Count`.
     """
@@ -171,7 +171,7 @@ def channels_of(light: np.ndarray, frame: np.ndarray, hints: np.ndarray) -> np.n
     frame : (H, W) bool ndarray
         Where the photo is.
     hints : (H, W, 3) ndarray
-        1 on points of the thing, on points of the background, in the box; else 0.
+        1 on points of the object, on points of the background, in the box; else 0.
 
     Returns
     -------

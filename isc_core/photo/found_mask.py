@@ -1,4 +1,4 @@
-"""A mask that was found by the looks of a photo, and what finds it."""
+"""A mask that was found in a photo, and what finds it."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -15,11 +15,11 @@ class FoundMask:
     Attributes
     ----------
     cover : (H, W) float32 ndarray
-        Share of each pixel that the thing covers.
+        Fraction of each pixel that the object covers.
     sureness : float
-        Probability, 0 to 1, that the mask overlaps the one thing meant by half or more.
+        Confidence: the probability that the overlap (IoU) with the intended object is at least .5.
     counts : (3,) ndarray
-        Probabilities that the photo shows none, one and several things.
+        Probabilities that the photo shows none, one and several objects.
     evidence : (N,) ndarray
         What the sureness was computed from, see `masking.evidence`.
     """
@@ -31,12 +31,12 @@ class FoundMask:
 
     @property
     def mask(self) -> np.ndarray:
-        """The pixels (H, W) that the thing covers by half or more."""
+        """The pixels (H, W) that the object covers by half or more."""
         return self.cover >= 0.5
 
 
 class MaskFinder(Protocol):
-    """What finds the mask of a photo by its looks."""
+    """What finds the mask of a photo by its appearance."""
 
     @property
     def always(self) -> bool:

@@ -21,7 +21,7 @@ class HighlightMarks:
     highlights : tuple of (x, y)
         On highlights; the middle of pixel (3, 5) is (3.5, 5.5).
     paint : tuple of (x, y)
-        On what looks like a highlight and is none.
+        On print or paint that looks like a highlight.
     """
 
     highlights: tuple[Place, ...] = ()

@@ -80,7 +80,7 @@ class Photo:
     camera : Camera or None
         The pinhole camera of `image`; None where it is unknown, for an orthographic view.
     found : FoundMask or None
-        The mask at the file's size, where it was found by its looks.
+        The mask at the file's size, if it was found automatically or from hints.
     cover : (H', W') float32 ndarray or None
         Share of each of the file's pixels that the object covers; None where `mask` says all.
     marks : HighlightMarks

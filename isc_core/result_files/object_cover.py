@@ -5,7 +5,7 @@ was found in the photo, of a soft mask and of an alpha channel is known more fin
 the cover of each of the photo's pixels.
 
 Equation: the cover of a pixel of the maps is the mean over its area. Beyond two pixels from the
-object it is 0, for the photo may show other things, unless the rim is soft (`photo.soft_rim`) and
+object it is 0, for the photo may show other objects, unless the rim is soft (`photo.soft_rim`) and
 the way there leads over pixels that the object covers in part. There the cover is the opacity of
 the surface.
 

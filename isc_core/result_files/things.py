@@ -1,4 +1,4 @@
-"""Where the results of the things of one photo lie.
+"""Where the results of the objects of one photo lie.
 
 Programs that show results read it too, so that it needs no numerical library.
 """
@@ -9,7 +9,7 @@ _RESULT = "decomposition.json"
 
 
 def things_in(folder: Path) -> list[Path]:
-    """Return the results of the things of a photo, from left to right.
+    """Return the results of the objects of a photo, from left to right.
 
     Parameters
     ----------

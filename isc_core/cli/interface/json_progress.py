@@ -6,7 +6,7 @@
     {"event": "cancelled"}
 
 Any number of progress events comes first; their fraction, of the whole job, never decreases; of
-several photos or things they have a `part`, [2, 3] for the second of three. One of the other three
+several photos or objects they have a `part`, [2, 3] for the second of three. One of the other three
 comes last.
 
 The calling program holds the other end of standard input: the line `cancel` acts as Ctrl-C. With

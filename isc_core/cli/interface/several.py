@@ -1,4 +1,4 @@
-"""Several photos, or several things of one: a failure stops no other."""
+"""Several photos, or several objects of one: a failure stops no other."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
