@@ -152,7 +152,8 @@ def _checked(location: str, limits: Limits) -> Path:
 def _check_length(location: str, length: int, limits: Limits) -> None:
     if length > limits.max_bytes:
         raise InputError(
-            f"{location}: more than {limits.max_bytes / 1e9:.1f} GB: too large for a photo"
+            f"{location}: more than {limits.max_bytes / 1e9:.1f} GB, too large for a photo: reduce "
+            "it first"
         )
 
 

@@ -67,7 +67,7 @@ class Manifest:
         if not (isinstance(image, str) and isinstance(mask, str) and isinstance(name, str)):
             raise InputError(f"{self._at(line)}: image, mask and name must be text")
         if not image:
-            raise InputError(f"{self._at(line)} names no image")
+            raise InputError(f"{self._at(line)} names no image: write its path or URL under image")
         if name:
             check_given(name, self._at(line))
         options = (

@@ -101,7 +101,9 @@ def run_batch(
     monitor.report("reading the inputs", 0.0)
     inputs = Inputs(batch.inputs, batch.masks, recipe)
     if next(iter(inputs), None) is None:  # before the folder is created
-        raise InputError(f"{', '.join(batch.inputs)}: names no image")
+        raise InputError(
+            f"{', '.join(batch.inputs)}: names no image: give photos, or a manifest with rows"
+        )
     with folder.locked(plan.run):
         names = Names(_cancellable(inputs, monitor))
         with Journal(folder, names.count) as journal:

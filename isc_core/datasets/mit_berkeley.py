@@ -94,7 +94,7 @@ def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
     )
     if not names:
         raise InputError(
-            f"{folder} holds no objects: give the folder that contains the MIT-Berkeley set"
+            f"{folder} contains no objects: give the folder that contains the MIT-Berkeley set"
         )
     return names
 

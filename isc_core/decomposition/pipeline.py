@@ -111,7 +111,7 @@ def decompose(
         constraints = _at_scale(inputs, photo, working)
         if not share_in_blocks(maps.mask):
             raise InputError(
-                "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
+                "the mask has no block of 2 x 2 pixels to build a shape from: mark a larger region "
                 "or use a larger photo"
             )
     with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):

@@ -73,7 +73,7 @@ class Clusters:
         """
         if not 1 <= number <= len(self.shares):
             raise InputError(
-                f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see "
+                f"there is no cluster {number}: choose one from 1 to {len(self.shares)}, see "
                 "clusters.png"
             )
         mask = self.labels >= 0

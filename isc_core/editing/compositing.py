@@ -97,7 +97,7 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
     expected = tuple(max(1, int(np.ceil(n * recorded - 1e-6))) for n in (height, width))
     if size != [width, height] or expected != d.mask.shape:
         raise InputError(
-            f"the result was made of a photo of {' x '.join(map(str, size))} pixels, this one has "
+            f"the result was made from a photo of {' x '.join(map(str, size))} pixels, not of "
             f"{width} x {height}: give the same photo"
         )
     boxes = np.array(mask_box(photo.mask)) * recorded, np.array(mask_box(d.mask))

@@ -21,7 +21,7 @@ _MOST_LOG = 10.0  # larger errors of the logarithm come from somebody else's fil
 STOPPED_EARLY = "the solver reached its limit of evaluations: try a cleaner mask"
 STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
 CROPPED = (
-    "the photo was cropped, so its focal length does not hold: use the whole photo, or --camera MM"
+    "the photo was cropped, so its focal length is not used: use the whole photo, or --camera MM"
 )
 COLOURED = "the light is coloured: use --light-colour estimate"
 

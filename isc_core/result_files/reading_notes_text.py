@@ -11,19 +11,19 @@ _TEXTS = {
     ),
     ReadingNoteKind.TABLE_PROFILE: (
         "the photo's colour profile is a table of colours, which was applied with 8 bits: save the "
-        "photo in sRGB or Adobe RGB for more"
+        "photo in sRGB or Adobe RGB to keep more"
     ),
     ReadingNoteKind.UNUSED_PROFILE: (
-        "the photo's colour profile is a table of colours, which --transfer replaced: without the "
-        "option it is applied"
+        "the photo's colour profile was replaced by --transfer: leave out --transfer to apply the "
+        "profile"
     ),
     ReadingNoteKind.GAIN_MAP: "the photo's gain map (HDR) was ignored",
     ReadingNoteKind.UNKNOWN_CAMERA_COLOURS: (
-        "the raw file does not say which colours its camera sees: hues may be wrong; export it as "
+        "the raw file does not describe the colours of its camera: hues may be wrong; export it as "
         "a 16-bit TIFF instead"
     ),
     ReadingNoteKind.OUT_OF_GAMUT: (
-        "of the object's pixels {value:.0%} have colours outside of Rec.709: they were clipped"
+        "{value:.0%} of the object's pixels have colours outside Rec.709: they were clipped"
     ),
 }
 

@@ -150,7 +150,7 @@ def _notes(d: Decomposition, done: ActionResult, original: Original | None) -> l
             "the photo's file differs from the one that was decomposed; the edit is applied anyway"
         )
     if done.layers and np.array_equal(done.edit.image, d.image):
-        notes.append("the image is unchanged: none of the options has an effect on it")
+        notes.append("the image is unchanged: none of the options affects it")
     return notes
 
 

@@ -51,5 +51,5 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
 
 
 ACTION = EditAction(
-    "dichromatic", "the diffuse and the specular layer, edited separately", _act, _add_options
+    "dichromatic", "edit the diffuse and the specular layer separately", _act, _add_options
 )

@@ -62,4 +62,4 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-ACTION = EditAction("gloss", "glossier, rougher or metallic", _act, _add_options)
+ACTION = EditAction("gloss", "make the object glossier, rougher or metallic", _act, _add_options)

@@ -70,4 +70,4 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--replace", action="store_true", help="remove the existing highlights")
 
 
-ACTION = EditAction("highlight", "a new highlight on the recovered shape", _act, _add_options)
+ACTION = EditAction("highlight", "add a highlight on the recovered shape", _act, _add_options)

@@ -152,7 +152,7 @@ def _add_nothing(parser: argparse.ArgumentParser) -> None:
 
 ACTION = EditAction(
     "light-direction",
-    "the single light that best explains the shading, and the highlights",
+    "estimate the single light that best explains the shading, and the highlights",
     _act,
     _add_nothing,
 )

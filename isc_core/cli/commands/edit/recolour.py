@@ -114,4 +114,4 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-ACTION = EditAction("recolour", "another reflectance under the same gloss", _act, _add_options)
+ACTION = EditAction("recolour", "change the reflectance under the same gloss", _act, _add_options)

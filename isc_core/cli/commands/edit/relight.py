@@ -132,4 +132,6 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     add_lobe(parser)
 
 
-ACTION = EditAction("relight", "the recovered light rotated, or another light", _act, _add_options)
+ACTION = EditAction(
+    "relight", "rotate the recovered light, or use another light", _act, _add_options
+)
