@@ -132,7 +132,9 @@ def test_the_sun_takes_a_custom_direction(addon: Any, built: BuiltObject) -> Non
     toward = sun.rotation_quaternion.to_matrix() @ Vector((0, 0, 1))
     np.testing.assert_allclose(toward, (0, -1, 0), atol=1e-6)
     assert sun.data.energy == pytest.approx(2 * energy)
-    assert "the direction is zero" in error_of(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
+    assert "direction is zero" in error_of(
+        addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0)
+    )
 
 
 def test_the_recovered_light_is_restored(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
