@@ -291,7 +291,7 @@ def auto_mask_steps(
     folder: Path,
     environment: WorkerEnvironment,
 ) -> RunSteps:
-    """Find the object by its looks.
+    """Find the object by its appearance.
 
     Parameters
     ----------

@@ -275,7 +275,7 @@ def start_auto_mask(
     environment: WorkerEnvironment,
     transfer: str = "auto",
 ) -> WorkerProcess:
-    """Start finding the object by its looks.
+    """Start finding the object by its appearance.
 
     Parameters
     ----------

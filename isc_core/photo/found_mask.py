@@ -21,7 +21,7 @@ class FoundMask:
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several objects.
     evidence : (N,) ndarray
-        What the sureness was computed from, see `masking.evidence`.
+        What the confidence was computed from, see `masking.evidence`.
     """
 
     cover: np.ndarray
