@@ -52,7 +52,7 @@ class ISC_OT_save_asset(bpy.types.Operator):
             Where False, the tooltip gives the reason.
         """
         if find_built(context.object) is None:
-            cls.poll_message_set("Select a local object created by ISC")
+            cls.poll_message_set("Select an object created by ISC that is not linked")
             return False
         return True
 
