@@ -182,7 +182,7 @@ def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
     photo.write_bytes(b"another photo")
     cases = [
         ([str(tmp_path / "none"), "-o", str(output)], "not a result folder"),
-        ([str(start), "-o", str(start)], "cannot replace its start"),
+        ([str(start), "-o", str(start)], "cannot replace its input"),
         ([str(start), "--photo", str(photo), "-o", str(output)], "another checksum"),
         ([str(start), "--photo", str(tmp_path / "no.png"), "-o", str(output)], "cannot read"),
     ]
