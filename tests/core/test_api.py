@@ -110,7 +110,7 @@ def test_what_cannot_be_used_is_named(
 
 def test_a_photo_has_its_own_mask(tmp_path: Path) -> None:
     photo = read_photo(ball_photo(tmp_path))
-    with pytest.raises(InputError, match="mask of its own"):
+    with pytest.raises(InputError, match="already has a mask"):
         isc_core.decompose(photo, photo.mask)
 
 
