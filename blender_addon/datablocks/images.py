@@ -10,7 +10,7 @@ does it while the window waits. Blender decodes one when it is drawn for the fir
 """
 
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -82,12 +82,19 @@ class ImageFile:
         Whether it is PNG.
     alpha_is_data : bool
         Whether alpha is a channel like the others, and no opacity.
+    checksum : str
+        CRC-32 of the data, hexadecimal: numbers of Blender have a sign.
     """
 
     data: bytes
     space: str
     is_png: bool = True
     alpha_is_data: bool = False
+    checksum: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        # Here, as files are made in threads: of a large map it takes as long as packing it.
+        object.__setattr__(self, "checksum", f"{zlib.crc32(self.data):08x}")
 
 
 def map_file(values: np.ndarray, space: str, alpha: np.ndarray | None = None) -> ImageFile:
@@ -191,7 +198,7 @@ def new_image(file: ImageFile) -> bpy.types.Image:
         image.alpha_mode = "CHANNEL_PACKED"
     image.pack(data=file.data, data_len=len(file.data))
     image.source = "FILE"
-    image[_CHECKSUM] = f"{zlib.crc32(file.data):08x}"  # as text: numbers have a sign
+    image[_CHECKSUM] = file.checksum
     return image
 
 

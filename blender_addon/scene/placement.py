@@ -3,17 +3,33 @@
 The middle of its base is at the cursor. If another object would swallow it, such as the cube of a
 new file, it stands beside that one instead, to the right, with a gap of a tenth of its own width.
 
-Limits: an object swallows a place if rays from there along both directions of the three axes leave
-through its surface from inside. Rooms are told from bodies by their normals, which point inward.
+Equation: a surface surrounds a place p by its winding number, with the solid angle of a triangle
+whose corners are a, b and c from p,
+
+    w = sum 2 atan2(a.(b x c), |a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|) / (4 pi).
+
+It is 1 in a closed body, 0 outside, and -1 in a room, whose normals point inward; above one half,
+the object swallows the place. Of a large mesh, 1000 faces from all over it stand for the others:
+Blender's ray casts first sort all of them, a tenth of a second for 100,000, while the window waits.
+
+Citations: A. Van Oosterom, J. Strackee 1983, doi:10.1109/TBME.1983.325207 (solid angle);
+A. Jacobson, L. Kavan, O. Sorkine-Hornung 2013, doi:10.1145/2461912.2461916 (winding numbers of any
+mesh).
+
+Limits: of a large mesh, w is known to .01 R/h at the distance h from a surface of radius R, so that
+places closer to it than a fiftieth may be taken for either side; worse where a few faces are much
+larger than most.
 """
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 import bpy
 import numpy as np
 from mathutils import Vector
 
-_DIRECTIONS = ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1))
+_MOST_FACES = 1000  # of a mesh that are looked at
+_GOLDEN = 0.618034  # its multiples are spread evenly over [0, 1), and follow no order of faces
 _GAP = 0.1
 _MOST_STEPS = 16
 _SOLID = {"SOLID", "TEXTURED"}
@@ -73,11 +89,43 @@ def _swallows(obj: bpy.types.Object, place: Vector) -> bool:
     low, high = _world_bounds(obj)
     if not all(a <= x <= b for a, x, b in zip(low, place, high, strict=True)):
         return False
-    to_local = obj.matrix_world.inverted_safe()
-    start = to_local @ place
-    for direction in _DIRECTIONS:
-        ray = to_local.to_3x3() @ Vector(direction)
-        hit, _, normal, _ = obj.ray_cast(start, ray)
-        if not hit or normal.dot(ray) <= 0:
-            return False
-    return True
+    return _winding_number(obj, place) > 0.5
+
+
+def _winding_number(obj: bpy.types.Object, place: Vector) -> float:
+    """How often the surface of an object surrounds a place."""
+    mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    triangles, weight = _sample(mesh)
+    center = np.array(obj.matrix_world.inverted_safe() @ place)
+    return weight * float(_solid_angles(triangles - center).sum()) / (4 * np.pi)
+
+
+def _sample(mesh: bpy.types.Mesh) -> tuple[np.ndarray, float]:
+    """Triangles (T, 3, 3) of some faces, and for how many faces each of these stands."""
+    count = len(mesh.polygons)
+    if not count:  # nothing but edges, or a mesh in Edit Mode
+        return np.zeros((0, 3, 3)), 0.0
+    chosen = _spread(count, _MOST_FACES)
+    faces = [mesh.polygons[index].vertices[:] for index in chosen]
+    fans = [(face[0], *edge) for face in faces for edge in pairwise(face[1:])]
+    points = np.empty((len(mesh.vertices), 3), np.float32)
+    # By its attribute this is copied whole, otherwise one by one.
+    mesh.attributes["position"].data.foreach_get("vector", points.ravel())
+    return points[np.array(fans)], count / len(chosen)
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """Numbers below `count`, all of them or one from each of so many equal parts."""
+    if count <= most:
+        return list(range(count))
+    number = np.arange(most)
+    return ((number + number * _GOLDEN % 1) * (count / most)).astype(int).tolist()
+
+
+def _solid_angles(triangles: np.ndarray) -> np.ndarray:
+    """Signed solid angles (T,) of triangles (T, 3, 3) from the origin; steradians."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    far_a, far_b, far_c = (np.linalg.norm(corner, axis=1) for corner in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(1)
+    rest = far_a * far_b * far_c + (a * b).sum(1) * far_c + (b * c).sum(1) * far_a
+    return 2 * np.arctan2(volume, rest + (c * a).sum(1) * far_b)

@@ -14,6 +14,7 @@ from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa:
 from blender_addon.operators.viewport import find_view, front_view, show  # noqa: E402
 from blender_addon.scene.build import build_object, find_built  # noqa: E402
 from blender_addon.scene.hand_edits import is_edited_by_hand  # noqa: E402
+from blender_addon.scene.placement import _sample, _winding_number  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 
 SHARED = BuildOptions(own_scene=False, size_metres=1.0)
@@ -79,6 +80,68 @@ def test_rooms_tables_and_hidden_things_leave_it_on_the_cursor(
     prepare()
     low, high = bounds(build_object(result, SHARED).object)
     np.testing.assert_allclose([*((low + high) / 2)[:2], low[2]], 0, atol=1e-5)
+
+
+def ball(segments: int, inward: bool = False) -> Any:
+    """A ball of radius 2 about the origin, of segments^2 / 2 faces, scaled and turned."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=segments, ring_count=segments // 2, radius=1)
+    obj = bpy.context.object
+    if inward:
+        obj.data.flip_normals()
+    obj.scale, obj.rotation_euler = (2, 2, 2), (0.3, 0.2, 0.1)
+    bpy.context.view_layer.update()
+    return obj
+
+
+@pytest.mark.parametrize("segments", [16, 256])
+@pytest.mark.parametrize("inward", [False, True])
+def test_a_surface_surrounds_what_is_in_it(blender: Any, segments: int, inward: bool) -> None:
+    obj, sign = ball(segments, inward), -1 if inward else 1
+    exact = segments == 16
+    for x, wanted in ((0.0, 1), (1.0, 1), (1.7, 1), (2.3, 0), (4.0, 0)):
+        found = _winding_number(obj, Vector((x, 0.1, -0.2)))
+        assert found == pytest.approx(sign * wanted, abs=1e-4 if exact else 0.2), x
+
+
+def test_a_new_object_leaves_a_ball_of_many_faces_and_stays_in_such_a_room(
+    result: ResultArrays,
+) -> None:
+    obj = ball(256)
+    low, _ = bounds(build_object(result, SHARED).object)
+    assert low[0] > 2, "beside it"
+    obj.data.flip_normals()
+    other = BuildOptions(own_scene=False, size_metres=0.5, name="other")
+    low, high = bounds(build_object(result, other).object)
+    np.testing.assert_allclose([*((low + high) / 2)[:2], low[2]], 0, atol=1e-5)
+
+
+def test_a_second_object_stands_beside_the_first(result: ResultArrays) -> None:
+    """A body of the extension has 100,000 faces: to sort them blocks the window."""
+    options = [
+        BuildOptions(own_scene=False, size_metres=1, back="rounded", triangles=0, name=name)
+        for name in ("one", "two")
+    ]
+    (_, high), (low, _) = (bounds(build_object(result, one).object) for one in options)
+    assert low[0] > high[0]
+
+
+def test_what_has_no_surface_surrounds_nothing(blender: Any) -> None:
+    obj = cube(2, (0, 0, 0))
+    blender.ops.object.mode_set(mode="EDIT")
+    assert abs(_winding_number(obj, Vector())) < 1.001, "whatever Blender shows of it"
+    blender.ops.object.mode_set(mode="OBJECT")
+    obj.data.clear_geometry()
+    blender.context.view_layer.update()
+    assert _winding_number(obj, Vector()) == 0
+
+
+def test_of_a_large_mesh_few_faces_stand_for_all(blender: Any) -> None:
+    mesh = ball(256).data
+    triangles, weight = _sample(mesh)
+    assert len(triangles) <= 2000, "read while the window waits"
+    edges = triangles[:, 1:] - triangles[:, :1]
+    area = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1).sum() / 2
+    assert weight * area == pytest.approx(4 * np.pi, rel=0.02)
 
 
 def test_light_and_camera_wait_in_a_collection_that_is_unchecked(result: ResultArrays) -> None:
