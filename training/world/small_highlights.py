@@ -19,13 +19,15 @@ Limits: no Fresnel factor, no shadows, orthographic view. The sources add no dif
 they were part of the surroundings.
 """
 
+import math
+
 import torch
 from torch.nn import functional
 
 from .lit_pictures import LitPictures
 
 _MOST = 4  # sources of a picture
-_ALPHA = (0.02, 0.2)
+_LOG_ALPHA = (math.log(0.02), math.log(0.2))
 _WINDOW, _LARGEST = 0.4, 0.15  # share of sources that are windows; half side, in units of |n - h|
 _BAR = 0.008  # half width of the bar across a window
 _LEVEL = (-0.4, 1.0)  # mean and deviation of the logarithm of A over the mean shading
@@ -86,7 +88,7 @@ def _mirrored(normal: torch.Tensor, toward: torch.Tensor) -> torch.Tensor:
     window = (uniform(0, 1) < _WINDOW).float()
     a, b = (maps(window * uniform(0.02, _LARGEST)) for _ in range(2))
     beside = (u.abs() - a).clamp(min=0).square() + (w.abs() - b).clamp(min=0).square()
-    alpha = maps(torch.exp(uniform(*(float(torch.tensor(one).log()) for one in _ALPHA))))
+    alpha = maps(torch.exp(uniform(*_LOG_ALPHA)))
     lobe = (1 + beside / alpha.square()).square().reciprocal()
     barred = maps((uniform(0, 1) < 0.5).float() * window)
     lobe = lobe * (1 - barred * (u.abs() < _BAR).float())

@@ -72,7 +72,7 @@ def task_of(d: Decomposition) -> DecompositionTask:
 
 @pytest.fixture(scope="module")
 def glossy() -> tuple[Decomposition, SceneEstimate]:
-    d = grey_ball(10)
+    d = grey_ball(20)
     return d, joint(task_of(d))
 
 
@@ -122,7 +122,7 @@ def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
 
 @pytest.mark.slow
 def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
-    d = grey_ball(10)
+    d = grey_ball(20)
     _, start = supported_layers(d.image, mdr(task_of(d)).split, d.mask)
     assert start is not None and start.unreliable.any()
     found = joint(task_of(d), JointOptions(change_of_variables=-1e6))
@@ -143,7 +143,7 @@ def test_paint_is_continued_under_the_highlight() -> None:
 
 
 def test_what_colour_has_taken_off_is_not_taken_twice() -> None:
-    d = grey_ball(10)
+    d = grey_ball(20)
     found = detect_residual_highlights(d.image, d.diffuse, d.mask)
     assert found is None
     assert detect_residual_highlights(d.image, d.image, d.mask) is not None
