@@ -245,7 +245,7 @@ def supported_layers(
     cleaner = split.diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale
     kept = supported(image, cleaner, mask, *form, options.odds, marks, clipped)
-    hidden = np.zeros_like(kept) if clipped is None else _hidden(kept, clipped, mask)
+    hidden = _hidden(kept, clipped, mask)
     kept |= hidden
     split = replace(
         split,
@@ -265,11 +265,11 @@ def supported_layers(
     return _with_diffuse(split, diffuse) if hidden.any() else split, None
 
 
-def _hidden(kept: np.ndarray, clipped: np.ndarray, mask: np.ndarray) -> np.ndarray:
+def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> np.ndarray:
     """Where highlights hide the paint (H, W) bool: clipped pixels and their neighbours, which mix
     with them, in holes that belong to kept regions for the larger part.
     """
-    if not clipped.any():
+    if clipped is None or not clipped.any():
         return np.zeros_like(kept)
     holes = ndimage.binary_dilation(clipped, iterations=_SPREAD) & mask
     labels, count = ndimage.label(holes, np.ones((3, 3)))

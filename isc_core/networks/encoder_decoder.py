@@ -12,14 +12,14 @@ Limits: those of `layers`.
 """
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from ..errors import InputError
 from ..imaging.blocks import block_means
 from .layers import conv_block, convolved, depth_to_space, is_chain, space_to_depth
-from .loader import Network
+from .loader import Network, Parameters
 
 BLOCK = 4  # pixels of a block's side
 
@@ -68,6 +68,27 @@ class EncoderDecoder(Network):
             inputs = width
         shapes.append((9, inputs, BLOCK**2 * self.outputs))
         return is_chain(self.weights, self.biases, shapes)
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> Self:
+        """Build a network that has no other parts than these.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        EncoderDecoder
+            Of the class on which it is called.
+
+        Raises
+        ------
+        InputError
+            If the parameters do not fit.
+        """
+        return cls(parameters.weights, parameters.biases)
 
     @property
     def depth(self) -> int:

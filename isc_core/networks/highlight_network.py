@@ -31,7 +31,6 @@ from ..imaging.smoothing import masked_gaussian
 from .encoder_decoder import EncoderDecoder
 from .frame import at_full_size, framed
 from .layers import DARK
-from .loader import Parameters
 from .scene_network import LONG_SIDE, SIDE
 from .scene_network import channels_of as photo_channels_of
 
@@ -48,26 +47,6 @@ class HighlightNetwork(EncoderDecoder):
     title = "highlight network"
     file = "highlight_network.npz"
     inputs, outputs = INPUTS, len(REACHES)
-
-    @classmethod
-    def from_parameters(cls, parameters: Parameters) -> "HighlightNetwork":
-        """Build the network.
-
-        Parameters
-        ----------
-        parameters : Parameters
-            The content of its archive.
-
-        Returns
-        -------
-        HighlightNetwork
-
-        Raises
-        ------
-        InputError
-            If the parameters do not fit.
-        """
-        return cls(parameters.weights, parameters.biases)
 
 
 @dataclass(frozen=True)

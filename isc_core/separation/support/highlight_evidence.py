@@ -38,7 +38,7 @@ from ...imaging.channels import largest, mean_channel, smallest
 from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
-_DARK = 0.02  # of the bright pixels: added before logarithms
+_DARK = 0.02  # of the bright pixels: added to what a chroma is divided by
 _CORE, _FLANK = 0.5, 0.2  # of a region's peak
 _RING = 0.02  # distance of the ring, of the object's diagonal
 _LEAST, _FEWEST = 6, 3  # pixels: of a region that can be judged, of its flanks
@@ -87,6 +87,7 @@ def highlight_evidence(
     ratio_scale : (H, W) ndarray
         b.
     clipped : (H, W) ndarray of bool, optional
+        Pixels whose true value lies above the recorded one.
 
     Returns
     -------
@@ -106,42 +107,32 @@ def highlight_evidence(
         if inside.sum() < _LEAST:
             continue
         numbers.append(k)
-        areas = _areas(inside, removed[wide], mask[wide], clear[wide], reach)
+        compared, ring = _surroundings(inside, removed[wide], mask[wide], clear[wide], reach)
         weight = np.square(removed[wide]) * inside
         form = log_ratio[wide], ratio_scale[wide]
         found.append(
             [
                 *_form_and_saturation(weight, diffuse[wide], *form, dark),
-                _chroma_rise(image[wide], areas, dark),
+                _chroma_rise(image[wide], compared, ring, dark),
             ]
         )
     return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, len(WEIGHTS) - 1))
 
 
-@dataclass(frozen=True)
-class _Areas:
-    """Where a region is compared with its surroundings, each (h, w) bool.
-
-    `flanks`: unclipped pixels of the region that are not faint; `ring`: around it; `clear`: pixels
-    whose colour can be trusted.
-    """
-
-    flanks: np.ndarray
-    ring: np.ndarray
-    clear: np.ndarray
-
-
-def _areas(
+def _surroundings(
     inside: np.ndarray, removed: np.ndarray, mask: np.ndarray, clear: np.ndarray, reach: int
-) -> _Areas:
+) -> tuple[np.ndarray, np.ndarray]:
+    """Flanks and ring of a region together, without clipped pixels, and the ring; (h, w) bool."""
     peak = float(np.quantile(removed[inside], 0.95))
     core = inside & (removed > _CORE * peak)
     near = ndimage.binary_dilation(core, iterations=reach)
     ring = ndimage.binary_dilation(near, iterations=2) & ~near & mask & (removed < _CORE * peak)
     if ring.sum() < _LEAST - 1:
         ring = mask & ~core
+    ring = ring if ring.any() else mask
     flanks = inside & (removed > _FLANK * peak) & clear
-    return _Areas(flanks if flanks.sum() >= _FEWEST else core, ring if ring.any() else mask, clear)
+    both = (flanks if flanks.sum() >= _FEWEST else core) | ring
+    return both & clear if (both & clear).sum() >= _LEAST else both, ring
 
 
 def _form_and_saturation(
@@ -152,25 +143,25 @@ def _form_and_saturation(
     dark: float,
 ) -> tuple[float, float]:
     """The first two numbers of a region, with weights (h, w)."""
-    saturation = (largest(diffuse) - smallest(diffuse)) / (largest(diffuse) + dark)
-    y, b, paint = (
-        float((weight * one).sum()) for one in (mean_channel(log_ratio), ratio_scale, saturation)
-    )
+    maps = mean_channel(log_ratio), ratio_scale, _saturation(diffuse, dark)
+    y, b, paint = (float((weight * one).sum()) for one in maps)
     ratio = float(np.clip(y / max(b, 1e-12), -_MOST_RATIO, _MOST_RATIO))
     return ratio, paint / max(float(weight.sum()), 1e-12)
 
 
-def _chroma_rise(image: np.ndarray, areas: _Areas, dark: float) -> float:
+def _chroma_rise(image: np.ndarray, compared: np.ndarray, ring: np.ndarray, dark: float) -> float:
     """The last number of a region: q, limited, times the saturation of the ring."""
-    high, low = largest(image).astype(float), smallest(image).astype(float)
-    saturation = float(np.median(((high - low) / (high + dark))[areas.ring]))
-    used = (areas.flanks | areas.ring) & areas.clear
-    if used.sum() < _LEAST:
-        used = areas.flanks | areas.ring
-    chroma, light = (high - low)[used], low[used]
+    image = image.astype(float)
+    low = smallest(image)
+    light, chroma = low[compared], (largest(image) - low)[compared]
     light = light - light.mean()
     slope = float((light * chroma).sum()) / max(float(np.square(light).sum()), (1e-3 * dark) ** 2)
-    return float(np.clip(slope, *_SLOPES)) * saturation
+    return float(np.clip(slope, *_SLOPES)) * float(np.median(_saturation(image, dark)[ring]))
+
+
+def _saturation(image: np.ndarray, dark: float) -> np.ndarray:
+    high = largest(image)
+    return np.asarray((high - smallest(image)) / (high + dark))
 
 
 def supported(
