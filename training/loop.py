@@ -222,7 +222,7 @@ def fit(
     options : RunOptions
         Length, files and seeds of the run.
     draw_validation : callable, optional
-        Draws a batch of held-out subjects. The same batches are used at every evaluation.
+        Draws a finished batch of held-out subjects. The same ones are used at every evaluation.
     prepare : callable, optional
         Makes what the network's loss takes of what was drawn, on the device.
 
@@ -239,12 +239,13 @@ def fit(
     if options.threads:
         torch.set_num_threads(options.threads)
     network.to(options.device)
+    torch.backends.cudnn.benchmark = True  # batches have one size: the fastest kernels for it
     optimizers = _optimizers(network, schedule, options.device)
     average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
         clock.resume(_restore(_checkpoint(options.resume), network, average, optimizers))
     batches = _loader(draw, options, clock.step)
-    held_out = [prepare(batch) for batch in _validation_batches(draw_validation, options)]
+    held_out = _validation_batches(draw_validation, options)
     report = _Report()
     while not clock.over:
         share = _rate_share(clock.step, clock.progress, schedule.warm_up)
@@ -346,32 +347,30 @@ def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedul
     kept_share = min(schedule.average_limit, (step + 1) / (step + schedule.average_delay))
     with torch.no_grad():
         pairs = zip(average.state_dict().values(), network.state_dict().values(), strict=True)
-        for kept, new in pairs:
-            if kept.is_floating_point():
-                kept.lerp_(new, 1 - kept_share)
-            else:
-                kept.copy_(new)
+        floats = [(kept, new) for kept, new in pairs if kept.is_floating_point()]
+        kept, new = map(list, zip(*floats, strict=True))
+        torch._foreach_lerp_(kept, new, 1 - kept_share)
 
 
 class _Report:
-    """Prints smoothed losses every hundred steps."""
+    """Prints smoothed losses every hundred steps; between, they stay on the device."""
 
     def __init__(self) -> None:
         self._began = time.monotonic()
-        self._smoothed: dict[str, float] = {}
+        self._smoothed: torch.Tensor | None = None
         self._count = 0
 
     def add(
         self, done: int, loss: torch.Tensor, terms: dict[str, torch.Tensor], last: bool
     ) -> None:
         self._count += 1
-        for name, value in chain([("loss", loss)], terms.items()):
-            smoothed = self._smoothed.get(name, 0.0)
-            self._smoothed[name] = 0.99 * smoothed + 0.01 * float(value.detach())
+        values = torch.stack([loss, *terms.values()]).detach().float()
+        before = torch.zeros_like(values) if self._smoothed is None else self._smoothed
+        self._smoothed = torch.lerp(before, values, 0.01)
         if done % _REPORT_EVERY and not last:
             return
-        weight = 1 - 0.99**self._count
-        shown = _shown({name: part / weight for name, part in self._smoothed.items()})
+        means = (self._smoothed / (1 - 0.99**self._count)).tolist()
+        shown = _shown(dict(zip(["loss", *terms], means, strict=True)))
         seconds = time.monotonic() - self._began
         print(f"step {done}: {shown} ({seconds:.0f} s)", flush=True)
 

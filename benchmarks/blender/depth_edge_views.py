@@ -25,11 +25,11 @@ from training.world.bodies.body import Source
 from training.world.bodies.built import CREDIT, KINDS
 from training.world.bodies.sources import BodyReference
 from training.world.environments import read_panoramas
-from training.world.lighting import batch_of, prepared
 from training.world.lit_pictures import make_pictures
 from training.world.patterns import Atlas, make_atlas
 from training.world.pictures import Bank, bank_of, stacked
 from training.world.recipes import Shares, draw_recipe
+from training.world.view_batches import batch_of, prepared
 
 CHOSEN_ON, REPORTED = range(3), range(3, 6)
 _FIRST = 5000  # worlds have less than a hundred bodies of a kind

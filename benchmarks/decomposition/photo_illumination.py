@@ -104,6 +104,7 @@ def balanced_scenes(
     from training.world.files import Split
     from training.world.recipes import LightKind, Paint, Shares
     from training.world.samples import Darkroom, draw_batch
+    from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.BODY,), 0)
@@ -118,12 +119,12 @@ def balanced_scenes(
     rng, made, bodies = np.random.default_rng(seed), list[Scene](), found.views[Split.BODY]
 
     def balanced(view: int) -> "Sample":
-        draw = draw_batch([bodies[view]], 1, found.atlas, found.judged, rng, shares)
+        draw = draw_batch(bodies, np.array([view]), 1, found.atlas, found.judged, rng, shares)
         turn = draw.recipes["turn"][0].double().numpy()
         colour = _balance(*pictures[int(draw.recipes["environment"][0])], turn, balance, rng)
         ambient = torch.from_numpy(1 / colour[None]).float()
         return Darkroom(found.bank, 1, _SIDE)(
-            replace(draw, recipes={**draw.recipes, "ambient": ambient})
+            replace(draw, recipes={**draw.recipes, "ambient": ambient}), ViewStore(bodies)
         )
 
     for view in rng.permutation(len(bodies)):

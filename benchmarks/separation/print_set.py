@@ -31,7 +31,6 @@ from torch.nn import functional
 from training.world.camera import CameraDraw
 from training.world.environments import read_panoramas
 from training.world.files import Split, views_in
-from training.world.lighting import PreparedView, batch_of, prepared
 from training.world.lit_pictures import LitPictures, make_pictures
 from training.world.patterns.atlas import Atlas
 from training.world.patterns.canvas import FINER, averaged
@@ -41,6 +40,7 @@ from training.world.pictures import Bank, bank_of, stacked
 from training.world.random_draws import log_uniform
 from training.world.recipes import LAYERS, Recipe, Shares, draw_recipe
 from training.world.samples import OBJECT, Placement, photograph
+from training.world.view_batches import PreparedView, batch_of, prepared
 from training.world.views import View
 
 PHOTO_SIDE = 160  # pixels; the body is 140 long

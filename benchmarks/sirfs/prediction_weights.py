@@ -101,6 +101,7 @@ def lit_bodies(
     from training.world.files import Split
     from training.world.recipes import Shares
     from training.world.samples import OUTPUT, Darkroom, draw_batch
+    from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.BODY,), 0)
@@ -111,8 +112,8 @@ def lit_bodies(
     for k in rng.permutation(len(bodies)):
         if len(made) == count:
             break
-        draw = draw_batch([bodies[int(k)]], 1, found.atlas, found.judged, rng, shares)
-        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw)
+        draw = draw_batch(bodies, np.array([k]), 1, found.atlas, found.judged, rng, shares)
+        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw, ViewStore(bodies))
         mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
         photo, ratio, normal, shading = (
             part[0].permute(1, 2, 0).numpy()

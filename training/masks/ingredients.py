@@ -25,10 +25,10 @@ from isc_core.io.npy import read_array
 from ..networks.scene_batches import World, read_world
 from ..world.camera import encoded_srgb
 from ..world.files import Split
-from ..world.lighting import batch_of
 from ..world.lit_pictures import make_pictures
 from ..world.pictures import stacked
 from ..world.recipes import Shares, draw_recipe
+from ..world.view_batches import batch_of
 from .backgrounds import background, read_crops
 
 SIDE = 128  # pixels of a picture

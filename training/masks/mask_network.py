@@ -53,6 +53,7 @@ def main() -> None:
         weights = None if arguments.weights is None else read_arrays(arguments.weights)
     except InputError as error:
         parser.error(str(error))
+    unvaried = Composites(judged, options.batch, arguments.side)
     network = MaskNetworkModule()
     network.begin(weights)
     fit(
@@ -60,7 +61,8 @@ def main() -> None:
         Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),
         replace(SCHEDULE, rate=arguments.rate),
         options,
-        Composites(judged, options.batch, arguments.side),
+        lambda rng: unvaried(rng).to(options.device),
+        lambda batch: batch.to(options.device),
     )
 
 

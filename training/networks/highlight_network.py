@@ -41,6 +41,7 @@ SHARES = Shares(
     matte=0.0,
     coated=0.1,
     white=0.45,
+    stretch=0.25,
 )
 _PHOTOS = 8  # of each lit view: their gloss and colours differ, too
 _MATT = 0.35  # share of photos without gloss
@@ -62,13 +63,14 @@ def varied(pictures: LitPictures) -> LitPictures:
     """
     layers = pictures.layers.float()
     count = len(layers)
-    gain = torch.exp(_GAIN[0] + _GAIN[1] * torch.randn(count))
-    gain = torch.where(torch.rand(count) < _MATT, 0.0, gain).to(layers.device)
-    order = torch.rand(count, 3).argsort(1).to(layers.device)
+    device = layers.device
+    gain = torch.exp(_GAIN[0] + _GAIN[1] * torch.randn(count, device=device))
+    gain = torch.where(torch.rand(count, device=device) < _MATT, 0.0, gain)
+    order = torch.rand(count, 3, device=device).argsort(1)
     order = order[..., None, None].expand(-1, -1, *layers.shape[2:])
     diffuse, gloss, rest = layers[:, :3], layers[:, 3:6], layers[:, 6:]
-    sharp = (gain > 0) & (torch.rand(count).to(layers.device) < _SHARP)
-    gain = torch.where(sharp, gain * torch.rand(count).to(layers.device), gain)
+    sharp = (gain > 0) & (torch.rand(count, device=device) < _SHARP)
+    gain = torch.where(sharp, gain * torch.rand(count, device=device), gain)
     gloss = gloss.gather(1, order) * gain[:, None, None, None]
     gloss = gloss + small_highlights(pictures) * sharp[:, None, None, None]
     altered = torch.cat([diffuse.gather(1, order), gloss.clamp(max=_BRIGHTEST), rest], 1)

@@ -6,7 +6,7 @@ them.
 
 import argparse
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,18 +18,19 @@ from ..loop import Net, RunOptions, Schedule, fit
 from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
 from ..world.invented_environments import invented_room, invented_sky, studio
-from ..world.lighting import PreparedView, prepared
 from ..world.lit_pictures import LitPictures
 from ..world.pack import read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
 from ..world.samples import OUTPUT, Darkroom, Draw, Sample, draw_batch
+from ..world.view_batches import PreparedView, ViewStore, prepared
 
 _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
 PHOTOS = 8  # taken of each lit view, on average: lighting takes three times as long
-POOL = 512  # lit views
+POOL = 512  # lit views; on a GPU, which lights more at once, several times as many
+_GPU_POOL, _GPU_EVERY = 3072, 4
 _ALIKE = 400  # views lit together are so near in size: less is filled up
 
 
@@ -50,6 +51,8 @@ class SceneDraws:
     plain_camera : bool
     photos : int
         Taken of each lit view, on average.
+    every : int
+        Views are lit for one batch in so many, for all of these at once.
     """
 
     views: list[PreparedView]
@@ -59,6 +62,7 @@ class SceneDraws:
     shares: Shares
     plain_camera: bool = False
     photos: int = PHOTOS
+    every: int = 1
 
     def __call__(self, rng: np.random.Generator) -> Draw:
         """Draw a batch.
@@ -71,11 +75,11 @@ class SceneDraws:
         -------
         Draw
         """
-        fresh = max(1, -(-self.size // self.photos))
+        fresh = max(1, -(-self.size * self.every // self.photos))
         around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, fresh)
-        chosen = [self.views[int(k) % len(self.views)] for k in around]
         return draw_batch(
-            chosen,
+            self.views,
+            around % len(self.views),
             self.size,
             self.atlas,
             self.environments,
@@ -86,16 +90,19 @@ class SceneDraws:
 
 
 class SceneBatches:
-    """Draws and finishes batches on one device, in a worker process or not.
+    """Draws and finishes batches on one device.
 
     Parameters
     ----------
     draw : SceneDraws
     bank : Bank
+        On the CPU.
     side : int
         Of the photos, pixels.
     alter : callable, optional
         See `Darkroom`.
+    device : str
+        Where photos are made.
     """
 
     def __init__(
@@ -104,8 +111,12 @@ class SceneBatches:
         bank: Bank,
         side: int = OUTPUT,
         alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+        device: str = "cpu",
     ) -> None:
-        self._draw, self._darkroom = draw, Darkroom(bank, POOL, side, alter)
+        self._draw, self._device = draw, device
+        pool = POOL if device == "cpu" else _GPU_POOL
+        self._darkroom = Darkroom(bank.to(device), pool, side, alter)
+        self._views = ViewStore(draw.views, device)
 
     def __call__(self, rng: np.random.Generator) -> Sample:
         """Return the next batch.
@@ -118,7 +129,22 @@ class SceneBatches:
         -------
         Sample
         """
-        return self._darkroom(self._draw(rng))
+        return self.finished(self._draw(rng))
+
+    def finished(self, drawn: Draw) -> Sample:
+        """Make the photos of a draw.
+
+        Parameters
+        ----------
+        drawn : Draw
+            On the CPU.
+
+        Returns
+        -------
+        Sample
+            On the device.
+        """
+        return self._darkroom(drawn.to(self._device), self._views)
 
 
 @dataclass(frozen=True)
@@ -273,16 +299,8 @@ def fit_to_photos(
     alter : callable, optional
         See `Darkroom`.
     """
-    held_out = SceneBatches(judged, bank, side, alter)
-    if options.device == "cpu":
-        fit(network, SceneBatches(draw, bank, side, alter), schedule, options, held_out)
-        return
-    # Workers draw, the device lights: it holds the bank and the pool.
-    darkroom = Darkroom(bank.to(options.device), POOL, side, alter)
-
-    def prepare(drawn: Draw | Sample) -> Sample:
-        if isinstance(drawn, Sample):
-            return drawn.to(options.device)
-        return darkroom(drawn.to(options.device))
-
-    fit(network, draw, schedule, options, held_out, prepare)
+    if options.device != "cpu":
+        draw = replace(draw, every=_GPU_EVERY)
+    made = SceneBatches(draw, bank, side, alter, options.device)
+    held_out = SceneBatches(judged, bank, side, alter, options.device)
+    fit(network, draw, schedule, options, held_out, made.finished)

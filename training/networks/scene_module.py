@@ -19,6 +19,8 @@ doi:10.1109/ICCV.2015.123.
 Limits: one deviation for both components of a normal, one scale for three colours.
 """
 
+import math
+
 import numpy as np
 import torch
 from torch import nn
@@ -263,12 +265,11 @@ def _light_terms(
 ) -> dict[str, torch.Tensor]:
     sizes = [LIGHT, LIGHT, LIGHT * FACTORS, COUNTS, PLACE_COUNT, KIND_COUNT]
     mean, log_scale, factors, counts, places, kinds = vector.split(sizes, dim=1)
-    gauss = torch.distributions.LowRankMultivariateNormal(
-        mean,
+    distance = _surprise(
+        batch.light - mean,
+        log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE),
         FACTOR_SCALE * factors.reshape(-1, LIGHT, FACTORS),
-        torch.exp(2 * log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE)),
     )
-    distance = -gauss.log_prob(batch.light) / LIGHT
     whole = share.sum().clamp(min=1)
     lit = batch.place >= 0
     place = functional.cross_entropy(places, batch.place.clamp(min=0), reduction="none")
@@ -279,6 +280,21 @@ def _light_terms(
         "kind": functional.cross_entropy(kinds, batch.kind),
         "light_error": ((mean - batch.light).abs().mean(1) * share).sum().detach() / whole,
     }
+
+
+def _surprise(error: torch.Tensor, log_scale: torch.Tensor, factors: torch.Tensor) -> torch.Tensor:
+    """Negative log likelihood (B,) of errors, a number of theirs, for a Gaussian of low rank.
+
+    As `torch.distributions.LowRankMultivariateNormal`, but without waiting for the device.
+    """
+    scale = torch.exp(-log_scale)
+    error, factors = error * scale, factors * scale[..., None]
+    inner = torch.eye(FACTORS, device=error.device) + factors.mT @ factors
+    root = torch.linalg.cholesky_ex(inner).L
+    along = torch.linalg.solve_triangular(root, factors.mT @ error[..., None], upper=False)
+    squares = error.square().sum(1) - along.square().sum((1, 2))
+    volume = 2 * log_scale.sum(1) + 2 * root.diagonal(dim1=1, dim2=2).log().sum(1)
+    return 0.5 * (squares + volume + LIGHT * math.log(2 * math.pi)) / LIGHT
 
 
 _WEIGHTS = {

@@ -31,12 +31,14 @@ from .scene_batches import SceneDraws, add_photo_arguments, fit_to_photos, read_
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
+_STRETCH = 0.25
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
     "prints": {"printed": 0.0},
     "lamps": {"lights": (0.3, 0.7, 0, 0, 0)},
     "harmonics": {"lights": (0, 0.32, 0.3, 0.14, 0.24)},
     "gloss": {"matte": 1.0, "kinds": (1, 0, 0)},
+    "stretch": {"stretch": 0.0},
 }
 
 
@@ -60,7 +62,7 @@ def main() -> None:
     widths = tuple(arguments.widths)
     network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
     schedule = replace(SCHEDULE, rate=arguments.rate)
-    shares = Shares()
+    shares = Shares(stretch=_STRETCH)
     for name in arguments.without:
         shares = replace(shares, **_ABLATIONS[name])
     draw = SceneDraws(

@@ -29,10 +29,10 @@ from synth.scene.tracing import Hits, Tracer
 from ..world.bodies.sources import BodyFolders, BodyReference, body_names
 from ..world.camera import draw_camera, exposed, photographed
 from ..world.files import SETTINGS, Split, split_of
-from ..world.lighting import ViewBatch
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, material_of, stacked
 from ..world.recipes import Shares, draw_recipe
+from ..world.view_batches import ViewBatch
 from ..world.views import DIRECTIONS, FILL, camera_rays, in_picture, random_side, spread_directions
 
 SIDE = 16 * round(SOLVE_SIZE / FILL / 16)  # of a picture, whose object is about SOLVE_SIZE long
@@ -183,6 +183,7 @@ def _as_batch(hits: Hits) -> ViewBatch:
         torch.zeros((1, count)),
         torch.zeros((1, count, 0), dtype=torch.uint8),
         torch.zeros((1, DIRECTIONS, 3)),
+        torch.ones((1, DIRECTIONS)),
     )
 
 

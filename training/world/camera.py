@@ -119,7 +119,8 @@ def exposed(light: torch.Tensor, mask: torch.Tensor, exposure: torch.Tensor) -> 
     """
     bright = (light.amax(1, keepdim=True) * mask).flatten(1)
     rank = (mask.flatten(1).sum(1) * 0.01).long().clamp(min=1, max=bright.shape[1])
-    most = bright.topk(int(rank.max()), dim=1).values.gather(1, rank[:, None] - 1)
+    # a number that the device does not have to tell
+    most = bright.topk(max(1, bright.shape[1] // 100), dim=1).values.gather(1, rank[:, None] - 1)
     return (exposure[:, None] / most.clamp(min=1e-6))[..., None, None]
 
 
@@ -151,8 +152,6 @@ def photographed(
     image = (image + deviation * torch.randn_like(image)).clamp(min=0)
     image = torch.where(value["clips"] > 0, image.clamp(max=1), image)
     filed = value["quality"] > 0
-    if not bool(filed.any()):
-        return image
     tone = encoded_srgb(image.clamp(max=1))
     tone = (tone + value["contrast"] * tone * (1 - tone) * (2 * tone - 1)).clamp(0, 1)
     tone = through_jpeg(tone, camera["quality"].clamp(min=1), camera["subsampled"])

@@ -30,13 +30,13 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Self
 
-import numpy as np
 import torch
 from torch.nn import functional
 
 from .reflectance import reflected_share
 from .tensor_batch import TensorBatch
-from .views import DIRECTIONS, LOWEST, SIDE, View
+from .view_batches import ViewBatch
+from .views import DIRECTIONS, LOWEST
 
 _SOLID_ANGLE = 2 * math.pi * (1 - LOWEST) / DIRECTIONS
 _STEEPEST = 0.02  # least cosine toward the viewer, so that grazing lobes stay finite
@@ -46,78 +46,6 @@ _POINT = 0.02  # radians: smaller lamps shine from one stored direction
 _COAT = 0.06  # roughness of a clear coat
 _FLOOR = 0.03  # of the mean shading: added before the logarithm of what no light reaches
 _NORMALS = 128
-
-
-@dataclass(frozen=True)
-class PreparedView:
-    """A view as the lighting needs it, N pixels.
-
-    Attributes
-    ----------
-    index : (N,) int64 ndarray
-        Pixel of the picture, row by row.
-    surface : (N, 10) float32 ndarray
-        Normal, place, unit vector to the camera, thickness.
-    reached : (N, DIRECTIONS) uint8 ndarray
-        Cosine to each direction that sees past the body, times 255.
-    directions : (DIRECTIONS, 3) float32 ndarray
-    """
-
-    index: np.ndarray
-    surface: np.ndarray
-    reached: np.ndarray
-    directions: np.ndarray
-
-
-def prepared(view: View) -> PreparedView:
-    """Prepare a view for lighting.
-
-    Parameters
-    ----------
-    view : View
-
-    Returns
-    -------
-    PreparedView
-    """
-    normal = view.normal.astype(np.float32)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    thickness = view.thickness.astype(np.float32)[:, None]
-    visible = np.unpackbits(view.visible, axis=1)
-    facing = np.rint(255 * np.clip(normal @ view.directions.T, 0, 1)).astype(np.uint8)
-    return PreparedView(
-        np.flatnonzero(view.mask),
-        np.hstack([normal, *_places(view), thickness]).astype(np.float32),
-        visible * facing,
-        view.directions.astype(np.float32),
-    )
-
-
-@dataclass(frozen=True)
-class ViewBatch(TensorBatch):
-    """B views, their pixels in rows of equal length P; shorter ones are filled up.
-
-    Attributes
-    ----------
-    index : (B, P) int64 tensor
-        Pixel of the picture, row by row; SIDE^2 where filled up.
-    normal, position, toward : (B, P, 3) tensor
-        Surface normal, place, and unit vector to the camera, in the camera frame.
-    thickness : (B, P) tensor
-        Length of the ray inside the body.
-    reached : (B, P, DIRECTIONS) uint8 tensor
-        See `PreparedView`.
-    directions : (B, DIRECTIONS, 3) tensor
-        Unit.
-    """
-
-    index: torch.Tensor
-    normal: torch.Tensor
-    position: torch.Tensor
-    toward: torch.Tensor
-    thickness: torch.Tensor
-    reached: torch.Tensor
-    directions: torch.Tensor
 
 
 @dataclass(frozen=True)
@@ -234,51 +162,6 @@ class LitViews:
     coefficients: torch.Tensor
 
 
-def batch_of(views: list[PreparedView]) -> ViewBatch:
-    """Collect views.
-
-    Parameters
-    ----------
-    views : list of PreparedView
-
-    Returns
-    -------
-    ViewBatch
-        On the CPU.
-    """
-    longest, count = max(len(view.index) for view in views), len(views)
-    index = np.full((count, longest), SIDE * SIDE)
-    surface = np.zeros((count, longest, 10), np.float32)
-    reached = np.zeros((count, longest, DIRECTIONS), np.uint8)
-    surface[..., 2] = surface[..., 8] = 1
-    for k, view in enumerate(views):
-        pixels = slice(len(view.index))
-        index[k, pixels], surface[k, pixels] = view.index, view.surface
-        reached[k, pixels] = view.reached
-    normal, position, toward, thickness = torch.from_numpy(surface).split([3, 3, 3, 1], dim=-1)
-    return ViewBatch(
-        torch.from_numpy(index),
-        normal,
-        position,
-        toward,
-        thickness[..., 0],
-        torch.from_numpy(reached),
-        torch.from_numpy(np.stack([view.directions for view in views])),
-    )
-
-
-def _places(view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (N, 3) of a view's pixels and unit vectors (N, 3) from there to the camera."""
-    rows, columns = np.nonzero(view.mask)
-    across = np.stack([columns + 0.5, SIDE - rows - 0.5], axis=1) * (2 / SIDE) - 1
-    depth = view.depth.astype(np.float32)[:, None]
-    if np.isinf(view.distance):
-        return np.hstack([across, depth]), np.broadcast_to((0.0, 0.0, 1.0), (len(depth), 3))
-    position = np.hstack([across * (1 - depth / view.distance), depth])
-    toward = np.array([0, 0, view.distance]) - position
-    return position, toward / np.linalg.norm(toward, axis=1, keepdims=True)
-
-
 def light_views(views: ViewBatch, material: Material, lights: Lights) -> LitViews:
     """Light views.
 
@@ -294,7 +177,7 @@ def light_views(views: ViewBatch, material: Material, lights: Lights) -> LitView
     LitViews
     """
     around = _irradiances(views, lights)
-    weight = torch.cat([around, torch.ones_like(around[..., :1])], dim=-1)
+    weight = torch.cat([around, views.solid[..., None]], dim=-1)
     gathered = views.reached.to(around.dtype) @ (weight / 255)
     shading, facing = gathered[..., :3], gathered[..., 3:]
     open_share = (facing / _open_sum(views.normal)).clamp(0, 1)
@@ -336,6 +219,7 @@ def _irradiances(views: ViewBatch, lights: Lights) -> torch.Tensor:
     """Irradiance over pi (B, DIRECTIONS, 3) of each stored direction: surroundings, wide lamps."""
     last = torch.full_like(lights.given, len(lights.alphas) - 1)[:, None]
     around = _looked_up(lights, views.directions, last) * (_SOLID_ANGLE / math.pi)
+    around = around * views.solid[..., None]
     for k in range(lights.lamp.shape[1]):
         wide = (_is_wide(lights, k) & (lights.power[:, k].amax(-1) > 0)).nonzero()[:, 0]
         if len(wide):

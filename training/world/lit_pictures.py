@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import torch
 
-from .lighting import LitViews, ViewBatch
+from .lighting import LitViews
 from .pictures import Bank, lit_pictures
 from .tensor_batch import TensorBatch
+from .view_batches import ViewBatch, stretched
 from .views import SIDE
 
 _LEAST_LAMP = 0.12  # of all lamps' light in the picture: below, a lamp does not count
@@ -59,6 +60,8 @@ def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank
     -------
     LitPictures
     """
+    if bool((recipes["stretch"] != 1).any()):
+        views = stretched(views, recipes["stretch"])
     lit = lit_pictures(views, recipes, bank)
     rows = [lit.diffuse, lit.specular, lit.shading, views.normal, views.position[..., 2:]]
     values = torch.cat([*rows, torch.ones_like(views.thickness)[..., None]], dim=-1)

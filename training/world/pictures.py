@@ -17,10 +17,11 @@ import torch
 from torch.nn import functional
 
 from .environments import smoothed_levels
-from .lighting import Lights, LitViews, Material, ViewBatch, light_coefficients, light_views
+from .lighting import Lights, LitViews, Material, light_coefficients, light_views
 from .patterns import Atlas
 from .recipes import LAYERS, Recipe
 from .tensor_batch import TensorBatch
+from .view_batches import ViewBatch
 
 ALPHAS = (0.06, 0.12, 0.2, 0.33, 0.55)  # roughness of the bank's levels
 _WIDE = 0.16  # the level that serves the stored directions: as wide as they are apart, 20 degrees

@@ -73,6 +73,8 @@ class Shares:
     white : float
         Bodies with stripes, dots, checks or patches that are white on a strong colour, or the other
         way round.
+    stretch : float
+        Deviation of the logarithm of the factor by which depth is scaled.
     """
 
     kinds: tuple[float, ...] = (0.9, 0.05, 0.05)
@@ -82,6 +84,7 @@ class Shares:
     matte: float = 0.25
     coated: float = 0.12
     white: float = 0.0
+    stretch: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,8 @@ class Recipe:
         1: `harmonic_gain` times the surroundings' log harmonics are the light.
     harmonic_gain : float
     harmonic_noise : (9, 3) ndarray
+    stretch : float
+        Factor of the body's depth.
     """
 
     base: np.ndarray
@@ -149,6 +154,7 @@ class Recipe:
     given: float
     harmonic_gain: float
     harmonic_noise: np.ndarray
+    stretch: float
 
 
 def draw_recipe(
@@ -183,7 +189,9 @@ def draw_recipe(
         **_gloss(kind, rng, shares),
         **_light(directions, light, rng),
     }
-    return Recipe(kind=int(kind), environment=int(rng.choice(environments)), **parts)
+    environment = int(rng.choice(environments))
+    stretch = math.exp(rng.normal(0, shares.stretch)) if shares.stretch else 1.0
+    return Recipe(kind=int(kind), environment=environment, stretch=stretch, **parts)
 
 
 def _paint(atlas: Atlas, kind: Kind, rng: np.random.Generator, shares: Shares) -> dict[str, Any]:

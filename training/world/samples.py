@@ -8,8 +8,10 @@ Limits: resampling is bilinear.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 import torch
@@ -18,13 +20,14 @@ from torch.nn import functional
 from isc_core.scene.light_estimate import PLACES
 
 from .camera import CameraDraw, draw_camera, exposed, photographed
-from .lighting import PreparedView, ViewBatch, basis_of, batch_of
+from .lighting import basis_of
 from .lit_pictures import LitPictures, make_pictures
 from .patterns import Atlas
 from .pictures import Bank, stacked
 from .random_draws import log_uniform
 from .recipes import Shares, draw_recipe
 from .tensor_batch import Pool, TensorBatch
+from .view_batches import PreparedView, ViewStore
 from .views import SIDE
 
 OUTPUT = 128  # pixels of the network's input
@@ -69,28 +72,32 @@ class Placement:
 
 @dataclass(frozen=True)
 class Draw:
-    """All that is drawn for one batch, on the CPU.
+    """All that is drawn for one batch.
 
     Attributes
     ----------
-    views : ViewBatch
-        To be lit for this batch.
+    chosen : (V,) int64 tensor
+        Numbers of the views that are lit for this batch, on the CPU; V may be 0.
     recipes : dict of str to tensor
-        The attributes of `Recipe`, stacked, one for each view.
+        The attributes of `Recipe`, stacked, one for each view; empty without views.
     shares : (B,) tensor
         Which pictures of the pool are photographed, see `Pool.picked`.
     cameras, placements : dict of str to tensor
         The attributes of `CameraDraw` and `Placement`, stacked, one for each photo.
     """
 
-    views: ViewBatch
+    chosen: torch.Tensor
     recipes: dict[str, torch.Tensor]
     shares: torch.Tensor
     cameras: dict[str, torch.Tensor]
     placements: dict[str, torch.Tensor]
 
+    def __reduce__(self) -> tuple[Callable[..., "Draw"], tuple[Any, ...]]:
+        # between processes, many small tensors travel slowly: each is a file of shared memory
+        return _from_arrays, tuple(_as_arrays(part) for part in vars(self).values())
+
     def to(self, device: str) -> "Draw":
-        """Return the draw on a device.
+        """Return the draw on the device that lights it.
 
         Parameters
         ----------
@@ -105,12 +112,27 @@ class Draw:
             return {name: part.to(device) for name, part in parts.items()}
 
         return Draw(
-            self.views.to(torch.device(device)),
+            self.chosen,
             moved(self.recipes),
             self.shares.to(device),
             moved(self.cameras),
             moved(self.placements),
         )
+
+
+def _as_arrays(part: torch.Tensor | dict[str, torch.Tensor]) -> Any:
+    if isinstance(part, torch.Tensor):
+        return part.numpy()
+    return {name: one.numpy() for name, one in part.items()}
+
+
+def _from_arrays(*parts: Any) -> Draw:
+    def tensors(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {name: torch.from_numpy(one) for name, one in part.items()}
+        return torch.from_numpy(part)
+
+    return Draw(*map(tensors, parts))
 
 
 @dataclass(frozen=True)
@@ -155,7 +177,8 @@ class Sample(TensorBatch):
 
 
 def draw_batch(
-    views: list[PreparedView],
+    views: Sequence[PreparedView],
+    chosen: np.ndarray,
     photos: int,
     atlas: Atlas,
     environments: np.ndarray,
@@ -167,8 +190,9 @@ def draw_batch(
 
     Parameters
     ----------
-    views : list of PreparedView
-        To be lit.
+    views : sequence of PreparedView
+    chosen : (V,) ndarray of int
+        Those that are lit.
     photos : int
         To be taken of pictures in the pool.
     atlas : Atlas
@@ -183,12 +207,12 @@ def draw_batch(
     -------
     Draw
     """
-    recipes = [draw_recipe(view.directions, atlas, environments, rng, shares) for view in views]
+    recipes = [draw_recipe(views[k].directions, atlas, environments, rng, shares) for k in chosen]
     cameras = [draw_camera(rng, plain_camera) for _ in range(photos)]
     placements = [draw_placement(rng) for _ in range(photos)]
     return Draw(
-        batch_of(views),
-        stacked(recipes),
+        torch.from_numpy(chosen),
+        stacked(recipes) if recipes else {},
         torch.from_numpy(rng.random(photos)),
         _attributes(cameras),
         _attributes(placements),
@@ -262,19 +286,22 @@ class Darkroom:
         self._bank, self._side, self._alter = bank, side, alter
         self._pool = Pool[LitPictures](pool)
 
-    def __call__(self, draw: Draw) -> Sample:
+    def __call__(self, draw: Draw, views: ViewStore) -> Sample:
         """Finish a batch.
 
         Parameters
         ----------
         draw : Draw
-            On the device of the bank.
+        views : ViewStore
+            What `draw.chosen` counts; all on the device of the bank.
 
         Returns
         -------
         Sample
         """
-        self._pool.exchange(make_pictures(draw.views, draw.recipes, self._bank))
+        if len(draw.chosen):
+            fresh = views.batch(draw.chosen)
+            self._pool.exchange(make_pictures(fresh, draw.recipes, self._bank))
         pictures = self._alter(self._pool.picked(draw.shares))
         return photograph(pictures, draw.cameras, draw.placements, self._side)
 
@@ -352,7 +379,7 @@ def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -
     across = torch.linspace(-1, 1, SIDE, device=cover.device)[::_SPARSE]
     y, x = torch.meshgrid(across, across, indexing="ij")
     inside = torch.stack([x, y], dim=-1).reshape(1, -1, 2)
-    turned = inside @ torch.linalg.inv(inverse).mT
+    turned = inside @ torch.linalg.inv_ex(inverse).inverse.mT
     outside = (cover.flatten(1) <= 0)[..., None]
     low = turned.masked_fill(outside, 9).amin(1)
     high = turned.masked_fill(outside, -9).amax(1)
@@ -415,9 +442,7 @@ def _light_of(
 ) -> torch.Tensor:
     """Coefficients (B, 27) of the light in the network's frame, for a photo of mean light 1."""
     angle, mirror = placements["angle"], placements["mirror"]
-    probe = functional.normalize(
-        torch.tensor(PLACES, dtype=torch.float32, device=angle.device), dim=-1
-    )
+    probe = _probe().to(angle.device)
     back = torch.stack(
         [
             probe[None, :, 0] * mirror[:, None],
@@ -427,9 +452,19 @@ def _light_of(
     ) @ _turn(angle)
     came = torch.cat([back, probe[None, :, 2:].expand(len(angle), -1, -1)], -1)
     values = basis_of(came) @ coefficients
-    found = torch.linalg.pinv(basis_of(probe)) @ values
+    found = _probe_inverse().to(angle.device) @ values
     found[:, 0] += brightness[:, None] * math.sqrt(4 * math.pi)
     return found.mT.flatten(1)
+
+
+@cache
+def _probe() -> torch.Tensor:
+    return functional.normalize(torch.tensor(PLACES, dtype=torch.float32), dim=-1)
+
+
+@cache
+def _probe_inverse() -> torch.Tensor:
+    return torch.linalg.pinv(basis_of(_probe()))
 
 
 def _edges(depth: torch.Tensor, known: torch.Tensor) -> torch.Tensor:

@@ -17,14 +17,12 @@ from tests.training.world.analytic_views import ellipsoid_view
 from training.world.lighting import (
     Lights,
     Material,
-    ViewBatch,
     basis_of,
-    batch_of,
     light_coefficients,
     light_views,
-    prepared,
 )
 from training.world.reflectance import reflected_share
+from training.world.view_batches import ViewBatch, batch_of, prepared
 
 FLOOR = 1e-4  # of the shading
 ALPHAS = torch.tensor([0.06, 0.2, 0.55, 0.16])

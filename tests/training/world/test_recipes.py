@@ -11,7 +11,6 @@ pytest.importorskip("torch")
 import torch
 
 from tests.training.world.analytic_views import ellipsoid_view
-from training.world.lighting import batch_of, prepared
 from training.world.patterns import Atlas
 from training.world.pictures import Bank, lights_of, lit_pictures, material_of, stacked
 from training.world.recipes import (
@@ -24,6 +23,7 @@ from training.world.recipes import (
     draw_recipe,
     lamp_places,
 )
+from training.world.view_batches import batch_of, prepared
 from training.world.views import spread_directions
 
 MAPS = 14

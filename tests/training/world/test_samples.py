@@ -17,7 +17,7 @@ from isc_core.networks import scene_network as core
 from isc_core.scene.light_estimate import PLACES
 from tests.training.world.analytic_views import ellipsoid_view
 from tests.training.world.test_recipes import ATLAS, bank
-from training.world.lighting import PreparedView, basis_of, prepared
+from training.world.lighting import basis_of
 from training.world.lit_pictures import LitPictures, make_pictures
 from training.world.recipes import Shares
 from training.world.samples import (
@@ -30,6 +30,7 @@ from training.world.samples import (
     draw_placement,
 )
 from training.world.tensor_batch import Pool
+from training.world.view_batches import PreparedView, ViewStore, prepared
 
 PHOTOS = 2  # of each picture, one after the other
 
@@ -57,13 +58,17 @@ def some_views(count: int) -> list[PreparedView]:
 def draw(seed: int, shares: Shares, count: int = 3, plain: bool = False) -> Draw:
     rng = np.random.default_rng(seed)
     views, places = some_views(count), np.array([0, 1, 2])
-    one = draw_batch(views, PHOTOS * count, ATLAS, places, rng, shares, plain)
+    one = draw_batch(views, np.arange(count), PHOTOS * count, ATLAS, places, rng, shares, plain)
     return replace(one, shares=(torch.arange(PHOTOS * count) // PHOTOS + 0.5) / count)
 
 
 def finished(one: Draw, seed: int = 0) -> Sample:
     torch.manual_seed(seed)
-    return Darkroom(bank(), 16)(one)
+    return Darkroom(bank(), 16)(one, store(one))
+
+
+def store(one: Draw) -> ViewStore:
+    return ViewStore(some_views(len(one.chosen)))
 
 
 def placed(one: Draw, **changes: float | list[float]) -> Draw:
@@ -241,7 +246,7 @@ def test_the_mean_light_of_what_the_light_is_told_for_is_one() -> None:
 def test_a_smaller_photo_shows_the_same() -> None:
     one = placed(draw(2, HARMONICS, 3, plain=True), **STRAIGHT)
     torch.manual_seed(0)
-    small = Darkroom(bank(), 16, OUTPUT // 2)(one)
+    small = Darkroom(bank(), 16, OUTPUT // 2)(one, store(one))
     large = finished(one)
     both = inner(functional.avg_pool2d(large.known, 2).floor()) & inner(small.known)
     off = (functional.avg_pool2d(large.normal, 2) - small.normal).norm(dim=1).numpy()
@@ -250,7 +255,10 @@ def test_a_smaller_photo_shows_the_same() -> None:
 
 
 def test_a_pool_keeps_the_latest_pictures() -> None:
-    parts = [make_pictures(one.views, one.recipes, bank()) for one in map(numbered, range(4))]
+    parts = [
+        make_pictures(store(one).batch(one.chosen), one.recipes, bank())
+        for one in map(numbered, range(4))
+    ]
     pool = Pool[LitPictures](4)
     with pytest.raises(ValueError, match="empty"):
         pool.picked(torch.zeros(1))

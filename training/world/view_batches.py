@@ -1,0 +1,223 @@
+"""Views as the lighting needs them: cosines to the directions that each pixel sees, in batches.
+
+Equation: `stretched` scales depth by s. Affine maps keep what hides what: with A = diag(1, 1, s), a
+direction l becomes A l / |A l|, a normal A^-1 n / |A^-1 n|, and the solid angle around l grows by
+s / |A l|^3. What the camera sees stays where it is.
+
+Limits: a stretched body's directions are no longer spread evenly, and fill another cap.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import torch
+from torch.nn import functional
+
+from .tensor_batch import TensorBatch
+from .views import DIRECTIONS, SIDE, View
+
+
+@dataclass(frozen=True)
+class PreparedView:
+    """A view as the lighting needs it, N pixels.
+
+    Attributes
+    ----------
+    index : (N,) int64 ndarray
+        Pixel of the picture, row by row.
+    surface : (N, 10) float32 ndarray
+        Normal, place, unit vector to the camera, thickness.
+    reached : (N, DIRECTIONS) uint8 ndarray
+        Cosine to each direction that sees past the body, times 255.
+    directions : (DIRECTIONS, 3) float32 ndarray
+    """
+
+    index: np.ndarray
+    surface: np.ndarray
+    reached: np.ndarray
+    directions: np.ndarray
+
+
+def prepared(view: View) -> PreparedView:
+    """Prepare a view for lighting.
+
+    Parameters
+    ----------
+    view : View
+
+    Returns
+    -------
+    PreparedView
+    """
+    normal = view.normal.astype(np.float32)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    thickness = view.thickness.astype(np.float32)[:, None]
+    visible = np.unpackbits(view.visible, axis=1)
+    facing = np.rint(255 * np.clip(normal @ view.directions.T, 0, 1)).astype(np.uint8)
+    return PreparedView(
+        np.flatnonzero(view.mask),
+        np.hstack([normal, *_places(view), thickness]).astype(np.float32),
+        visible * facing,
+        view.directions.astype(np.float32),
+    )
+
+
+@dataclass(frozen=True)
+class ViewBatch(TensorBatch):
+    """B views, their pixels in rows of equal length P; shorter ones are filled up.
+
+    Attributes
+    ----------
+    index : (B, P) int64 tensor
+        Pixel of the picture, row by row; SIDE^2 where filled up.
+    normal, position, toward : (B, P, 3) tensor
+        Surface normal, place, and unit vector to the camera, in the camera frame.
+    thickness : (B, P) tensor
+        Length of the ray inside the body.
+    reached : (B, P, DIRECTIONS) uint8 tensor
+        See `PreparedView`.
+    directions : (B, DIRECTIONS, 3) tensor
+        Unit.
+    solid : (B, DIRECTIONS) tensor
+        Solid angle around each direction; 1 where they are spread evenly.
+    """
+
+    index: torch.Tensor
+    normal: torch.Tensor
+    position: torch.Tensor
+    toward: torch.Tensor
+    thickness: torch.Tensor
+    reached: torch.Tensor
+    directions: torch.Tensor
+    solid: torch.Tensor
+
+
+def batch_of(views: Sequence[PreparedView]) -> ViewBatch:
+    """Collect views.
+
+    Parameters
+    ----------
+    views : sequence of PreparedView
+
+    Returns
+    -------
+    ViewBatch
+        On the CPU.
+    """
+    longest, count = max(len(view.index) for view in views), len(views)
+    index = np.full((count, longest), SIDE * SIDE)
+    surface = np.zeros((count, longest, 10), np.float32)
+    reached = np.zeros((count, longest, DIRECTIONS), np.uint8)
+    surface[..., 2] = surface[..., 8] = 1
+    for k, view in enumerate(views):
+        pixels = slice(len(view.index))
+        index[k, pixels], surface[k, pixels] = view.index, view.surface
+        reached[k, pixels] = view.reached
+    normal, position, toward, thickness = torch.from_numpy(surface).split([3, 3, 3, 1], dim=-1)
+    return ViewBatch(
+        torch.from_numpy(index),
+        normal,
+        position,
+        toward,
+        thickness[..., 0],
+        torch.from_numpy(reached),
+        torch.from_numpy(np.stack([view.directions for view in views])),
+        torch.ones(count, DIRECTIONS),
+    )
+
+
+class ViewStore:
+    """Views on the device that lights them.
+
+    Parameters
+    ----------
+    views : sequence of PreparedView
+    device : str
+    """
+
+    def __init__(self, views: Sequence[PreparedView], device: str = "cpu") -> None:
+        self._views, self._device = views, device
+        self._batches = [] if device == "cpu" else [batch_of([one]).to(device) for one in views]
+
+    def batch(self, chosen: torch.Tensor) -> ViewBatch:
+        """Collect views.
+
+        Parameters
+        ----------
+        chosen : (B,) int64 tensor
+            Their numbers, on the CPU.
+
+        Returns
+        -------
+        ViewBatch
+            On the device.
+        """
+        if not self._batches:
+            return batch_of([self._views[int(k)] for k in chosen])
+        return _filled_up([self._batches[int(k)] for k in chosen])
+
+
+def _filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
+    """One batch of batches of one view each; what is filled up faces the viewer, as in batch_of."""
+
+    def padded(name: str, value: float = 0) -> torch.Tensor:
+        rows = [getattr(one, name)[0] for one in views]
+        return torch.nn.utils.rnn.pad_sequence(rows, True, value)
+
+    index = padded("index", SIDE * SIDE)
+    away = (index == SIDE * SIDE).float()[..., None] * index.new_tensor([0.0, 0, 1])
+    return ViewBatch(
+        index,
+        padded("normal") + away,
+        padded("position"),
+        padded("toward") + away,
+        padded("thickness"),
+        padded("reached"),
+        torch.cat([one.directions for one in views]),
+        torch.cat([one.solid for one in views]),
+    )
+
+
+def stretched(views: ViewBatch, factor: torch.Tensor) -> ViewBatch:
+    """Scale the depth of bodies.
+
+    Parameters
+    ----------
+    views : ViewBatch
+    factor : (B,) tensor
+        > 0.
+
+    Returns
+    -------
+    ViewBatch
+    """
+    scale = torch.stack([torch.ones_like(factor)] * 2 + [factor], -1)[:, None]
+    directions, toward = views.directions * scale, views.toward * scale
+    length = directions.norm(dim=-1)
+    directions = directions / length[..., None]
+    normal = functional.normalize(views.normal / scale, dim=-1)
+    cosine = (normal @ directions.mT).clamp(0, 1)
+    reached = (255 * cosine).round().to(torch.uint8) * (views.reached > 0)
+    return replace(
+        views,
+        normal=normal,
+        position=views.position * scale,
+        toward=functional.normalize(toward, dim=-1),
+        thickness=views.thickness * toward.norm(dim=-1),
+        reached=reached,
+        directions=directions,
+        solid=views.solid * factor[:, None] / length**3,
+    )
+
+
+def _places(view: View) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3) of a view's pixels and unit vectors (N, 3) from there to the camera."""
+    rows, columns = np.nonzero(view.mask)
+    across = np.stack([columns + 0.5, SIDE - rows - 0.5], axis=1) * (2 / SIDE) - 1
+    depth = view.depth.astype(np.float32)[:, None]
+    if np.isinf(view.distance):
+        return np.hstack([across, depth]), np.broadcast_to((0.0, 0.0, 1.0), (len(depth), 3))
+    position = np.hstack([across * (1 - depth / view.distance), depth])
+    toward = np.array([0, 0, view.distance]) - position
+    return position, toward / np.linalg.norm(toward, axis=1, keepdims=True)
