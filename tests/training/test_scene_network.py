@@ -12,6 +12,7 @@ import torch
 
 from isc_core.networks.scene_network import (
     CHANNELS,
+    FACTORS,
     GLOBAL,
     INPUTS,
     LIGHT,
@@ -20,7 +21,7 @@ from isc_core.networks.scene_network import (
     SceneNetwork,
     channels_of,
 )
-from training.networks.scene_module import SceneNetworkModule, network_channels
+from training.networks.scene_module import SceneNetworkModule, light_surprise, network_channels
 from training.world.samples import OBJECT, OUTPUT, Sample
 
 WIDTHS = (6, 8, 8, 10)
@@ -209,3 +210,14 @@ def test_the_loss_falls() -> None:
         losses.append((loss.item(), terms["degrees"].item()))
     assert np.mean([loss for loss, _ in losses[-5:]]) < 0.7 * losses[0][0]
     assert losses[-1][1] < losses[0][1] - 10
+
+
+def test_the_likelihood_of_light_is_that_of_a_gaussian_of_low_rank() -> None:
+    torch.manual_seed(0)
+    error, log_scale = torch.randn(4, LIGHT), 0.3 * torch.randn(4, LIGHT)
+    factors = torch.randn(4, LIGHT, FACTORS)
+    gauss = torch.distributions.LowRankMultivariateNormal(
+        torch.zeros_like(error), factors, torch.exp(2 * log_scale)
+    )
+    expected = -gauss.log_prob(error) / LIGHT
+    torch.testing.assert_close(light_surprise(error, log_scale, factors), expected)

@@ -6,7 +6,9 @@ them.
 
 import argparse
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +21,7 @@ from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
 from ..world.invented_environments import invented_room, invented_sky, studio
 from ..world.lit_pictures import LitPictures
-from ..world.pack import read_pack
+from ..world.pack import PackedWorld, read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.recipes import Shares
@@ -194,20 +196,7 @@ def read_world(
     """
     packs = [read_pack(path) for path in paths if path.is_file()]
     folders = [path for path in paths if not path.is_file()]
-    views = {
-        split: sorted(
-            (
-                prepared(view)
-                for part in (
-                    *(pack.views[split] for pack in packs),
-                    *(views_in(folder, split) for folder in folders),
-                )
-                for view in part
-            ),
-            key=lambda view: len(view.index),
-        )
-        for split in splits
-    }
+    views = {split: _prepared_views(packs, folders, split) for split in splits}
     if not all(views.values()):
         raise InputError(f"{paths[0]} has no views to learn from: build more bodies")
     if panoramas is None and not packs:
@@ -223,6 +212,17 @@ def read_world(
     photographed = np.flatnonzero(~judged[: len(found)])
     learned = np.concatenate([np.flatnonzero(~judged), np.repeat(photographed, _OFTEN)])
     return World(views, atlas, bank, learned, np.flatnonzero(judged))
+
+
+def _prepared_views(
+    packs: Sequence[PackedWorld], folders: Sequence[Path], split: Split
+) -> list[PreparedView]:
+    """Views ordered by size."""
+    found = chain(
+        *(pack.views[split] for pack in packs), *(views_in(folder, split) for folder in folders)
+    )
+    with ThreadPoolExecutor() as pool:
+        return sorted(pool.map(prepared, found), key=lambda view: len(view.index))
 
 
 def add_photo_arguments(parser: argparse.ArgumentParser, rate: float) -> None:

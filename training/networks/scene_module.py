@@ -51,7 +51,7 @@ from ..world.samples import Sample
 from .blocks import load_arrays, stored_arrays
 from .encoder_decoder import EncoderDecoderModule, quieten
 
-WIDTHS = (64, 128, 192, 256)
+WIDTHS = (64, 160, 256, 384)
 HIDDEN = 192
 
 
@@ -265,7 +265,7 @@ def _light_terms(
 ) -> dict[str, torch.Tensor]:
     sizes = [LIGHT, LIGHT, LIGHT * FACTORS, COUNTS, PLACE_COUNT, KIND_COUNT]
     mean, log_scale, factors, counts, places, kinds = vector.split(sizes, dim=1)
-    distance = _surprise(
+    distance = light_surprise(
         batch.light - mean,
         log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE),
         FACTOR_SCALE * factors.reshape(-1, LIGHT, FACTORS),
@@ -282,10 +282,24 @@ def _light_terms(
     }
 
 
-def _surprise(error: torch.Tensor, log_scale: torch.Tensor, factors: torch.Tensor) -> torch.Tensor:
-    """Negative log likelihood (B,) of errors, a number of theirs, for a Gaussian of low rank.
+def light_surprise(
+    error: torch.Tensor, log_scale: torch.Tensor, factors: torch.Tensor
+) -> torch.Tensor:
+    """Return the negative log likelihood of errors for a Gaussian of low rank.
 
-    As `torch.distributions.LowRankMultivariateNormal`, but without waiting for the device.
+    As `torch.distributions.LowRankMultivariateNormal`, but nothing waits for the device.
+
+    Parameters
+    ----------
+    error : (B, LIGHT) tensor
+    log_scale : (B, LIGHT) tensor
+        Of the diagonal part.
+    factors : (B, LIGHT, FACTORS) tensor
+
+    Returns
+    -------
+    (B,) tensor
+        Divided by `LIGHT`.
     """
     scale = torch.exp(-log_scale)
     error, factors = error * scale, factors * scale[..., None]

@@ -155,11 +155,21 @@ class ViewStore:
         """
         if not self._batches:
             return batch_of([self._views[int(k)] for k in chosen])
-        return _filled_up([self._batches[int(k)] for k in chosen])
+        return filled_up([self._batches[int(k)] for k in chosen])
 
 
-def _filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
-    """One batch of batches of one view each; what is filled up faces the viewer, as in batch_of."""
+def filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
+    """Join batches of one view each; what is filled up faces the viewer, as in `batch_of`.
+
+    Parameters
+    ----------
+    views : sequence of ViewBatch
+        On one device.
+
+    Returns
+    -------
+    ViewBatch
+    """
 
     def padded(name: str, value: float = 0) -> torch.Tensor:
         rows = [getattr(one, name)[0] for one in views]

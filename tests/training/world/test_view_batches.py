@@ -10,7 +10,14 @@ pytest.importorskip("torch")
 import torch
 
 from tests.training.world.analytic_views import ellipsoid_view
-from training.world.view_batches import ViewBatch, ViewStore, batch_of, prepared, stretched
+from training.world.view_batches import (
+    ViewBatch,
+    ViewStore,
+    batch_of,
+    filled_up,
+    prepared,
+    stretched,
+)
 from training.world.views import SIDE
 
 HALVES = ((0.9, 0.9, 0.9), (0.5, 0.9, 0.7))
@@ -58,12 +65,10 @@ def test_no_stretch_changes_nothing() -> None:
         torch.testing.assert_close(getattr(same, name), getattr(views, name))
 
 
-def test_stores_of_all_devices_give_the_same_batches() -> None:
+def test_a_store_fills_up_as_batches_do() -> None:
     chosen = torch.tensor([1, 0, 1])
-    kept = ViewStore(VIEWS, "meta")._batches
-    assert len(kept) == len(VIEWS)
     batch = batch_of([VIEWS[k] for k in chosen])
-    store = ViewStore(VIEWS)
-    store._batches = [batch_of([one]) for one in VIEWS]
-    for name, part in vars(batch).items():
-        torch.testing.assert_close(getattr(store.batch(chosen), name), part)
+    filled = filled_up([batch_of([VIEWS[k]]) for k in chosen])
+    for store in (ViewStore(VIEWS).batch(chosen), filled):
+        for name, part in vars(batch).items():
+            torch.testing.assert_close(getattr(store, name), part)
