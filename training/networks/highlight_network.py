@@ -41,7 +41,7 @@ SHARES = Shares(
     matte=0.0,
     coated=0.1,
     white=0.45,
-    stretch=0.25,
+    stretch=0.2,
 )
 _PHOTOS = 8  # of each lit view: their gloss and colours differ, too
 _MATT = 0.35  # share of photos without gloss

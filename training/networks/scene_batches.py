@@ -5,10 +5,10 @@ them.
 """
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from itertools import chain
+from dataclasses import dataclass, field, replace
+from itertools import chain, count
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ _INVENTED = 60  # surroundings of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
 PHOTOS = 8  # taken of each lit view, on average: lighting takes three times as long
 POOL = 512  # lit views; on a GPU, which lights more at once, several times as many
-_GPU_POOL, _GPU_EVERY = 3072, 4
+_GPU_POOL, _GPU_EVERY = 4096, 4
 _ALIKE = 400  # views lit together are so near in size: less is filled up
 
 
@@ -55,6 +55,8 @@ class SceneDraws:
         Taken of each lit view, on average.
     every : int
         Views are lit for one batch in so many, for all of these at once.
+    calls : iterator of int
+        Counts the batches.
     """
 
     views: list[PreparedView]
@@ -65,6 +67,7 @@ class SceneDraws:
     plain_camera: bool = False
     photos: int = PHOTOS
     every: int = 1
+    calls: Iterator[int] = field(default_factory=count)
 
     def __call__(self, rng: np.random.Generator) -> Draw:
         """Draw a batch.
@@ -78,6 +81,7 @@ class SceneDraws:
         Draw
         """
         fresh = max(1, -(-self.size * self.every // self.photos))
+        fresh = 0 if next(self.calls) % self.every else fresh
         around = rng.integers(len(self.views)) + rng.integers(-_ALIKE, _ALIKE, fresh)
         return draw_batch(
             self.views,

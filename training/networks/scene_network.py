@@ -31,7 +31,7 @@ from .scene_batches import SceneDraws, add_photo_arguments, fit_to_photos, read_
 from .scene_module import WIDTHS, SceneNetworkModule
 
 SCHEDULE = Schedule(rate=3e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
-_STRETCH = 0.25
+_STRETCH = 0.2
 _ABLATIONS: dict[str, dict[str, Any]] = {
     "camera": {},
     "prints": {"printed": 0.0},

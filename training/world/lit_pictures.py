@@ -34,6 +34,8 @@ class LitPictures(TensorBatch):
     strongest : (B, 3) tensor
         Unit vector to the lamp that gives most light.
     kind : (B,) int64 tensor
+    aspect : (B, 2) tensor
+        Factors of the picture's width and height: bodies are stretched, pictures are not yet.
     """
 
     layers: torch.Tensor
@@ -43,6 +45,7 @@ class LitPictures(TensorBatch):
     lamps: torch.Tensor
     strongest: torch.Tensor
     kind: torch.Tensor
+    aspect: torch.Tensor
 
 
 def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank) -> LitPictures:
@@ -80,6 +83,7 @@ def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank
         lamps,
         strongest,
         recipes["kind"],
+        recipes["stretch"][:, :2],
     )
 
 

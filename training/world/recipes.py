@@ -74,7 +74,8 @@ class Shares:
         Bodies with stripes, dots, checks or patches that are white on a strong colour, or the other
         way round.
     stretch : float
-        Deviation of the logarithm of the factor by which depth is scaled.
+        Deviation of the logarithm of the factor by which depth is scaled; the aspect ratio varies
+        as much.
     """
 
     kinds: tuple[float, ...] = (0.9, 0.05, 0.05)
@@ -125,8 +126,8 @@ class Recipe:
         1: `harmonic_gain` times the surroundings' log harmonics are the light.
     harmonic_gain : float
     harmonic_noise : (9, 3) ndarray
-    stretch : float
-        Factor of the body's depth.
+    stretch : (3,) ndarray
+        Factors of the body's width, height and depth.
     """
 
     base: np.ndarray
@@ -154,7 +155,7 @@ class Recipe:
     given: float
     harmonic_gain: float
     harmonic_noise: np.ndarray
-    stretch: float
+    stretch: np.ndarray
 
 
 def draw_recipe(
@@ -190,8 +191,13 @@ def draw_recipe(
         **_light(directions, light, rng),
     }
     environment = int(rng.choice(environments))
-    stretch = math.exp(rng.normal(0, shares.stretch)) if shares.stretch else 1.0
+    stretch = _stretch(rng, shares) if shares.stretch else np.ones(3)
     return Recipe(kind=int(kind), environment=environment, stretch=stretch, **parts)
+
+
+def _stretch(rng: np.random.Generator, shares: Shares) -> np.ndarray:
+    aspect, depth = rng.normal(0, shares.stretch, 2)
+    return np.exp([aspect / 2, -aspect / 2, depth])
 
 
 def _paint(atlas: Atlas, kind: Kind, rng: np.random.Generator, shares: Shares) -> dict[str, Any]:

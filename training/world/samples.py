@@ -361,14 +361,16 @@ def _placed(
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
     """Layers (B, 13, side, side) of what is seen, where it is known, and the share covered."""
     picture = torch.cat([pictures.layers, pictures.cover], dim=1).float()
-    grid = _grid(picture[:, -1], placements, side)
+    grid = _grid(picture[:, -1], pictures.aspect[:, None], placements, side)
     found = functional.grid_sample(picture, grid, align_corners=False)
     cover = found[:, -1:]
     known = (cover > 0.5).float() * _frame(placements, side)
     return found[:, :-1] / cover.clamp(min=0.25), known, cover
 
 
-def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -> torch.Tensor:
+def _grid(
+    cover: torch.Tensor, aspect: torch.Tensor, placements: dict[str, torch.Tensor], side: int
+) -> torch.Tensor:
     """Where each pixel of the network's frame lies in the view, for `grid_sample`."""
     angle, mirror = placements["angle"], placements["mirror"]
     inverse = _turn(-angle)
@@ -379,7 +381,7 @@ def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -
     across = torch.linspace(-1, 1, SIDE, device=cover.device)[::_SPARSE]
     y, x = torch.meshgrid(across, across, indexing="ij")
     inside = torch.stack([x, y], dim=-1).reshape(1, -1, 2)
-    turned = inside @ torch.linalg.inv_ex(inverse).inverse.mT
+    turned = (inside * aspect) @ torch.linalg.inv_ex(inverse).inverse.mT
     outside = (cover.flatten(1) <= 0)[..., None]
     low = turned.masked_fill(outside, 9).amin(1)
     high = turned.masked_fill(outside, -9).amax(1)
@@ -390,7 +392,7 @@ def _grid(cover: torch.Tensor, placements: dict[str, torch.Tensor], side: int) -
     frame = torch.stack([columns, rows], dim=-1).reshape(1, -1, 2)
     frame = frame - placements["shift"][:, None] * (2 / OUTPUT)
     found = (frame @ inverse.mT) * scale[:, None, None] + middle[:, None]
-    return found.reshape(-1, side, side, 2)
+    return (found / aspect).reshape(-1, side, side, 2)
 
 
 def _frame(placements: dict[str, torch.Tensor], side: int) -> torch.Tensor:

@@ -1,8 +1,8 @@
 """Views as the lighting needs them: cosines to the directions that each pixel sees, in batches.
 
-Equation: `stretched` scales depth by s. Affine maps keep what hides what: with A = diag(1, 1, s), a
-direction l becomes A l / |A l|, a normal A^-1 n / |A^-1 n|, and the solid angle around l grows by
-s / |A l|^3. What the camera sees stays where it is.
+Equation: `stretched` scales the axes of the camera's frame by A = diag(a, b, s). Affine maps keep
+what hides what: a direction l becomes A l / |A l|, a normal A^-1 n / |A^-1 n|, and the solid angle
+around l grows by a b s / |A l|^3.
 
 Limits: a stretched body's directions are no longer spread evenly, and fill another cap.
 """
@@ -189,20 +189,21 @@ def filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
     )
 
 
-def stretched(views: ViewBatch, factor: torch.Tensor) -> ViewBatch:
-    """Scale the depth of bodies.
+def stretched(views: ViewBatch, factors: torch.Tensor) -> ViewBatch:
+    """Scale bodies along the axes.
 
     Parameters
     ----------
     views : ViewBatch
-    factor : (B,) tensor
+    factors : (B, 3) tensor
         > 0.
 
     Returns
     -------
     ViewBatch
+        `index` is that of the picture before: it has to be scaled, too.
     """
-    scale = torch.stack([torch.ones_like(factor)] * 2 + [factor], -1)[:, None]
+    scale = factors[:, None]
     directions, toward = views.directions * scale, views.toward * scale
     length = directions.norm(dim=-1)
     directions = directions / length[..., None]
@@ -217,7 +218,7 @@ def stretched(views: ViewBatch, factor: torch.Tensor) -> ViewBatch:
         thickness=views.thickness * toward.norm(dim=-1),
         reached=reached,
         directions=directions,
-        solid=views.solid * factor[:, None] / length**3,
+        solid=views.solid * factors.prod(1, keepdim=True) / length**3,
     )
 
 

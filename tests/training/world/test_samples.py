@@ -254,6 +254,25 @@ def test_a_smaller_photo_shows_the_same() -> None:
     torch.testing.assert_close(small.light[:, 1:9], large.light[:, 1:9])
 
 
+def test_a_stretched_ball_is_an_ellipse_with_its_normals() -> None:
+    aspect = 1.4
+    one = placed(draw(2, HARMONICS, 3, plain=True), **STRAIGHT)
+    factors = torch.tensor([math.sqrt(aspect), 1 / math.sqrt(aspect), 1]).expand(3, 3)
+    sample = finished(replace(one, recipes=one.recipes | {"stretch": factors}))
+    known = sample.known[0, 0] > 0  # the first view is a ball
+    rows, columns = (known.any(axis).sum().item() for axis in (1, 0))
+    assert columns / rows == pytest.approx(aspect, rel=0.03)
+    across = (torch.arange(OUTPUT) + 0.5 - OUTPUT / 2) * (2 / OBJECT)
+    y, x = -across[:, None] * aspect, across[None]
+    inside = (x**2 + y**2 < 0.9) & known
+    # the surface x^2 + y^2 + (z a)^2 = 1 in units of half the width, y scaled by the aspect
+    true = torch.stack(torch.broadcast_tensors(x, y * aspect, torch.sqrt(1 - x**2 - y**2)))
+    true[2] *= math.sqrt(aspect)
+    true = functional.normalize(true.nan_to_num(), dim=0)
+    off = (true - sample.normal[0]).norm(dim=0)[inside]
+    assert off.mean() < 0.03
+
+
 def test_a_pool_keeps_the_latest_pictures() -> None:
     parts = [
         make_pictures(store(one).batch(one.chosen), one.recipes, bank())
