@@ -241,11 +241,11 @@ def fit(
     network.to(options.device)
     torch.backends.cudnn.benchmark = True  # batches have one size: the fastest kernels for it
     optimizers = _optimizers(network, schedule, options.device)
+    held_out = _validation_batches(draw_validation, options)
     average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
         clock.resume(_restore(_checkpoint(options.resume), network, average, optimizers))
     batches = _loader(draw, options, clock.step)
-    held_out = _validation_batches(draw_validation, options)
     report = _Report()
     while not clock.over:
         share = _rate_share(clock.step, clock.progress, schedule.warm_up)
