@@ -23,8 +23,9 @@ The weights are those of `benchmarks.separation.print_rule --mixed` on rendered 
 them with print; docs/methods/print.md says how the odds were chosen.
 
 Limits: a region that contains both a highlight and print is kept or restored as a whole. Pale print
-of the same chroma as the paint around it looks like light. Faint and broad highlights, of which the
-network is not sure, stay in the image, and most on grey and white.
+of the same chroma as the paint around it looks like light. Coloured light changes C, as paint does.
+Faint and broad highlights, of which the network is not sure, stay in the image, and most on grey
+and white.
 """
 
 from collections.abc import Sequence
