@@ -5,7 +5,9 @@
 
 WORLD is a folder of `isc world build`: held-out bodies are lit by held-out panoramas. `--photos`
 are folders of photos with masks. `--data` are sets like MIT-Berkeley's: their laboratory photos
-with and without gloss. Prints a Markdown table, and below it the photos with warnings.
+with and without gloss. Prints a Markdown table, and below it the photos with warnings; for lit
+bodies also the area under the ROC curve of each distinction, and how far off the direction of a
+single lamp is.
 """
 
 import argparse
@@ -15,16 +17,41 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.stats import rankdata
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.decomposition.assumption_checks import check_scene
 from isc_core.errors import InputError
-from isc_core.networks.scene_network import Kind, SceneNetwork, predict_scene
+from isc_core.networks.scene_network import (
+    Kind,
+    SceneNetwork,
+    ScenePrediction,
+    predict_scene,
+)
 from isc_core.photo import read_photo
 from isc_core.scene.diagnostics import WarningKind
+from isc_core.scene.light_estimate import PLACES
 
 _LAMPS = ("no lamp", "one lamp", "several lamps")
 _SIZE = 32  # photos of a batch
+
+
+@dataclass(frozen=True)
+class LitTruth:
+    """What is known of a lit body.
+
+    Attributes
+    ----------
+    kind : Kind
+    lamps : int
+        None, one, 2 for several.
+    toward : (3,) ndarray or None
+        Unit vector to the strongest lamp, if there is one.
+    """
+
+    kind: Kind
+    lamps: int
+    toward: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -41,12 +68,15 @@ class CheckedPhoto:
         Row of the table.
     name : str
         Printed if the photo gets a warning; "" for lit bodies.
+    truth : LitTruth or None
+        Of lit bodies.
     """
 
     image: np.ndarray
     mask: np.ndarray
     group: str
     name: str = ""
+    truth: LitTruth | None = None
 
 
 def lit(world: Path, panoramas: Path, batches: int) -> Iterator[CheckedPhoto]:
@@ -70,16 +100,18 @@ def lit(world: Path, panoramas: Path, batches: int) -> Iterator[CheckedPhoto]:
     from training.world.recipes import Shares
 
     found = read_world([world], panoramas, (Split.BODY,), 0)
-    draws = SceneDraws(found.views[Split.BODY], found.atlas, found.judged, _SIZE, Shares())
+    bodies, judged = found.views[Split.BODY], found.judged
+    draws = SceneDraws(bodies, found.atlas, judged, _SIZE, Shares(), photos=1)
     draw, rng = SceneBatches(draws, found.bank), np.random.default_rng(0)
     for _ in range(batches):
         sample = draw(rng)
         for k in range(_SIZE):
-            kind = list(Kind)[int(sample.kind[k])]
-            lamps = _LAMPS[int(sample.count[k])]
-            group = f"lit, {lamps}" if kind == Kind.OPAQUE else f"lit, {kind}"
+            kind, lamps = list(Kind)[int(sample.kind[k])], int(sample.count[k])
+            toward = PLACES[int(sample.place[k])] if lamps else None
+            group = f"lit, {_LAMPS[lamps]}" if kind == Kind.OPAQUE else f"lit, {kind}"
             image = sample.photo[k].permute(1, 2, 0).numpy()
-            yield CheckedPhoto(image, sample.mask[k, 0].numpy() > 0, group)
+            truth = LitTruth(kind, lamps, toward)
+            yield CheckedPhoto(image, sample.mask[k, 0].numpy() > 0, group, truth=truth)
 
 
 def photographed(folder: Path) -> Iterator[CheckedPhoto]:
@@ -166,10 +198,8 @@ def report(photos: Sequence[CheckedPhoto], network: SceneNetwork) -> None:
     """
     if not photos:
         raise InputError("no photos; give --world, --photos or --data")
-    found = [
-        {one.kind for one in check_scene(predict_scene(photo.image, photo.mask, network))}
-        for photo in photos
-    ]
+    scenes = [predict_scene(photo.image, photo.mask, network) for photo in photos]
+    found = [{one.kind for one in check_scene(scene)} for scene in scenes]
     lines = [
         "| photos | number | with warnings | mirror or glass | several lights |",
         "|---|---:|---:|---:|---:|",
@@ -188,7 +218,70 @@ def report(photos: Sequence[CheckedPhoto], network: SceneNetwork) -> None:
         if photo.name and kinds:
             names = ", ".join(sorted(kind.name.lower().replace("_", " ") for kind in kinds))
             lines.append(f"{photo.group}: {photo.name}: {names}")
+    known = [(photo.truth, scene) for photo, scene in zip(photos, scenes, strict=True)]
+    lines += distinctions([(truth, scene) for truth, scene in known if truth is not None])
     sys.stdout.write("\n".join(lines) + "\n")
+
+
+def distinctions(photos: Sequence[tuple[LitTruth, ScenePrediction]]) -> list[str]:
+    """Measure how well the network tells kinds of scenes apart.
+
+    Parameters
+    ----------
+    photos : sequence of (LitTruth, ScenePrediction)
+
+    Returns
+    -------
+    list of str
+        Lines of a Markdown table; empty without photos.
+    """
+    if not photos:
+        return []
+    opaque = [(truth, scene) for truth, scene in photos if truth.kind == Kind.OPAQUE]
+    areas = {
+        "mirror or glass from opaque": roc_area(
+            [1 - scene.kinds[0] for _, scene in photos],
+            [truth.kind != Kind.OPAQUE for truth, _ in photos],
+        ),
+        "several lamps from fewer": roc_area(
+            [scene.lamps.several for _, scene in opaque], [truth.lamps == 2 for truth, _ in opaque]
+        ),
+        "no lamp from some": roc_area(
+            [scene.lamps.none for _, scene in opaque], [truth.lamps == 0 for truth, _ in opaque]
+        ),
+    }
+    off = [
+        np.degrees(np.arccos(np.clip(scene.lamps.direction @ truth.toward, -1, 1)))
+        for truth, scene in opaque
+        if truth.lamps == 1 and truth.toward is not None
+    ]
+    return [
+        "",
+        "| distinction | area under the ROC curve |",
+        "|---|---:|",
+        *(f"| {name} | {area:.3f} |" for name, area in areas.items()),
+        f"| direction of one lamp, median error | {np.median(off):.1f} degrees |",
+    ]
+
+
+def roc_area(scores: Sequence[float], positive: Sequence[bool]) -> float:
+    """Return the area under the ROC curve.
+
+    Parameters
+    ----------
+    scores : sequence of float
+        Larger for what is taken for positive.
+    positive : sequence of bool
+
+    Returns
+    -------
+    float
+        The share of pairs in the right order, equal scores counting half; NaN without a pair.
+    """
+    chosen = np.asarray(positive, bool)
+    ranks, pairs = rankdata(scores), chosen.sum() * (~chosen).sum()
+    least = chosen.sum() * (chosen.sum() + 1) / 2
+    return float((ranks[chosen].sum() - least) / pairs) if pairs else float("nan")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from isc_core.progress import Monitor
 from ..world.bodies.sources import BodyFolders
 from ..world.build import build_world
 from ..world.files import WorldSettings
-from ..world.pack import pack_worlds
+from ..world.pack import all_views, pack_worlds
 
 SUMMARY = "trace bodies from random sides"
 
@@ -73,6 +73,7 @@ def _declare_pack(parser: argparse.ArgumentParser) -> None:
     add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas, .exr or .hdr")
     add("-o", "--output", type=Path, required=True, metavar="FILE", help="the pack")
+    add("--without", type=Path, nargs="+", default=[], metavar="PACK", help="leave out their views")
     add("--megabytes", type=positive, default=50.0, metavar="N", help="default: %(default)g")
     add("--seed", type=count, default=0, metavar="N", help="default: %(default)s")
 
@@ -99,7 +100,14 @@ def run_pack(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     monitor.report("packing", 0)
     most = int(1e6 * options.megabytes)
-    lines = pack_worlds(options.worlds, options.panoramas, options.output, most, options.seed)
+    lines = pack_worlds(
+        options.worlds,
+        options.panoramas,
+        options.output,
+        most,
+        options.seed,
+        [view for path in options.without for view in all_views(path)],
+    )
     return hints(options, *lines)
 
 

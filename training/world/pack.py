@@ -15,6 +15,7 @@ Limits: normals are off by up to a degree.
 """
 
 import lzma
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -128,8 +129,32 @@ def read_pack(path: Path) -> PackedWorld:
         raise InputError(f"{path} is no pack of a world: {error}; make it again") from error
 
 
+def all_views(path: Path) -> list[View]:
+    """Read the views of a pack, whatever their split.
+
+    Parameters
+    ----------
+    path : Path
+
+    Returns
+    -------
+    list of View
+
+    Raises
+    ------
+    InputError
+        If the file is no pack of this version.
+    """
+    return [view for views in read_pack(path).views.values() for view in views]
+
+
 def pack_worlds(
-    folders: Sequence[Path], panoramas: Path, path: Path, most: int, seed: int
+    folders: Sequence[Path],
+    panoramas: Path,
+    path: Path,
+    most: int,
+    seed: int,
+    packed: Sequence[View] = (),
 ) -> list[str]:
     """Pack as many views of worlds as fit into a file.
 
@@ -145,6 +170,8 @@ def pack_worlds(
         Bytes that it may have.
     seed : int
         Chooses views, and which panoramas are judged.
+    packed : sequence of View
+        Left out; their bodies come last.
 
     Returns
     -------
@@ -154,9 +181,15 @@ def pack_worlds(
     Raises
     ------
     InputError
-        If a folder is no world, or not even a few views fit.
+        If a folder is no world, no view is left, or not even a few fit.
     """
-    views = {split: [v for one in folders for v in views_in(one, split)] for split in Split}
+    known = {_identity(view) for view in packed}
+    views = {
+        split: [v for one in folders for v in views_in(one, split) if _identity(v) not in known]
+        for split in Split
+    }
+    if not any(views.values()):
+        raise InputError(f"{folders[0]} has no views that other packs do not hold")
     atlas = read_patterns(folders[0])
     few = slice(_PATTERNS)
     atlas = Atlas(atlas.maps[few], atlas.kinds[few], atlas.tileable[few])
@@ -164,7 +197,9 @@ def pack_worlds(
     everything = sum(map(len, views.values()))
     for _ in range(_GUESSES):
         chosen = {
-            split: chosen_views(views[split], round(count * share), np.random.default_rng(seed))
+            split: chosen_views(
+                views[split], round(count * share), np.random.default_rng(seed), packed
+            )
             for split, share in _SHARES.items()
         }
         size = write_pack(path, PackedWorld(chosen, found, atlas))
@@ -178,7 +213,14 @@ def pack_worlds(
     return [f"{path}: {whole} views, {len(found)} panoramas, {size / 1e6:.1f} MB"]
 
 
-def chosen_views(views: Sequence[View], count: int, rng: np.random.Generator) -> list[View]:
+def _identity(view: View) -> tuple[str, bytes]:
+    """Two views of a body have different outlines."""
+    return view.name, np.packbits(view.mask).tobytes()
+
+
+def chosen_views(
+    views: Sequence[View], count: int, rng: np.random.Generator, packed: Sequence[View] = ()
+) -> list[View]:
     """Choose views so that as many bodies as possible are among them.
 
     Parameters
@@ -186,18 +228,20 @@ def chosen_views(views: Sequence[View], count: int, rng: np.random.Generator) ->
     views : sequence of View
     count : int
     rng : numpy.random.Generator
+    packed : sequence of View
+        Chosen before.
 
     Returns
     -------
     list of View
-        At most `count`; every body once before any body twice.
+        At most `count`; every body once before any body twice, those chosen before counted.
     """
     order = rng.permutation(len(views))
-    seen: dict[str, int] = {}
+    seen = Counter(view.name for view in packed)
     rank = []
     for k in order:
-        rank.append(seen.get(views[k].name, 0))
-        seen[views[k].name] = rank[-1] + 1
+        rank.append(seen[views[k].name])
+        seen[views[k].name] += 1
     first = np.argsort(rank, kind="stable")[:count]
     return [views[order[k]] for k in first]
 

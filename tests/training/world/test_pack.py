@@ -21,10 +21,18 @@ from training.world.files import (
     WorldSettings,
     claim_folder,
     split_of,
+    views_in,
     write_patterns,
     write_views,
 )
-from training.world.pack import PackedWorld, chosen_views, pack_worlds, read_pack, write_pack
+from training.world.pack import (
+    PackedWorld,
+    all_views,
+    chosen_views,
+    pack_worlds,
+    read_pack,
+    write_pack,
+)
 from training.world.patterns import Atlas
 
 RNG = np.random.default_rng(0)
@@ -123,6 +131,24 @@ def test_worlds_are_packed_into_the_bytes_that_are_allowed(tmp_path: Path) -> No
     assert len(found.views[Split.TRAIN]) > len(found.views[Split.BODY]) > 0
     assert all(split_of(one.name) == split for split in Split for one in found.views[split])
     assert sum(one.judged for one in found.panoramas) == 1
+
+
+def test_bodies_that_are_packed_come_last() -> None:
+    views = [replace(VIEWS[0], name=name) for name in ("a", "a", "b", "c")]
+    chosen = chosen_views(views, 2, np.random.default_rng(0), [views[0]])
+    assert sorted(one.name for one in chosen) == ["b", "c"]
+
+
+@pytest.mark.slow
+def test_a_second_pack_holds_what_the_first_has_not(tmp_path: Path) -> None:
+    world, second = world_folder(tmp_path), tmp_path / "b.isw"
+    first = [view for split in Split for view in views_in(world, split)][::2]
+    pack_worlds([world], tmp_path / "hdri", second, 10**8, 0, first)
+    names = {one.name for one in all_views(second)}
+    assert len(names) == 24 - len(first) and not names & {one.name for one in first}
+    everything = [*first, *all_views(second)]
+    with pytest.raises(InputError, match="no views that other packs do not hold"):
+        pack_worlds([world], tmp_path / "hdri", tmp_path / "c.isw", 10**8, 0, everything)
 
 
 @pytest.mark.slow
