@@ -197,8 +197,8 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--highlight-odds",
-        default="3",
-        choices=("3", "1", "0"),
+        default="4",
+        choices=("4", "1", "0"),
         help="highlights to remove: certain, likely or all, as in isc decompose "
         "(default: %(default)s)",
     )

@@ -6,8 +6,8 @@ WORLD is a folder of `isc world build`. Regions of light that colour and network
 `Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
 whose removal raises it. Logistic regression, each region with the root of its squared light over
 that of its photo as weight, gives `highlight_evidence.WEIGHTS`. For the bodies of `Part.CHOICE` it
-prints what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, which the
-shipped weights had, as many bodies without print are added to both parts.
+prints what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, as many bodies
+without print are added to both parts; so were the shipped weights fitted, with a former network.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from isc_core.separation.support.highlight_evidence import highlight_evidence
 
 from .print_set import Part, PrintScene, print_scenes
 
-ODDS = (1.5, 2.0, 2.5, 3.0, 4.0)
+ODDS = (1.5, 2.0, 3.0, 4.0, 6.0)
 _RIDGE, _STEPS = 0.01, 50
 
 

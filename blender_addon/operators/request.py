@@ -55,7 +55,7 @@ class MethodSettings:
     samples: int = 64
     camera: str = "auto"
     texture_size: str = "photo"
-    highlight_odds: str = "3"
+    highlight_odds: str = "4"
     highlights: str = ""
     not_highlights: str = ""
     refine: bool = False

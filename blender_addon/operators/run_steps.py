@@ -127,7 +127,7 @@ def decompose_steps(
         transfer=photo.transfer,
         camera=method.camera,
         texture_size=method.texture_size,
-        highlight_odds=method.highlight_odds if method.model == "joint" else "3",
+        highlight_odds=method.highlight_odds if method.model == "joint" else "4",
         highlights=highlights,
         not_highlights=not_highlights,
         each=place.build.each,

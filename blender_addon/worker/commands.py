@@ -89,7 +89,7 @@ class DecomposeJob:
     transfer: str = "auto"
     camera: str = "auto"
     texture_size: str = "photo"
-    highlight_odds: str = "3"
+    highlight_odds: str = "4"
     highlights: tuple[tuple[int, int], ...] = ()
     not_highlights: tuple[tuple[int, int], ...] = ()
     each: bool = False

@@ -47,7 +47,7 @@ PUBLISHED = tuple(name for name in METHODS if name[-4:].isdigit())
 BEST = "isc"
 IMPROVED = "improved"
 # That light is a highlight and no paint, to be exceeded (`support.highlight_evidence`).
-HIGHLIGHT_ODDS = 3.0
+HIGHLIGHT_ODDS = 4.0
 # The toolbox processes the whole frame and ignores clipping; its published figures can only be
 # reproduced that way.
 _TOOLBOX = "sihr"
