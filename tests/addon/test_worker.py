@@ -30,6 +30,7 @@ from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.atomic import remove_unfinished, unfinished
 from isc_core.numerics.kernel_library import shipped_library
 from isc_core.result_files.result_folder import load, save
+from isc_core.separation import HIGHLIGHT_ODDS
 from tests.core.ball_scene import ball
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -360,6 +361,10 @@ def test_the_job_reaches_the_command_line(
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }
+
+
+def test_unless_asked_the_odds_are_those_of_the_command_line() -> None:
+    assert float(DecomposeJob.highlight_odds) == HIGHLIGHT_ODDS
 
 
 @pytest.mark.slow
