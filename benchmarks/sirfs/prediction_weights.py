@@ -1,11 +1,12 @@
 """How far should SIRFS trust what the scene network predicts? Measured on held-out bodies.
 
   python -m benchmarks.sirfs.prediction_weights WORLD --panoramas DIR [--weights NPZ] [--count N]
-  [--ways A,B,...] [--light KIND] [--illumination NAME] [--seed K] [--json FILE]
+  [--ways A,B,...] [--light KIND] [--illumination NAME] [--half 0|1] [--seed K] [--json FILE]
 
 WORLD is a folder of `isc world build`. Bodies and panoramas that no fit has seen are lit and
-photographed, each from one side; the network sees the photo, SIRFS its diffuse image. Ways are
-those of `ways`; "network" is the network's own answer. Errors are
+photographed, each from one side; the network sees the photo, SIRFS its diffuse image. What is
+chosen on bodies of one `--half` can be reported on the other: they share no body. Ways are those
+of `ways`; "network" is the network's own answer. Errors are
 geometric means over photos, relative to no prediction at all, with the 95 % interval of resampled
 photos: mean angle of the normals, mean error of log shading but for its brightness (that of log
 reflectance is the same), and but for its brightness in each channel.
@@ -19,6 +20,8 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
+from zlib import crc32
 
 import numpy as np
 
@@ -40,9 +43,13 @@ from isc_core.shading.spherical_harmonics import (
 )
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.settings import PredictionWeights
+from training.world.files import HELD_OUT_OF
 from training.world.recipes import LightKind
 
 from .ways import Predictions, with_way
+
+if TYPE_CHECKING:
+    from training.world.view_batches import PreparedView
 
 WAYS = "-:-:-,network,.5:-:-,-:.5:-,-:-:1,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
 _LEAST_PIXELS = 1500
@@ -76,6 +83,7 @@ def lit_bodies(
     seed: int,
     light: str | None = None,
     side: int | None = None,
+    half: int | None = None,
 ) -> list[Lit]:
     """Light and photograph held-out opaque bodies, each from one side.
 
@@ -90,6 +98,8 @@ def lit_bodies(
         Kind of light; by default all kinds, as often as the network has seen them.
     side : int, optional
         Pixels of a photo's side; by default those of the network's frame.
+    half : int, optional
+        0 or 1: one half of the bodies; by default all.
 
     Returns
     -------
@@ -98,17 +108,16 @@ def lit_bodies(
     import torch
 
     from training.networks.scene_batches import read_world
-    from training.world.files import Split
     from training.world.recipes import Shares
     from training.world.samples import OUTPUT, Darkroom, draw_batch
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
-    found = read_world([world], panoramas, (Split.BODY,), 0)
+    found = read_world([world], panoramas, (), 0)
     shares = Shares(kinds=(1, 0, 0))
     if light is not None:
         shares = replace(shares, lights=tuple(float(kind.name == light) for kind in LightKind))
-    rng, made, bodies = np.random.default_rng(seed), list[Lit](), found.views[Split.BODY]
+    rng, made, bodies = np.random.default_rng(seed), list[Lit](), _held_out(world, half)
     for k in rng.permutation(len(bodies)):
         if len(made) == count:
             break
@@ -122,6 +131,33 @@ def lit_bodies(
         if mask.sum() > _LEAST_PIXELS:
             made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
     return made
+
+
+def _held_out(world: Path, half: int | None) -> "list[PreparedView]":
+    """Views of held-out bodies, ordered by size; those of one half, or all."""
+    from training.world.files import Split, views_in
+    from training.world.view_batches import prepared
+
+    views = views_in(world, Split.BODY)
+    made = [prepared(view) for view in views if half in (None, half_of(view.name))]
+    return sorted(made, key=lambda view: len(view.index))
+
+
+def half_of(name: str) -> int:
+    """Return the half of the held-out bodies that a body belongs to.
+
+    Parameters
+    ----------
+    name : str
+        Of the body. What precedes its last "-" is common to the parts of one piece of furniture.
+
+    Returns
+    -------
+    int
+        0 or 1.
+    """
+    whole = name.rpartition("-")[0] or name
+    return crc32(whole.encode()) // HELD_OUT_OF % 2
 
 
 def errors_of(
@@ -278,6 +314,7 @@ def main() -> None:
     add("--ways", default=WAYS, help="default: %(default)s")
     add("--light", choices=[kind.name for kind in LightKind], help="kind of light (default: all)")
     add("--illumination", default="photo", choices=ILLUMINATIONS, help="priors to use")
+    add("--half", type=int, choices=(0, 1), help="of the bodies (default: all)")
     add("--seed", type=int, default=0, help="of the photos")
     add("--workers", type=int, default=2, help="processes")
     add("--json", type=Path, help="file to write")
@@ -285,7 +322,9 @@ def main() -> None:
     ways = given.ways.split(",")
     try:
         network = None if given.weights is None else SceneNetwork.read(given.weights)
-        photos = lit_bodies(given.world, given.panoramas, given.count, given.seed, given.light)
+        photos = lit_bodies(
+            given.world, given.panoramas, given.count, given.seed, given.light, half=given.half
+        )
     except InputError as error:
         parser.error(str(error))
     run = partial(errors_of, ways=ways, illumination=given.illumination, network=network)
