@@ -16,8 +16,8 @@ INPUTS := pyproject.toml constraints.txt tools/setup.sh
 demo: .venv/.ready-demo
 	@echo "demo: rendering a glossy object"
 	@$(BIN)/python -m synth.demo_scene -o demo/input
-	@echo "demo: taking it apart"
-	@$(BIN)/isc decompose demo/input/photo.png -o demo/result
+	@echo "demo: taking it apart; the object is glossy, so likely highlights are removed, not only certain ones"
+	@$(BIN)/isc decompose demo/input/photo.png -o demo/result --highlight-odds 1
 	@echo "The photo:        demo/input/photo.png"
 	@echo "What came out:    demo/result/preview.png (look at this first)"
 	@echo "The textured mesh: demo/result/mesh.glb"

@@ -66,10 +66,10 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         colour = separate("isc", photo, mask, scene.clipped)
         marks = strongest_highlight(scene) if name == "marked" else None
         options = JointOptions(odds=float(odds)) if odds else None
-        split, residual = supported_layers(
+        layers = supported_layers(
             photo, colour, mask, options=options, clipped=scene.clipped, marks=marks
         )
-        return split.specular if residual is None else photo - residual.diffuse
+        return layers.split.specular if layers.residual is None else photo - layers.diffuse
     return separate(method, photo, mask, scene.clipped).specular
 
 
@@ -194,8 +194,8 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         photo = whole.resized_to_object(_SHEET_SIDE)
         image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
         colour = separate("isc", image, mask, photo.clipped)
-        split, residual = supported_layers(image, colour, mask, clipped=photo.clipped)
-        kept = split.specular if residual is None else image - residual.diffuse
+        layers = supported_layers(image, colour, mask, clipped=photo.clipped)
+        kept = layers.split.specular if layers.residual is None else image - layers.diffuse
         unit = max(float(np.quantile(image[mask], 0.995)), 1e-6)
         box = mask_slices(mask)
         column = [_padded(one[box] / unit) for one in (image, colour.specular, kept)]

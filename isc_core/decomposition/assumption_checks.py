@@ -27,6 +27,7 @@ from .layers import scale_confidence
 from .task import SceneEstimate
 
 _MUCH_CLIPPED = 0.1  # of the object; single highlights are smaller
+_MUCH_DOUBTFUL = 0.005  # of the light: a highlight of a hundredth of the object
 _RAGGED = 0.5  # of the mask outside blocks of 2 x 2 pixels, which no mesh covers
 LIKELY_CLEAR = 0.3  # probability of a mirror or glass
 LIKELY_SEVERAL = 0.6  # probability of several lamps
@@ -75,6 +76,24 @@ def check_photo(photo: Photo) -> tuple[AssumptionWarning, ...]:
     if ragged > _RAGGED:
         found.append(AssumptionWarning(WarningKind.RAGGED_MASK, round(ragged, 4)))
     return tuple(found)
+
+
+def check_highlights(diagnostics: Diagnostics) -> tuple[AssumptionWarning, ...]:
+    """Check whether much light stays that may be highlights.
+
+    Parameters
+    ----------
+    diagnostics : Diagnostics
+        Of the model.
+
+    Returns
+    -------
+    tuple of AssumptionWarning
+    """
+    share = diagnostics.doubtful_highlights or 0.0
+    if share < _MUCH_DOUBTFUL:
+        return ()
+    return (AssumptionWarning(WarningKind.DOUBTFUL_HIGHLIGHTS, share),)
 
 
 def share_in_blocks(mask: np.ndarray) -> float:
@@ -144,6 +163,6 @@ def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -
             "several": round(lamps.several, 4),
         },
         several_lights=round(lamps.several, 4),
-        warnings=warnings + check_photo(maps),
+        warnings=warnings + check_photo(maps) + check_highlights(estimate.diagnostics),
     )
     return replace(estimate, split=split, diagnostics=diagnostics)

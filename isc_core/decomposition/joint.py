@@ -55,7 +55,7 @@ from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation import HIGHLIGHT_ODDS
 from ..separation.support.clipped_texture import continue_under_clipped
-from ..separation.support.highlight_evidence import supported
+from ..separation.support.highlight_evidence import judged_highlights
 from ..separation.support.light_tint import limit_tint
 from ..separation.support.sure_ratio import SureRatioOptions, highlights_stand_out, sure_ratio
 from .layers import separated_first, shaded
@@ -118,6 +118,30 @@ class ResidualHighlights:
 
 
 @dataclass(frozen=True)
+class SupportedLayers:
+    """What colour and form support together.
+
+    Attributes
+    ----------
+    split : Separation
+        By colour; where nothing supports a highlight, diffuse is the image and the rest 0.
+    residual : ResidualHighlights or None
+        What form adds; None if nothing.
+    doubtful : float
+        See `highlight_evidence.Judgement`.
+    """
+
+    split: Separation
+    residual: ResidualHighlights | None
+    doubtful: float
+
+    @property
+    def diffuse(self) -> np.ndarray:
+        """The diffuse image (H, W, 3) of both."""
+        return self.split.diffuse if self.residual is None else self.residual.diffuse
+
+
+@dataclass(frozen=True)
 class JointStep:
     """Shape and light of D_1, and the diffuse image after the step.
 
@@ -163,7 +187,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     split, layers = separated_first(task)
     task = replace(task, split=None)
     with task.clock.stage("separation"):
-        layers, residual = supported_layers(
+        support = supported_layers(
             working.image,
             layers,
             working.mask,
@@ -172,6 +196,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
             working.clipped,
             working.marks,
         )
+    layers, residual = support.split, support.residual
     weight = confidence_weight(
         without_unreliable(layers.confidence, residual), task.settings.confidence_weights
     )
@@ -181,7 +206,12 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
         outcome = JointOutcome.CONTINUED if step.kept else JointOutcome.REMOVED
     split = _split(layers if task.one_scale else split, residual, step, task, options)
     lobe = fit_specular(split, step.shape, task, monitor.part(0.92, 0.96))
-    diagnostics = replace(step.shape.diagnostics, lobe=lobe.diagnostics, joint=outcome)
+    diagnostics = replace(
+        step.shape.diagnostics,
+        lobe=lobe.diagnostics,
+        joint=outcome,
+        doubtful_highlights=round(support.doubtful, 4),
+    )
     return SceneEstimate(split, step.shape.height, step.shape.light, diagnostics, lobe.brdf)
 
 
@@ -213,7 +243,7 @@ def supported_layers(
     options: JointOptions | None = None,
     clipped: np.ndarray | None = None,
     marks: HighlightMarks | None = None,
-) -> tuple[Separation, ResidualHighlights | None]:
+) -> SupportedLayers:
     """Add what form shows of highlights to what colour shows, and keep what both support.
 
     Parameters
@@ -235,18 +265,15 @@ def supported_layers(
 
     Returns
     -------
-    split : Separation
-        By colour; where nothing supports a highlight, diffuse is the image and the rest 0.
-    residual : ResidualHighlights or None
-        What form adds; None if nothing.
+    SupportedLayers
     """
     options, seen = options or JointOptions(), seen or predict_scene(image, mask)
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale
-    kept = supported(image, cleaner, mask, *form, options.odds, marks, clipped)
-    hidden = _hidden(kept, clipped, mask)
-    kept |= hidden
+    judged = judged_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
+    hidden = _hidden(judged.kept, clipped, mask)
+    kept = judged.kept | hidden
     split = replace(
         split,
         diffuse=_given_back(split.diffuse, image, kept, mask),
@@ -261,8 +288,10 @@ def supported_layers(
         diffuse = diffuse if residual is not None else diffuse.copy()
         np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
-        return split, ResidualHighlights(diffuse, residual.unreliable & kept)
-    return _with_diffuse(split, diffuse) if hidden.any() else split, None
+        added = ResidualHighlights(diffuse, residual.unreliable & kept)
+        return SupportedLayers(split, added, judged.doubtful)
+    split = _with_diffuse(split, diffuse) if hidden.any() else split
+    return SupportedLayers(split, None, judged.doubtful)
 
 
 def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> np.ndarray:
@@ -466,7 +495,7 @@ def _split(
     """
     photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale and (residual is not None or start.specular.any()):
-        start, of_maps = supported_layers(
+        of_maps = supported_layers(
             photo.image,
             start,
             photo.mask,
@@ -475,7 +504,7 @@ def _split(
             photo.clipped,
             photo.marks,
         )
-        residual = None if residual is None else of_maps
+        start, residual = of_maps.split, None if residual is None else of_maps.residual
         if residual is not None:
             diffuse = residual.diffuse
             if step.kept:

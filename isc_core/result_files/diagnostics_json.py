@@ -86,6 +86,7 @@ def diagnostics_from_json(status: Any) -> Diagnostics:
         evaluations=_count(status.get("evaluations")),
         joint=_member(JointOutcome, status.get("joint"))
         or _old_meaning(_OLD_JOINT, status.get("joint")),
+        doubtful_highlights=_number(status.get("doubtful_highlights")),
         lobe=_old_lobe(status.get("gloss")) if old else _lobe(status.get("lobe")),
         light_colour=_light_colour(status.get("light_colour")),
         photo_colours=_member(PhotoColours, status.get("photo_colours")),

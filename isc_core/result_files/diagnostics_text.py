@@ -76,6 +76,9 @@ _WARNINGS = {
     WarningKind.RAGGED_MASK: (
         "{share}of the mask is too thin or ragged for a mesh, such as hair: fill the mask"
     ),
+    WarningKind.DOUBTFUL_HIGHLIGHTS: (
+        "{share}of the light stays, but may be highlights: mark them, or require lower odds"
+    ),
 }
 
 

@@ -156,12 +156,15 @@ class WarningKind(StrEnum):
         Much of the object is clipped; the value is its share.
     RAGGED_MASK
         The mask is thin or ragged; the value is the share that no mesh can cover.
+    DOUBTFUL_HIGHLIGHTS
+        Much light may be highlights, but not certainly, and stays; the value is its share.
     """
 
     MIRROR_OR_GLASS = "mirror or glass"
     SEVERAL_LIGHTS = "several lights"
     CLIPPED = "clipped"
     RAGGED_MASK = "ragged mask"
+    DOUBTFUL_HIGHLIGHTS = "doubtful highlights"
 
 
 @dataclass(frozen=True)
@@ -272,6 +275,8 @@ class Diagnostics:
         The solver's work.
     joint : JointOutcome or None
         What the model joint did beyond MDR.
+    doubtful_highlights : float or None
+        Share of the light that is likelier a highlight than print, but not certainly: it stays.
     lobe : LobeDiagnostics or None
         The fitted lobe.
     light_colour : LightColourDiagnostics or None
@@ -297,6 +302,7 @@ class Diagnostics:
     iterations: int | None = None
     evaluations: int | None = None
     joint: JointOutcome | None = None
+    doubtful_highlights: float | None = None
     lobe: LobeDiagnostics | None = None
     light_colour: LightColourDiagnostics | None = None
     photo_colours: PhotoColours | None = None
@@ -317,6 +323,7 @@ class Diagnostics:
             "iterations": self.iterations,
             "evaluations": self.evaluations,
             "joint": self.joint and self.joint.value,
+            "doubtful_highlights": self.doubtful_highlights,
             "lobe": lobe
             and {
                 "status": lobe.status.value,

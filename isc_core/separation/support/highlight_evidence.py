@@ -166,7 +166,23 @@ def _saturation(image: np.ndarray, dark: float) -> np.ndarray:
     return np.asarray((high - smallest(image)) / (high + dark))
 
 
-def supported(
+@dataclass(frozen=True)
+class Judgement:
+    """Which removed light was a highlight.
+
+    Attributes
+    ----------
+    kept : (H, W) ndarray of bool
+        False in regions that give their light back, and outside of all regions.
+    doubtful : float
+        Of the image's light: regions that give it back, though a highlight is likelier than print.
+    """
+
+    kept: np.ndarray
+    doubtful: float
+
+
+def judged_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
@@ -175,7 +191,7 @@ def supported(
     odds: float,
     marks: HighlightMarks | None = None,
     clipped: np.ndarray | None = None,
-) -> np.ndarray:
+) -> Judgement:
     """Decide where removed light was a highlight.
 
     Parameters
@@ -197,16 +213,26 @@ def supported(
 
     Returns
     -------
-    (H, W) ndarray of bool
-        False in regions that give their light back, and outside of all regions.
+    Judgement
     """
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale, clipped)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
     kept = np.isin(seen.labels, seen.numbers[np.exp(score) > odds])
+    doubtful = np.isin(seen.labels, seen.numbers[score > 0]) & ~kept
     if marks:
-        kept |= _marked(seen.labels, marks.highlights, mask)
-        kept &= ~_marked(seen.labels, marks.paint, mask)
-    return kept
+        lit, paint = (_marked(seen.labels, one, mask) for one in (marks.highlights, marks.paint))
+        kept, doubtful = (kept | lit) & ~paint, doubtful & ~lit & ~paint
+    return Judgement(kept, _share_of_light(image, diffuse, doubtful, mask))
+
+
+def _share_of_light(
+    image: np.ndarray, diffuse: np.ndarray, where: np.ndarray, mask: np.ndarray
+) -> float:
+    """Light of the image that the diffuse image lacks there, of all on the object."""
+    if not where.any():
+        return 0.0
+    lost = image[where].astype(float) - diffuse[where]
+    return float(lost.sum() / max(float(image[mask].sum(dtype=float)), 1e-12))
 
 
 def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np.ndarray:

@@ -123,7 +123,7 @@ def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
 @pytest.mark.slow
 def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
     d = grey_ball(20)
-    _, start = supported_layers(d.image, mdr(task_of(d)).split, d.mask)
+    start = supported_layers(d.image, mdr(task_of(d)).split, d.mask).residual
     assert start is not None and start.unreliable.any()
     found = joint(task_of(d), JointOptions(change_of_variables=-1e6))
     np.testing.assert_array_equal(found.split.diffuse, start.diffuse)

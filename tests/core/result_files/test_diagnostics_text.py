@@ -183,7 +183,7 @@ def test_a_note_is_one_short_line_that_says_what_to_do() -> None:
         *(warning_text(AssumptionWarning(kind, 0.23)) for kind in WarningKind),
     ]
     assert all(len(note) <= 100 and "\n" not in note for note in notes)
-    doing = ("try", "photograph", "use", "dull", "reduce", "fill")
+    doing = ("try", "photograph", "use", "dull", "reduce", "fill", "mark")
     assert all(any(f" {verb} " in note for verb in doing) for note in notes)
     every = replace(ALL, warnings=tuple(AssumptionWarning(kind, 0.5) for kind in WarningKind))
     lines = note_lines(every)

@@ -1,5 +1,7 @@
 """Print and highlights on balls of known paint: what colour and form together take off."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
 from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import HIGHLIGHT_ODDS, separate
-from isc_core.separation.support.highlight_evidence import highlight_evidence, supported
+from isc_core.separation.support.highlight_evidence import highlight_evidence, judged_highlights
 
 RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
 SIDE = 96
@@ -30,6 +32,10 @@ def ball(stripe: float = 0.0, gloss: float = 0.0) -> tuple[np.ndarray, np.ndarra
     spot = gloss * np.exp(-((x + 0.2) ** 2 + (y - 0.25) ** 2) / 0.012)
     photo = diffuse + np.where(mask, spot, 0)[..., None]
     return photo.astype(np.float32), diffuse.astype(np.float32), mask
+
+
+def supported(*evidence: Any, **options: Any) -> np.ndarray:
+    return judged_highlights(*evidence, **options).kept
 
 
 def form(photo: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -54,19 +60,32 @@ def test_white_paint_of_which_form_is_not_sure_is_given_back() -> None:
     assert not supported(photo, removed, mask, 0.1 * ratio, scale, HIGHLIGHT_ODDS).any()
 
 
+def test_likely_highlights_that_stay_are_counted() -> None:
+    photo, diffuse, mask = ball(gloss=0.4)
+    evidence = photo, diffuse, mask, *form(photo, diffuse)
+    share = float((photo - diffuse)[mask].sum() / photo[mask].sum())
+    strict = judged_highlights(*evidence, odds=1e9)
+    assert not strict.kept.any() and strict.doubtful == pytest.approx(share, rel=0.05)
+    assert judged_highlights(*evidence, odds=HIGHLIGHT_ODDS).doubtful == 0
+    rows, columns = np.nonzero((photo - diffuse).sum(axis=2) > 0.5)
+    place = (int(columns[0]), int(rows[0]))
+    for marks in (HighlightMarks((place,)), HighlightMarks((), (place,))):
+        assert judged_highlights(*evidence, odds=1e9, marks=marks).doubtful == 0
+
+
 @pytest.mark.parametrize("stripe", [0.05, 0.12, 0.3])
 def test_a_sharp_white_stripe_on_a_matt_ball_stays_bit_for_bit(stripe: float) -> None:
     photo, _, mask = ball(stripe=stripe)
-    split, added = supported_layers(photo, separate("isc", photo, mask), mask)
-    assert added is None
+    layers = supported_layers(photo, separate("isc", photo, mask), mask)
+    split = layers.split
+    assert layers.residual is None
     np.testing.assert_array_equal(split.diffuse, photo)
     assert not split.specular.any() and not split.residual.any()
 
 
 def test_a_true_highlight_on_a_ball_is_still_separated() -> None:
     photo, diffuse, mask = ball(gloss=0.4)
-    split, added = supported_layers(photo, separate("isc", photo, mask), mask)
-    found = split.diffuse if added is None else added.diffuse
+    found = supported_layers(photo, separate("isc", photo, mask), mask).diffuse
     nothing = np.square((photo - diffuse)[mask]).sum()
     assert np.square((found - diffuse)[mask]).sum() < 0.5 * nothing
 
@@ -207,8 +226,7 @@ def test_paint_is_continued_under_a_clipped_highlight_and_beside_it() -> None:
     clipped = (photo >= 1).any(axis=2) & mask
     photo = np.minimum(photo, 1)
     start = separate("isc", photo, mask, clipped)
-    split, added = supported_layers(photo, start, mask, clipped=clipped)
-    found = split.diffuse if added is None else added.diffuse
+    found = supported_layers(photo, start, mask, clipped=clipped).diffuse
     bright = (photo - diffuse).sum(axis=2) > 0.6
     assert (bright & ~clipped).any() and (bright & clipped).any()
     np.testing.assert_allclose(found[bright], diffuse[bright], atol=0.12)
