@@ -304,7 +304,7 @@ def fit_to_photos(
         See `Darkroom`.
     """
     if options.device != "cpu":
-        draw = replace(draw, every=_GPU_EVERY)
+        draw = replace(draw, every=_GPU_EVERY, calls=count())
     made = SceneBatches(draw, bank, side, alter, options.device)
     held_out = SceneBatches(judged, bank, side, alter, options.device)
     fit(network, draw, schedule, options, held_out, made.finished)
