@@ -1,6 +1,31 @@
-"""What the device that fits a network is good at."""
+"""Which devices can fit a network, and what they are good at."""
+
+import argparse
 
 import torch
+
+
+def available_device(name: str) -> str:
+    """Return the name of a device that is there; the type of a command-line option.
+
+    Parameters
+    ----------
+    name : {"cpu", "cuda"}
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If the name is unknown, or PyTorch finds no such device.
+    """
+    if name not in ("cpu", "cuda"):
+        raise argparse.ArgumentTypeError(f"unknown device {name!r}: cpu or cuda")
+    if name == "cuda" and not torch.cuda.is_available():
+        raise argparse.ArgumentTypeError("PyTorch finds no CUDA device: leave out --device")
+    return name
 
 
 def halves_are_fast(device: str) -> bool:

@@ -31,7 +31,7 @@ from torch import nn
 
 from isc_core.io.atomic import new_file
 
-from .devices import halves_are_fast
+from .devices import available_device, halves_are_fast
 
 _REPORT_EVERY, _CHECKPOINT_EVERY = 100, 1000  # steps
 _VALIDATION_BATCHES = 8
@@ -154,7 +154,7 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
         default=0,
         help="processes that draw samples; 0, the default: none, the fastest on a CPU",
     )
-    add("--device", default="cpu", choices=("cpu", "cuda"), help="default: %(default)s")
+    add("--device", default="cpu", type=available_device, help="cpu or cuda (default: %(default)s)")
     add("--minutes", type=float, default=0, help="end after so long (default: after --steps)")
     add("--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint")
 

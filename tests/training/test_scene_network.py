@@ -10,6 +10,7 @@ pytest.importorskip("torch")
 
 import torch
 
+from isc_core.errors import InputError
 from isc_core.networks.scene_network import (
     CHANNELS,
     FACTORS,
@@ -21,6 +22,7 @@ from isc_core.networks.scene_network import (
     SceneNetwork,
     channels_of,
 )
+from training.networks.highlight_module import HighlightNetworkModule
 from training.networks.scene_module import SceneNetworkModule, light_surprise, network_channels
 from training.world.samples import OBJECT, OUTPUT, Sample
 
@@ -221,3 +223,11 @@ def test_the_likelihood_of_light_is_that_of_a_gaussian_of_low_rank() -> None:
     )
     expected = -gauss.log_prob(error) / LIGHT
     torch.testing.assert_close(light_surprise(error, log_scale, factors), expected)
+
+
+def test_weights_of_another_network_are_refused_in_one_line() -> None:
+    arrays = module(4).arrays()
+    del arrays["normalisation"]
+    for wrong in (arrays, HighlightNetworkModule().arrays()):
+        with pytest.raises(InputError, match="weights of another network"):
+            SceneNetworkModule.of(wrong)

@@ -1,5 +1,6 @@
 """A training runs, resumes, and exports weights that the core reads."""
 
+import argparse
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ pytest.importorskip("torch")
 import torch
 
 from isc_core.networks.scene_network import SceneNetwork
+from training.devices import available_device
 from training.loop import RunOptions, fit
 from training.networks.scene_module import SceneNetworkModule
 from training.networks.scene_network import SCHEDULE
@@ -74,3 +76,12 @@ def test_another_networks_checkpoint_is_refused(tmp_path: Path) -> None:
     torch.save({"weights": torch.zeros(1)}, tmp_path / "other.pt")
     with pytest.raises(ValueError, match="not a training checkpoint"):
         fit(other, draw, SCHEDULE, options(path, resume=tmp_path / "other.pt"))
+
+
+def test_a_device_that_is_not_there_is_refused_in_one_line() -> None:
+    assert available_device("cpu") == "cpu"
+    with pytest.raises(argparse.ArgumentTypeError, match="unknown device"):
+        available_device("tpu")
+    if not torch.cuda.is_available():
+        with pytest.raises(argparse.ArgumentTypeError, match="leave out --device"):
+            available_device("cuda")

@@ -48,14 +48,14 @@ def main() -> None:
     arguments = parser.parse_args()
     options = run_options(arguments)
     torch.manual_seed(options.seed)
+    network = MaskNetworkModule()
     try:
         learned, judged = (Ingredients.read(arguments.folder, k) for k in ("learned", "judged"))
         weights = None if arguments.weights is None else read_arrays(arguments.weights)
+        network.begin(weights)
     except InputError as error:
         parser.error(str(error))
     unvaried = Composites(judged, options.batch, arguments.side)
-    network = MaskNetworkModule()
-    network.begin(weights)
     fit(
         network,
         Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),

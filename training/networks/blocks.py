@@ -11,6 +11,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.errors import InputError
+
 
 class Convolution(nn.Module):  # type: ignore[misc]
     """A 3 x 3 convolution without bias, whose weights are one matrix.
@@ -193,7 +195,24 @@ def load_arrays(
     dense : mapping of str to Linear
     arrays : mapping of str to ndarray
         Content of an archive.
+
+    Raises
+    ------
+    InputError
+        If they are the weights of another network.
     """
+    try:
+        _load(pairs, out, dense, arrays)
+    except (KeyError, RuntimeError) as error:
+        raise InputError(f"these are the weights of another network: {error}") from error
+
+
+def _load(
+    pairs: Sequence[tuple[Convolution, nn.BatchNorm2d]],
+    out: nn.Conv2d,
+    dense: Mapping[str, nn.Linear],
+    arrays: Mapping[str, np.ndarray],
+) -> None:
     states, last = arrays["normalisation"], len(pairs)
     with torch.no_grad():
         for k, (convolution, norm) in enumerate(pairs):

@@ -87,12 +87,12 @@ def main() -> None:
     arguments = parser.parse_args()
     options = run_options(arguments)
     torch.manual_seed(options.seed)
+    network = HighlightNetworkModule()
     try:
         world, start = read_given(arguments, options.seed)
+        network.begin(start)
     except InputError as error:
         parser.error(str(error))
-    network = HighlightNetworkModule()
-    network.begin(start)
     draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,

@@ -57,10 +57,10 @@ def main() -> None:
     torch.manual_seed(options.seed)
     try:
         world, start = read_given(arguments, options.seed)
+        widths = tuple(arguments.widths)
+        network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
     except InputError as error:
         parser.error(str(error))
-    widths = tuple(arguments.widths)
-    network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
     schedule = replace(SCHEDULE, rate=arguments.rate)
     shares = Shares(stretch=_STRETCH)
     for name in arguments.without:
