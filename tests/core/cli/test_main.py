@@ -538,17 +538,9 @@ def test_priors_are_fitted_to_the_chosen_objects(
     root, path = shared / "data" / "mit_berkeley_train", tmp_path / "priors.npz"
     assert isc("fit-priors", root, "--objects", "box", "-o", path) == 2
     assert "at least two" in capfd.readouterr().err
-    left_out = "cup1,dinosaur,panther"
+    left_out = "apple,cup1,dinosaur,panther,paper1,phone,squirrel"
     assert isc("fit-priors", root, "--leave-out", left_out, "--quiet", "-o", path) == 0
-    assert load_prior_set(path).record.objects == (
-        "apple",
-        "box",
-        "frog1",
-        "paper1",
-        "phone",
-        "squirrel",
-        "teabag2",
-    )
+    assert load_prior_set(path).record.objects == ("box", "frog1", "teabag2")
     assert (
         isc("decompose", ball_photo(tmp_path), "--priors", path, "--quiet", "-o", tmp_path / "out")
         == 0
