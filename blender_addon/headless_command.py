@@ -18,6 +18,8 @@ from isc_core.cli.interface.values import count, positive, texture_size, whole
 from isc_core.errors import Cancelled, InputError
 from isc_core.extras import install_command
 
+from .worker.commands import CERTAIN
+
 DONE, INVALID_INPUT, CANCELLED = 0, 2, 130
 
 
@@ -197,8 +199,8 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
     )
     add(
         "--highlight-odds",
-        default="4",
-        choices=("4", "1", "0"),
+        default=CERTAIN,
+        choices=(CERTAIN, "1", "0"),
         help="highlights to remove: certain, likely or all, as in isc decompose "
         "(default: %(default)s)",
     )

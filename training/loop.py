@@ -224,7 +224,7 @@ def fit(
     draw_validation : callable, optional
         Draws a finished batch of held-out subjects. The same ones are used at every evaluation.
     prepare : callable, optional
-        Makes what the network's loss takes of what was drawn, on the device.
+        Makes what the network's loss takes of what was drawn.
 
     Returns
     -------
@@ -241,7 +241,7 @@ def fit(
     network.to(options.device)
     torch.backends.cudnn.benchmark = True  # batches have one size: the fastest kernels for it
     optimizers = _optimizers(network, schedule, options.device)
-    held_out = _validation_batches(draw_validation, options)
+    held_out = [batch.to(options.device) for batch in _validation_batches(draw_validation, options)]
     average, clock = copy.deepcopy(network).eval(), _Clock(options)
     if options.resume is not None:
         clock.resume(_restore(_checkpoint(options.resume), network, average, optimizers))
@@ -251,7 +251,7 @@ def fit(
         share = _rate_share(clock.step, clock.progress, schedule.warm_up)
         for group in chain(*(one.param_groups for one in optimizers)):
             group["lr"] = share * schedule.rate
-        loss, terms = network.loss(prepare(next(batches)))
+        loss, terms = network.loss(prepare(next(batches)).to(options.device))
         network.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)

@@ -218,8 +218,8 @@ def report(photos: Sequence[CheckedPhoto], network: SceneNetwork) -> None:
         if photo.name and kinds:
             names = ", ".join(sorted(kind.name.lower().replace("_", " ") for kind in kinds))
             lines.append(f"{photo.group}: {photo.name}: {names}")
-    known = [(photo.truth, scene) for photo, scene in zip(photos, scenes, strict=True)]
-    lines += distinctions([(truth, scene) for truth, scene in known if truth is not None])
+    pairs = zip(photos, scenes, strict=True)
+    lines += distinctions([(one.truth, scene) for one, scene in pairs if one.truth is not None])
     sys.stdout.write("\n".join(lines) + "\n")
 
 

@@ -117,6 +117,7 @@ def balanced_scenes(
         matte=0,
     )
     rng, made, bodies = np.random.default_rng(seed), list[Scene](), found.views[Split.BODY]
+    store = ViewStore(bodies)
 
     def balanced(view: int) -> "Sample":
         draw = draw_batch(bodies, np.array([view]), 1, found.atlas, found.judged, rng, shares)
@@ -124,7 +125,7 @@ def balanced_scenes(
         colour = _balance(*pictures[int(draw.recipes["environment"][0])], turn, balance, rng)
         ambient = torch.from_numpy(1 / colour[None]).float()
         return Darkroom(found.bank, 1, _SIDE)(
-            replace(draw, recipes={**draw.recipes, "ambient": ambient}), ViewStore(bodies)
+            replace(draw, recipes={**draw.recipes, "ambient": ambient}), store
         )
 
     for view in rng.permutation(len(bodies)):

@@ -26,7 +26,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from isc_core.decomposition.joint import JointOptions, supported_layers
+from isc_core.decomposition.joint import JointOptions, SupportedLayers, supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
@@ -69,8 +69,13 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         layers = supported_layers(
             photo, colour, mask, options=options, clipped=scene.clipped, marks=marks
         )
-        return layers.split.specular if layers.residual is None else photo - layers.diffuse
+        return _taken(layers, photo)
     return separate(method, photo, mask, scene.clipped).specular
+
+
+def _taken(layers: SupportedLayers, photo: np.ndarray) -> np.ndarray:
+    """Specular light of the joint model's layers."""
+    return layers.split.specular if layers.residual is None else photo - layers.diffuse
 
 
 def strongest_highlight(scene: PrintScene) -> HighlightMarks:
@@ -195,7 +200,7 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
         colour = separate("isc", image, mask, photo.clipped)
         layers = supported_layers(image, colour, mask, clipped=photo.clipped)
-        kept = layers.split.specular if layers.residual is None else image - layers.diffuse
+        kept = _taken(layers, image)
         unit = max(float(np.quantile(image[mask], 0.995)), 1e-6)
         box = mask_slices(mask)
         column = [_padded(one[box] / unit) for one in (image, colour.specular, kept)]

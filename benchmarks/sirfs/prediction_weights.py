@@ -20,7 +20,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 from zlib import crc32
 
 import numpy as np
@@ -47,9 +46,6 @@ from training.world.files import HELD_OUT_OF
 from training.world.recipes import LightKind
 
 from .ways import Predictions, with_way
-
-if TYPE_CHECKING:
-    from training.world.view_batches import PreparedView
 
 WAYS = "-:-:-,network,.5:-:-,-:.5:-,-:-:1,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
 _LEAST_PIXELS = 1500
@@ -108,21 +104,23 @@ def lit_bodies(
     import torch
 
     from training.networks.scene_batches import read_world
+    from training.world.files import Split
     from training.world.recipes import Shares
     from training.world.samples import OUTPUT, Darkroom, draw_batch
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
-    found = read_world([world], panoramas, (), 0)
+    found = read_world([world], panoramas, (Split.BODY,), 0)
     shares = Shares(kinds=(1, 0, 0))
     if light is not None:
         shares = replace(shares, lights=tuple(float(kind.name == light) for kind in LightKind))
-    rng, made, bodies = np.random.default_rng(seed), list[Lit](), _held_out(world, half)
+    bodies = [one for one in found.views[Split.BODY] if half in (None, half_of(one.name))]
+    rng, made, store = np.random.default_rng(seed), list[Lit](), ViewStore(bodies)
     for k in rng.permutation(len(bodies)):
         if len(made) == count:
             break
         draw = draw_batch(bodies, np.array([k]), 1, found.atlas, found.judged, rng, shares)
-        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw, ViewStore(bodies))
+        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw, store)
         mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
         photo, ratio, normal, shading = (
             part[0].permute(1, 2, 0).numpy()
@@ -131,16 +129,6 @@ def lit_bodies(
         if mask.sum() > _LEAST_PIXELS:
             made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
     return made
-
-
-def _held_out(world: Path, half: int | None) -> "list[PreparedView]":
-    """Views of held-out bodies, ordered by size; those of one half, or all."""
-    from training.world.files import Split, views_in
-    from training.world.view_batches import prepared
-
-    views = views_in(world, Split.BODY)
-    made = [prepared(view) for view in views if half in (None, half_of(view.name))]
-    return sorted(made, key=lambda view: len(view.index))
 
 
 def half_of(name: str) -> int:

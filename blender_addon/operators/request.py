@@ -15,6 +15,7 @@ from isc_core.photo.names import PHOTO_SUFFIXES
 from ..datablocks.provenance import KEY, SOURCE_IMAGE
 from ..files.image_source import ImageSource, inspect_image
 from ..scene.preparation import OWN_SHADOWS, BuildOptions
+from ..worker.commands import CERTAIN
 
 _SUFFIXES = (*PHOTO_SUFFIXES, ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"
@@ -55,7 +56,7 @@ class MethodSettings:
     samples: int = 64
     camera: str = "auto"
     texture_size: str = "photo"
-    highlight_odds: str = "4"
+    highlight_odds: str = CERTAIN
     highlights: str = ""
     not_highlights: str = ""
     refine: bool = False

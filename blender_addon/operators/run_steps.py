@@ -25,6 +25,7 @@ from ..files.result_cache import ResultCache, content_key
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
 from ..scene.things import prepare_things
 from ..worker.commands import (
+    CERTAIN,
     Box,
     DecomposeJob,
     Points,
@@ -127,7 +128,7 @@ def decompose_steps(
         transfer=photo.transfer,
         camera=method.camera,
         texture_size=method.texture_size,
-        highlight_odds=method.highlight_odds if method.model == "joint" else "4",
+        highlight_odds=method.highlight_odds if method.model == "joint" else CERTAIN,
         highlights=highlights,
         not_highlights=not_highlights,
         each=place.build.each,

@@ -22,6 +22,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..worker.commands import CERTAIN
 from .presets import CUSTOM, PRESETS, matching_preset
 
 EnumItem = tuple[str, str, str, int]
@@ -58,7 +59,11 @@ MODELS = _numbered(
     ("sfs-ikeuchi-horn", "Ikeuchi-Horn", "Baseline: regularized shape from shading"),
 )
 HIGHLIGHT_ODDS = _numbered(
-    ("4", "Certain", "Remove certain highlights only; print stays, and some highlights with it"),
+    (
+        CERTAIN,
+        "Certain",
+        "Remove certain highlights only; print stays, and some highlights with it",
+    ),
     ("1", "Likely", "Remove what is more likely a highlight than print, including some print"),
     ("0", "All", "Remove everything that looks like a highlight, including print"),
 )
@@ -279,7 +284,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Remove Highlights",
         description="Which highlights to remove from the base color if they could also be print",
         items=HIGHLIGHT_ODDS,
-        default="4",
+        default=CERTAIN,
     )
     refine: BoolProperty(
         name="Refine Gloss",

@@ -13,6 +13,8 @@ from .process import WorkerProcess
 Box = tuple[int, int, int, int]
 Points = Sequence[tuple[int, int]]
 """Left, top, width and height in pixels, from the photo's upper left corner."""
+CERTAIN = "4"
+"""The core's default of `--highlight-odds`; its module is not among those that Blender loads."""
 
 _INHERITED = (
     "PATH",
@@ -89,7 +91,7 @@ class DecomposeJob:
     transfer: str = "auto"
     camera: str = "auto"
     texture_size: str = "photo"
-    highlight_odds: str = "4"
+    highlight_odds: str = CERTAIN
     highlights: tuple[tuple[int, int], ...] = ()
     not_highlights: tuple[tuple[int, int], ...] = ()
     each: bool = False

@@ -55,14 +55,12 @@ def main() -> None:
         network.begin(weights)
     except InputError as error:
         parser.error(str(error))
-    unvaried = Composites(judged, options.batch, arguments.side)
     fit(
         network,
         Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),
         replace(SCHEDULE, rate=arguments.rate),
         options,
-        lambda rng: unvaried(rng).to(options.device),
-        lambda batch: batch.to(options.device),
+        Composites(judged, options.batch, arguments.side),
     )
 
 

@@ -202,27 +202,18 @@ def load_arrays(
         If they are the weights of another network.
     """
     try:
-        _load(pairs, out, dense, arrays)
+        states, last = arrays["normalisation"], len(pairs)
+        with torch.no_grad():
+            for k, (convolution, norm) in enumerate(pairs):
+                state, states = states[:, : norm.num_features], states[:, norm.num_features :]
+                restore(convolution, norm, arrays[f"weight{k:02d}"], state)
+            out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
+            out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
+            for name, layer in dense.items():
+                layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
+                layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
     except (KeyError, RuntimeError) as error:
         raise InputError(f"these are the weights of another network: {error}") from error
-
-
-def _load(
-    pairs: Sequence[tuple[Convolution, nn.BatchNorm2d]],
-    out: nn.Conv2d,
-    dense: Mapping[str, nn.Linear],
-    arrays: Mapping[str, np.ndarray],
-) -> None:
-    states, last = arrays["normalisation"], len(pairs)
-    with torch.no_grad():
-        for k, (convolution, norm) in enumerate(pairs):
-            state, states = states[:, : norm.num_features], states[:, norm.num_features :]
-            restore(convolution, norm, arrays[f"weight{k:02d}"], state)
-        out.weight.copy_(kernel_of(arrays[f"weight{last:02d}"]))
-        out.bias.copy_(torch.from_numpy(arrays[f"bias{last:02d}"].astype(np.float32)))
-        for name, layer in dense.items():
-            layer.weight.copy_(torch.from_numpy(arrays[f"{name}_weight"].astype(np.float32).T))
-            layer.bias.copy_(torch.from_numpy(arrays[f"{name}_bias"].astype(np.float32)))
 
 
 def restore(

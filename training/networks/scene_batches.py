@@ -56,7 +56,7 @@ class SceneDraws:
     every : int
         Views are lit for one batch in so many, for all of these at once.
     calls : iterator of int
-        Counts the batches.
+        Counts the batches; a copy counts its own.
     """
 
     views: list[PreparedView]
@@ -67,7 +67,7 @@ class SceneDraws:
     plain_camera: bool = False
     photos: int = PHOTOS
     every: int = 1
-    calls: Iterator[int] = field(default_factory=count)
+    calls: Iterator[int] = field(init=False, default_factory=count)
 
     def __call__(self, rng: np.random.Generator) -> Draw:
         """Draw a batch.
@@ -304,7 +304,7 @@ def fit_to_photos(
         See `Darkroom`.
     """
     if options.device != "cpu":
-        draw = replace(draw, every=_GPU_EVERY, calls=count())
+        draw = replace(draw, every=_GPU_EVERY)
     made = SceneBatches(draw, bank, side, alter, options.device)
     held_out = SceneBatches(judged, bank, side, alter, options.device)
     fit(network, draw, schedule, options, held_out, made.finished)

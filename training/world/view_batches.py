@@ -24,6 +24,8 @@ class PreparedView:
 
     Attributes
     ----------
+    name : str
+        The body's.
     index : (N,) int64 ndarray
         Pixel of the picture, row by row.
     surface : (N, 10) float32 ndarray
@@ -33,6 +35,7 @@ class PreparedView:
     directions : (DIRECTIONS, 3) float32 ndarray
     """
 
+    name: str
     index: np.ndarray
     surface: np.ndarray
     reached: np.ndarray
@@ -56,6 +59,7 @@ def prepared(view: View) -> PreparedView:
     visible = np.unpackbits(view.visible, axis=1)
     facing = np.rint(255 * np.clip(normal @ view.directions.T, 0, 1)).astype(np.uint8)
     return PreparedView(
+        view.name,
         np.flatnonzero(view.mask),
         np.hstack([normal, *_places(view), thickness]).astype(np.float32),
         visible * facing,
@@ -105,25 +109,22 @@ def batch_of(views: Sequence[PreparedView]) -> ViewBatch:
     ViewBatch
         On the CPU.
     """
-    longest, count = max(len(view.index) for view in views), len(views)
-    index = np.full((count, longest), SIDE * SIDE)
-    surface = np.zeros((count, longest, 10), np.float32)
-    reached = np.zeros((count, longest, DIRECTIONS), np.uint8)
-    surface[..., 2] = surface[..., 8] = 1
-    for k, view in enumerate(views):
-        pixels = slice(len(view.index))
-        index[k, pixels], surface[k, pixels] = view.index, view.surface
-        reached[k, pixels] = view.reached
-    normal, position, toward, thickness = torch.from_numpy(surface).split([3, 3, 3, 1], dim=-1)
+    return filled_up([_alone(view) for view in views])
+
+
+def _alone(view: PreparedView) -> ViewBatch:
+    """A batch of one view, which shares its memory."""
+    surface = torch.from_numpy(view.surface)[None]
+    normal, position, toward, thickness = surface.split([3, 3, 3, 1], dim=-1)
     return ViewBatch(
-        torch.from_numpy(index),
+        torch.from_numpy(view.index)[None],
         normal,
         position,
         toward,
         thickness[..., 0],
-        torch.from_numpy(reached),
-        torch.from_numpy(np.stack([view.directions for view in views])),
-        torch.ones(count, DIRECTIONS),
+        torch.from_numpy(view.reached)[None],
+        torch.from_numpy(view.directions)[None],
+        torch.ones(1, DIRECTIONS),
     )
 
 
@@ -137,8 +138,7 @@ class ViewStore:
     """
 
     def __init__(self, views: Sequence[PreparedView], device: str = "cpu") -> None:
-        self._views, self._device = views, device
-        self._batches = [] if device == "cpu" else [batch_of([one]).to(device) for one in views]
+        self._views = [_alone(view).to(device) for view in views]
 
     def batch(self, chosen: torch.Tensor) -> ViewBatch:
         """Collect views.
@@ -153,13 +153,11 @@ class ViewStore:
         ViewBatch
             On the device.
         """
-        if not self._batches:
-            return batch_of([self._views[int(k)] for k in chosen])
-        return filled_up([self._batches[int(k)] for k in chosen])
+        return filled_up([self._views[int(k)] for k in chosen])
 
 
 def filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
-    """Join batches of one view each; what is filled up faces the viewer, as in `batch_of`.
+    """Join batches of one view each; what is filled up faces the viewer.
 
     Parameters
     ----------

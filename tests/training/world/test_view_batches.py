@@ -72,3 +72,9 @@ def test_a_store_fills_up_as_batches_do() -> None:
     for store in (ViewStore(VIEWS).batch(chosen), filled):
         for name, part in vars(batch).items():
             torch.testing.assert_close(getattr(store, name), part)
+    lengths = torch.tensor([len(VIEWS[k].index) for k in chosen])
+    empty = torch.arange(int(lengths.max())) >= lengths[:, None]
+    assert empty.any() and ((batch.index == SIDE * SIDE) == empty).all()
+    for facing in (batch.normal[empty], batch.toward[empty]):
+        assert (facing == torch.tensor([0.0, 0, 1])).all()
+    assert not batch.position[empty].any() and not batch.reached[empty].any()
