@@ -1,34 +1,27 @@
 """Properties of whole decompositions.
 
-Shape and light are solved at `SIDE` pixels in a few steps: these tests exercise the paths through
+Shape and light are solved at a few pixels in a few steps: these tests exercise the paths through
 the program, not the quality of its results.
 """
 
-import contextlib
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
-from unittest import mock
 
 import numpy as np
 import pytest
 from hypothesis import strategies as st
 
 from isc_core.decomposition.pipeline import MODELS, Settings, decompose
-from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.photo import Photo, check_mask
 from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.mesh import build_mesh
 from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import METHODS
-from isc_core.sirfs import recover
+from tests.core.small_solves import small_solves
 from tests.properties.laws import at_most, between, finite, law, threads
 from tests.properties.photos import KINDS, MASKS, MadePhoto, ordinary, photos
 from tests.properties.test_separation import MOVES, moved_light
 
-SIDE = 24
-FEW_STEPS = LbfgsOptions(iterations=10, evaluations=25, loss_tolerance=1e-4)
 LAYERS = ("image", "diffuse", "specular", "residual", "reflectance", "shading")
 MAPS = (*LAYERS, "normal", "height", "confidence")
 FAST_METHODS = tuple(m for m in METHODS if m not in ("akashi_2016", "sparse_coding"))
@@ -60,19 +53,6 @@ def cases(
     light = st.sampled_from(("natural", "laboratory"))
     engine = st.sampled_from(("auto", "auto", "auto", "numpy"))
     return st.builds(DecompositionCase, drawn, model, separator, light, engine)
-
-
-@contextlib.contextmanager
-def small_solves() -> Iterator[None]:
-    """Solve SIRFS at a small size in few steps while the block lasts."""
-
-    def small(*args: Any, **options: Any) -> recover.RecoverOptions:
-        given = recover.RecoverOptions(*args, **options)
-        solver = replace(given.solver, lbfgs=FEW_STEPS)
-        return replace(given, solve_size=SIDE, margin=4, to_own_size=False, solver=solver)
-
-    with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
-        yield
 
 
 def decomposed(

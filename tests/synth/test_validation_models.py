@@ -4,8 +4,8 @@ the scenes; tables by material.
 
 import importlib
 import json
+from collections.abc import Iterator
 from dataclasses import fields, replace
-from functools import partial
 from math import exp, log
 from pathlib import Path
 from typing import Any
@@ -16,18 +16,15 @@ import pytest
 pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
 from isc_core.cli.main import main
-from isc_core.decomposition import layers, shape
+from isc_core.decomposition import layers
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
-from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
-from isc_core.sirfs.recover import RecoverOptions
-from isc_core.sirfs.solver import SolverOptions
 from synth.capture.truth import GroundTruth
 from synth.validation.measurement.bootstrap import Interval
 from synth.validation.measurement.figures import CHAIN, all_figures
@@ -55,6 +52,7 @@ from synth.validation.stages.models import (
 from synth.validation.stages.registry import find_stages
 from synth.validation.stages.separation import SEPARATION
 from synth.validation.stages.types import BLACK, StageOptions, stage_inputs
+from tests.core.small_solves import small_solves
 from tests.synth.test_validation import facts, sphere
 
 pytestmark = pytest.mark.slow  # they share a run
@@ -62,17 +60,11 @@ pytestmark = pytest.mark.slow  # they share a run
 EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 
 
-@pytest.fixture(autouse=True)
-def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SIRFS at 24 pixels instead of 256, and not converged: irrelevant to these tests."""
-
-    def small(*values: Any) -> RecoverOptions:
-        return replace(RecoverOptions(*values), solve_size=24, margin=6, to_own_size=False)
-
-    monkeypatch.setattr(shape, "RecoverOptions", small)
-    monkeypatch.setattr(
-        shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25))
-    )
+@pytest.fixture(scope="module", autouse=True)
+def _small() -> Iterator[None]:
+    """Shape and light hardly matter to these tests."""
+    with small_solves():
+        yield
 
 
 @pytest.fixture(scope="module")

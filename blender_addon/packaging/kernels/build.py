@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
@@ -192,8 +193,15 @@ def library(machine: Machine, code: str, declared: str, folder: Path) -> Path:
     made = folder / machine.name
     if made.is_file():
         return made
-    place = folder / f"parts-{machine.name}"
-    place.mkdir(parents=True, exist_ok=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    with TemporaryDirectory(prefix="parts-", dir=folder) as parts:
+        _compile(machine, code, declared, Path(parts))
+        (Path(parts) / machine.name).replace(made)
+    return made
+
+
+def _compile(machine: Machine, code: str, declared: str, place: Path) -> None:
+    """Make a library in a folder of its own."""
     (place / "kernels.ll").write_text(code, encoding="utf-8")
     (place / "entries.c").write_text(declared, encoding="utf-8")
     common = ["-target", machine.triple, "-O3", "-g0", "-fPIC"]
@@ -205,8 +213,6 @@ def library(machine: Machine, code: str, declared: str, folder: Path) -> Path:
     whole = ["-Wl,-z,defs"] if "linux" in machine.triple else []  # elsewhere the linker insists
     # The file's name is also in it, hence the folder.
     zig(place, *common, "-shared", "-s", *whole, "kernels.o", "entries.o", "-o", machine.name)
-    (place / machine.name).replace(made)
-    return made
 
 
 def zig(folder: Path, *arguments: str) -> None:

@@ -16,6 +16,7 @@ from isc_core.numerics import kernel_library
 from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_library import open_library
 from isc_core.numerics.kernel_types import Array, Group, Scalar, signatures
+from tests.core.numerics.kept_kernels import KEPT
 
 needs_compilers = pytest.mark.skipif(
     sys.platform != "linux"
@@ -26,8 +27,8 @@ needs_compilers = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory):
-    made = libraries_for("linux-x64", tmp_path_factory.mktemp("kernels"))
+def library():
+    made = libraries_for("linux-x64", KEPT)
     opened = [one for one in map(open_library, made) if one is not None]
     assert opened
     return made, opened[-1]
