@@ -28,6 +28,7 @@ from typing import Any, Protocol, TypeVar
 import numpy as np
 import torch
 from torch import nn
+from torch.optim.swa_utils import get_ema_multi_avg_fn
 
 from isc_core.io.atomic import new_file
 
@@ -345,11 +346,10 @@ def _shown(terms: dict[str, float]) -> str:
 def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedule) -> None:
     """Move the running average toward the current weights."""
     kept_share = min(schedule.average_limit, (step + 1) / (step + schedule.average_delay))
-    with torch.no_grad():
-        pairs = zip(average.state_dict().values(), network.state_dict().values(), strict=True)
-        floats = [(kept, new) for kept, new in pairs if kept.is_floating_point()]
-        kept, new = map(list, zip(*floats, strict=True))
-        torch._foreach_lerp_(kept, new, 1 - kept_share)
+    pairs = zip(average.state_dict().values(), network.state_dict().values(), strict=True)
+    floats = [(kept, new) for kept, new in pairs if kept.is_floating_point()]
+    kept, new = map(list, zip(*floats, strict=True))
+    get_ema_multi_avg_fn(kept_share)(kept, new, step)
 
 
 class _Report:

@@ -116,7 +116,7 @@ def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
         )
         figures[name] = {
             "overlap": overlap.round(4).tolist(),
-            "sureness": [round(one.found.sureness, 4) for one in found],
+            "confidence": [round(one.found.confidence, 4) for one in found],
         }
     lines += ["", "| shown | photos | accepted |", "|---|---|---|"]
     others = [name for name in groups if name not in single]
@@ -124,7 +124,7 @@ def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
     whole.append(("no single thing", [one for name in others for one in groups[name]]))
     for name, found in whole:
         lines.append(f"| {name} | {len(found)} | {_share([one.accepted for one in found])} |")
-        figures[name] = {"sureness": [round(one.found.sureness, 4) for one in found]}
+        figures[name] = {"confidence": [round(one.found.confidence, 4) for one in found]}
     seconds = np.median([one.seconds for found in groups.values() for one in found])
     lines += ["", f"median time of a mask: {seconds:.2f} s"]
     return "\n".join(lines), figures

@@ -1,11 +1,11 @@
-"""How good are masks that points and boxes make, and is their sureness what it says?
+"""How good are masks that points and boxes make, and is their confidence what it says?
 
   python -m benchmarks.decomposition.hinted_masks PHOTOS --panoramas DIR [--count N] [--json FILE]
 
 Composites of masked photos of real things before crops of panoramas that no fit has seen, half of
 them with other things beside. One thing is meant. A box around it leaves up to 15 % on each side;
 points are one to three pixels of it, and with `not` one or two of the background besides. A mask is
-right with an overlap of .5. The weights of the sureness are those fitted without hints; nothing
+right with an overlap of .5. The weights of the confidence are those fitted without hints; nothing
 here was chosen on these composites. What is refused counts as an empty mask that is not sure.
 Intervals are those of resampled masks.
 
@@ -38,7 +38,7 @@ _BACKGROUNDS, _BATCH, _SEED = 60, 8, 5
 _MOST_MARGIN = 0.15  # of a box, of the thing's width or height
 _LEAST = 200  # pixels of a thing
 _RIGHT = 0.5  # overlap
-_BINS = (0.0, 0.5, 0.8, 0.95, 1.01)  # of sureness
+_BINS = (0.0, 0.5, 0.8, 0.95, 1.01)  # of confidence
 
 
 @dataclass(frozen=True)
@@ -51,12 +51,12 @@ class Judged:
         One of `KINDS`.
     overlap : float
         Intersection over union with the truth.
-    sureness : float
+    confidence : float
     """
 
     kind: str
     overlap: float
-    sureness: float
+    confidence: float
 
 
 def composites(
@@ -161,7 +161,7 @@ def _judge(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, f
         found = find_mask(light, hints)
     except InputError:
         return 0.0, 0.0
-    return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.sureness
+    return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.confidence
 
 
 def report(found: list[Judged]) -> str:
@@ -174,26 +174,26 @@ def report(found: list[Judged]) -> str:
     Returns
     -------
     str
-        Two Markdown tables: by kind of hint, and by sureness.
+        Two Markdown tables: by kind of hint, and by confidence.
     """
     lines = [
-        "| hints | masks | IoU, median | 10th percentile | right | mean sureness |",
+        "| hints | masks | IoU, median | 10th percentile | right | mean confidence |",
         "|---|---|---|---|---|---|",
     ]
     for kind in (*KINDS, ""):
         chosen = [one for one in found if kind in ("", one.kind)]
         overlap = np.array([one.overlap for one in chosen])
         middle, low = np.quantile(overlap, (0.5, 0.1))
-        mean = np.mean([one.sureness for one in chosen])
+        mean = np.mean([one.confidence for one in chosen])
         lines.append(
             f"| {kind or 'all'} | {len(chosen)} | {middle:.3f} | {low:.3f} | {_right(overlap)} "
             f"| {mean:.1%} |"
         )
-    lines += ["", "| sureness | masks | mean sureness | right |", "|---|---|---|---|"]
+    lines += ["", "| confidence | masks | mean confidence | right |", "|---|---|---|---|"]
     for least, most in zip(_BINS, _BINS[1:], strict=False):
-        chosen = [one for one in found if least <= one.sureness < most]
+        chosen = [one for one in found if least <= one.confidence < most]
         if chosen:
-            mean = np.mean([one.sureness for one in chosen])
+            mean = np.mean([one.confidence for one in chosen])
             right = _right(np.array([one.overlap for one in chosen]))
             lines.append(
                 f"| {least:.0%} to {min(most, 1):.0%} | {len(chosen)} | {mean:.1%} | {right} |"
@@ -226,7 +226,7 @@ def main() -> None:
         parser.error(str(error))
     print(report(found))
     if given.json is not None:
-        rows = [[one.kind, one.overlap, one.sureness] for one in found]
+        rows = [[one.kind, one.overlap, one.confidence] for one in found]
         given.json.write_text(json.dumps(rows))
 
 

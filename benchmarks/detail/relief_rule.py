@@ -2,8 +2,8 @@
 
   python -m benchmarks.detail.relief_rule SET --rows FILE [--count N] [--kind KIND]
 
-SET is the choice set of `benchmarks.detail.sets`. Each body is decomposed without fine relief. What
-the whole object says, and the relief that its shading explains, judged at several shares, are
+SET is the validation set of `benchmarks.detail.sets`. Each body is decomposed without fine relief.
+What the whole object says, and the relief that its shading explains, judged at several shares, are
 stored in a row for each body, so that an interrupted run continues; with `--kind`, rows alone are
 made.
 
@@ -168,7 +168,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("folder", type=Path, metavar="SET", help="the choice set of benchmarks.detail.sets")
+    add("folder", type=Path, metavar="SET", help="the validation set of benchmarks.detail.sets")
     add("--rows", type=Path, required=True, metavar="FILE", help="JSON lines to append to")
     add("--kind", type=SetKind, choices=list(SetKind), help="measure one kind of bodies alone")
     add("--count", type=int, help="bodies of each kind")

@@ -33,12 +33,12 @@ _UNIT = 32767  # components of normals are stored in 16 bits
 class Part(StrEnum):
     """What a set is for."""
 
-    CHOICE = "choice"
+    VALIDATION = "validation"
     LIGHTS = "lights"
-    REPORT = "report"
+    TEST = "test"
 
 
-_SEEDS = {Part.CHOICE: 0, Part.LIGHTS: 0, Part.REPORT: 1}
+_SEEDS = {Part.VALIDATION: 0, Part.LIGHTS: 0, Part.TEST: 1}
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> 
     kept = part != Part.LIGHTS
     rooms = [one.radiance for one in read_panoramas(panoramas, 0) if one.judged == kept]
     if kept:
-        rooms = rooms[part == Part.REPORT :: 2]
+        rooms = rooms[part == Part.TEST :: 2]
     for number in range(count):
         for kind in SetKind:
             if (folder / f"{kind}_{number:02d}" / TRUTH).exists():

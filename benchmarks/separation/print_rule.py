@@ -1,13 +1,14 @@
 """Fit the weights by which colour and form decide what was a highlight.
 
-  python -m benchmarks.separation.print_rule WORLD --panoramas DIR [--count N] [--mixed]
+  python -m benchmarks.separation.print_rule WORLD --panoramas DIR [--count N] [--seed N] [--mixed]
 
-WORLD is a folder of `isc world build`. Regions of light that colour and network take off bodies of
-`Part.FIT`, matt and glossy, are divided into those whose removal lowers the squared error and those
-whose removal raises it. Logistic regression, each region with the root of its squared light over
-that of its photo as weight, gives `highlight_evidence.WEIGHTS`. For the bodies of `Part.CHOICE` it
-prints what each of `ODDS` costs and gains; `prints` reports on others. With --mixed, as many bodies
-without print are added to both parts; so were the shipped weights fitted, with a former network.
+WORLD is a folder of `isc world build`. Regions of light that colour and network remove from bodies
+of `Part.TRAINING`, matt and glossy, are divided into those whose removal lowers the squared error
+and those whose removal raises it. Logistic regression, each region with the root of its squared
+light over that of its photo as weight, gives `highlight_evidence.WEIGHTS`. For the bodies of
+`Part.VALIDATION` it prints what each of `ODDS` costs and gains; `prints` reports on others. With
+--mixed, as many bodies without print are added to both parts; so were the shipped weights fitted,
+with a former network.
 """
 
 import argparse
@@ -149,25 +150,28 @@ def main() -> None:
     parser.add_argument("world", type=Path, metavar="WORLD", help="folder of isc world build")
     parser.add_argument("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     parser.add_argument("--count", type=int, default=140, help="photos (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the photos (default: %(default)s)")
     parser.add_argument("--mixed", action="store_true", help="with bodies without print")
     given = parser.parse_args()
     world, panoramas = given.world, given.panoramas
     try:
-        fit, choice = (
+        training, validation = (
             [
                 regions_of(scene)
                 for painted in ((True, False) if given.mixed else (True,))
                 for glossy in (False, True)
-                for scene in print_scenes(world, panoramas, part, count, glossy, painted=painted)
+                for scene in print_scenes(
+                    world, panoramas, part, count, glossy, painted=painted, seed=given.seed
+                )
             ]
-            for part, count in ((Part.FIT, given.count), (Part.CHOICE, 60))
+            for part, count in ((Part.TRAINING, given.count), (Part.VALIDATION, 60))
         )
     except InputError as error:
         parser.error(str(error))
-    weights = fitted(fit)
+    weights = fitted(training)
     print("weights", *weights.round(3))
     for odds in ODDS:
-        share, mean, worst = kept(choice, weights, odds)
+        share, mean, worst = kept(validation, weights, odds)
         print(f"odds {odds}: matt, worst {share:.2%}; glossy, mean {mean:.3f}, worst {worst:.3f}")
 
 

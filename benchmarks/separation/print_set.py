@@ -8,7 +8,7 @@ Construction: a traced body of `training.world` is painted, lit by a white-balan
 lamps, and photographed: exposure, blur, noise, clipping, JPEG of 8-bit sRGB codes. Patterns are
 drawn anew, none is of the atlas that the scene network has learned from. Bodies of one colour,
 without print, are made alike. The three sets share no body, and no panorama that the network has
-learned from lights `Part.CHOICE` or `Part.REPORT`.
+learned from lights `Part.VALIDATION` or `Part.TEST`.
 
 Limits: trim is a bright grey band without a reflection of its own. A true diffuse image has the
 noise of its photo.
@@ -69,9 +69,13 @@ class PrintKind(IntEnum):
 class Part(StrEnum):
     """What a set is for: fitting constants, choosing among rules, reporting."""
 
-    FIT = "fit"
-    CHOICE = "choice"
-    REPORT = "report"
+    TRAINING = "training"
+    VALIDATION = "validation"
+    TEST = "test"
+
+
+# Part of the seeds, so that the photos stay those of the published figures.
+_SEED_WORDS = {Part.TRAINING: "fit", Part.VALIDATION: "choice", Part.TEST: "report"}
 
 
 @dataclass(frozen=True)
@@ -129,11 +133,11 @@ def print_scenes(
         If the world or the panoramas cannot be used.
     """
     torch.manual_seed(seed)
-    rng = np.random.default_rng([seed, glossy, *map(ord, part)] + [1] * (not painted))
-    found = [one for one in read_panoramas(panoramas, 0) if one.judged != (part == Part.FIT)]
+    rng = np.random.default_rng([seed, glossy, *map(ord, _SEED_WORDS[part])] + [1] * (not painted))
+    found = [one for one in read_panoramas(panoramas, 0) if one.judged != (part == Part.TRAINING)]
     rooms = [_balanced(one.radiance) for one in found]
-    if part != Part.FIT:
-        rooms = rooms[part == Part.REPORT :: 2]
+    if part != Part.TRAINING:
+        rooms = rooms[part == Part.TEST :: 2]
     bodies, made = _bodies(world, part), 0
     for k in rng.permutation(len(bodies)):
         if made == count:
@@ -155,14 +159,15 @@ def _balanced(radiance: np.ndarray) -> np.ndarray:
 
 def _bodies(world: Path, part: Part) -> list[PreparedView]:
     """One view of each body of a set."""
-    split = Split.TRAIN if part == Part.FIT else Split.BODY
+    split = Split.TRAIN if part == Part.TRAINING else Split.BODY
     found = dict[str, View]()
     for view in views_in(world, split):
-        half = Part.REPORT if crc32(view.name.encode()) // 8 % 2 else Part.CHOICE
-        if view.mask.sum() > _LEAST_PIXELS and part in (Part.FIT, half):
+        half = Part.TEST if crc32(view.name.encode()) // 8 % 2 else Part.VALIDATION
+        if view.mask.sum() > _LEAST_PIXELS and part in (Part.TRAINING, half):
             found.setdefault(view.name, view)
     return [
-        prepared(view) for view in islice(found.values(), 0, None, 6 if part == Part.FIT else 1)
+        prepared(view)
+        for view in islice(found.values(), 0, None, 6 if part == Part.TRAINING else 1)
     ]
 
 

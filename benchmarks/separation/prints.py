@@ -1,15 +1,15 @@
 """What is not a highlight: light that methods take off painted bodies, matt and glossy.
 
-  python -m benchmarks.separation.prints WORLD --panoramas DIR [--part choice|report] [--count N]
+  python -m benchmarks.separation.prints WORLD --panoramas DIR [--part PART] [--count N]
   [--methods isc,network,joint,marked,chain,joint@ODDS] [--sheet JPG] [--json FILE]
   python -m benchmarks.separation.prints WORLD --photos DIR --sheet JPG
 
 WORLD is a folder of `isc world build`; the photos are those of `print_set`. Constants are fitted on
-`Part.FIT` (`print_rule`), rules are chosen on `Part.CHOICE`, figures are reported on `Part.REPORT`.
-`isc` and `network` are separators, `joint` the layers of `isc decompose` before reflectance is
-continued, `chain` all of `isc decompose` (minutes). `marked` is `joint` with one click: at the
-strongest highlight of a glossy body, as a person sees it; none on a matt one. `joint@1` is `joint`
-with other odds than the default.
+`Part.TRAINING` (`print_rule`), rules are chosen on `Part.VALIDATION`, figures are reported on
+`Part.TEST`. `isc` and `network` are separators, `joint` the layers of `isc decompose` before
+reflectance is continued, `chain` all of `isc decompose` (minutes). `marked` is `joint` with one
+click: at the strongest highlight of a glossy body, as a person sees it; none on a matt one.
+`joint@1` is `joint` with other odds than the default.
 
 Matt: share of the light taken off, and its RMS over the photo's. Glossy: squared error of the
 specular light over that of none. 1 is what doing nothing reaches; intervals are of resampled
@@ -259,7 +259,7 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, metavar="DIR", help="panoramas")
-    add("--part", type=Part, default=Part.REPORT, choices=list(Part), help="which bodies")
+    add("--part", type=Part, default=Part.TEST, choices=list(Part), help="which bodies")
     add("--count", type=int, default=60, help="photos of each set (default: %(default)s)")
     add("--methods", default=",".join(METHODS), help="default: %(default)s")
     add("--photos", type=Path, metavar="DIR", help="photos to draw instead")

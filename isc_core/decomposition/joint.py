@@ -6,8 +6,8 @@ that leaves highlights in the diffuse image: shape and light are bent to explain
 reflectance shows them as bright albedo.
 
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
-form shows of highlights: t is the part of log(I / D) that the scene network is sure of
-(`separation.support.sure_ratio`), and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being
+form shows of highlights: t is a lower bound of the log(I / D) that the scene network predicts
+(`separation.support.ratio_bound`), and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being
 nearly white (`separation.support.light_tint`). Colour and form decide together, region by region,
 what of that was a highlight and what was print (`separation.support.highlight_evidence`); the rest
 is given back. Under clipped highlights the paint around is continued
@@ -20,7 +20,7 @@ surroundings, in the shading at that place,
     D = min(D_1, R exp(SH(normal)))
 
 Form adds to colour only where highlights stand out that colour has left
-(`separation.support.sure_ratio`).
+(`separation.support.ratio_bound`).
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
 the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
@@ -57,7 +57,11 @@ from ..separation import HIGHLIGHT_ODDS
 from ..separation.support.clipped_texture import continue_under_clipped
 from ..separation.support.highlight_evidence import judged_highlights
 from ..separation.support.light_tint import limit_tint
-from ..separation.support.sure_ratio import SureRatioOptions, highlights_stand_out, sure_ratio
+from ..separation.support.ratio_bound import (
+    RemovalOptions,
+    highlights_stand_out,
+    ratio_lower_bound,
+)
 from .layers import separated_first, shaded
 from .lobe import fit_specular
 from .shape import Shape, confidence_weight, energy_of, recover_shape
@@ -89,15 +93,15 @@ class JointOptions:
         t above which albedo is unreliable.
     change_of_variables : float
         b of the energy.
-    network : SureRatioOptions
-        When light is taken off.
+    network : RemovalOptions
+        When light that the network expects to be a highlight is removed.
     odds : float
         That removed light was a highlight, to be exceeded; above 0.
     """
 
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
-    network: SureRatioOptions = field(default_factory=SureRatioOptions)
+    network: RemovalOptions = field(default_factory=lambda: RemovalOptions(doubt=1.6))
     odds: float = HIGHLIGHT_ODDS
 
 
@@ -368,7 +372,7 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options = options or JointOptions()
-    expected = sure_ratio(seen or predict_scene(image, mask), options.network.doubt)
+    expected = ratio_lower_bound(seen or predict_scene(image, mask), options.network.doubt)
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows

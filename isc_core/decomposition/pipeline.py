@@ -315,7 +315,7 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
         "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
         **_marks_json(photo),
-        **({} if source.sureness is None else {"mask_sureness": round(source.sureness, 4)}),
+        **({} if source.confidence is None else {"mask_confidence": round(source.confidence, 4)}),
     }
 
 

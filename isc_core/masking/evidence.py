@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from ..networks.mask_network import SURENESS, Count
+from ..networks.mask_network import EVIDENCE, Count
 from .frames import PartPrediction
 
 _UNSURE = 1e-3
@@ -28,7 +28,7 @@ _OVERLAP = 3  # place of the overlap's log odds
 
 
 def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarray) -> np.ndarray:
-    """Return what sureness is computed from.
+    """Return what the confidence is computed from.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def evidence_of(first: PartPrediction, second: PartPrediction, before: np.ndarra
 
     Returns
     -------
-    (SURENESS,) ndarray
+    (EVIDENCE,) ndarray
         1, and log odds.
     """
     shares = [
@@ -57,14 +57,14 @@ def of_another_mask(evidence: np.ndarray, looked: np.ndarray, taken: np.ndarray)
 
     Parameters
     ----------
-    evidence : (SURENESS,) ndarray
+    evidence : (EVIDENCE,) ndarray
         As `evidence_of`.
     looked, taken : (H, W) ndarray
         Covers: the network's, and that of the mask.
 
     Returns
     -------
-    (SURENESS,) ndarray
+    (EVIDENCE,) ndarray
         The overlap is that of both masks if it is less than that of the passes.
     """
     overlap = _log_odds(np.array([_overlap(looked, taken)]))[1]
@@ -83,20 +83,20 @@ def no_evidence(first: PartPrediction) -> np.ndarray:
 
     Returns
     -------
-    (SURENESS,) ndarray
+    (EVIDENCE,) ndarray
         As `evidence_of`.
     """
-    found = np.zeros(SURENESS - 1)
+    found = np.zeros(EVIDENCE - 1)
     found[0] = first.counts[Count.ONE]
     return _log_odds(found)
 
 
-def sureness_of(evidence: np.ndarray, weights: np.ndarray) -> float:
+def confidence_of(evidence: np.ndarray, weights: np.ndarray) -> float:
     """Return the probability that a mask is right.
 
     Parameters
     ----------
-    evidence, weights : (SURENESS,) ndarray
+    evidence, weights : (EVIDENCE,) ndarray
 
     Returns
     -------

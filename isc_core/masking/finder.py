@@ -16,7 +16,7 @@ from ..photo.reading import photo_from_raster
 from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
-SURE = 0.2  # least sureness of a mask that is used without being asked for
+LEAST_CONFIDENCE = 0.2  # least confidence of a mask that is used without being asked for
 _LIKELY = 0.5  # the same where the whole photo would do as well
 _SEVERAL = 0.3  # of the largest part: a second one as large is another object
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
@@ -64,7 +64,7 @@ class MaskSearch:
         """
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
-        problem = why_refused(found, self.hints, _LIKELY if self.lenient else SURE)
+        problem = why_refused(found, self.hints, _LIKELY if self.lenient else LEAST_CONFIDENCE)
         if not problem:
             return found
         if self.lenient and not self.hints:
@@ -72,7 +72,9 @@ class MaskSearch:
         raise InputError(f"{name}: {problem}")
 
 
-def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SURE) -> str:
+def why_refused(
+    found: FoundMask, hints: Hints | None = None, least: float = LEAST_CONFIDENCE
+) -> str:
     """Return why a mask is not used.
 
     Parameters
@@ -81,7 +83,7 @@ def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SUR
     hints : Hints, optional
         With them a mask need not be sure.
     least : float, optional
-        Sureness of a mask that is used.
+        Confidence of a mask that is used.
 
     Returns
     -------
@@ -92,14 +94,14 @@ def why_refused(found: FoundMask, hints: Hints | None = None, least: float = SUR
     if hints:
         return "" if enough else "no object found there: put --point on it, or --box around it"
     several = enough and is_apart(found.mask)
-    if enough and found.sureness >= least and not several:
+    if enough and found.confidence >= least and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
     if several or kind == Count.SEVERAL:
         return f"it seems to show several objects: {_REMEDY}; --each processes each of them"
     if kind == Count.NONE or not enough:
         return f"no distinct object found: {_REMEDY}"
-    return f"its mask is uncertain (confidence {found.sureness:.0%}): {_REMEDY}"
+    return f"its mask is uncertain (confidence {found.confidence:.0%}): {_REMEDY}"
 
 
 def is_apart(mask: np.ndarray) -> bool:
@@ -156,7 +158,7 @@ class EachSearch:
         if not self.found:
             raise InputError(f"{name}: no distinct objects found: {_REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
-        least = min(self.found, key=lambda one: one.sureness)
+        least = min(self.found, key=lambda one: one.confidence)
         return replace(least, cover=cover)
 
 
@@ -226,5 +228,5 @@ def photos_of_each(
 
 
 def _alone(photo: Photo, found: FoundMask) -> Photo:
-    original = replace(photo.original, mask_from="each", sureness=None)
+    original = replace(photo.original, mask_from="each", confidence=None)
     return replace(photo, mask=found.mask, original=original, found=found, cover=found.cover)

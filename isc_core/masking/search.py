@@ -26,7 +26,7 @@ from ..networks.mask_network import Count, MaskNetwork
 from ..photo.found_mask import FoundMask
 from ..photo.grabcut import Box, grabcut
 from ..photo.masks import tidy_mask
-from .evidence import evidence_of, no_evidence, of_another_mask, sureness_of
+from .evidence import confidence_of, evidence_of, no_evidence, of_another_mask
 from .frames import Part, PartPrediction, predict_part
 from .hints import Hints
 from .refinement import refined
@@ -63,12 +63,12 @@ def find_mask(
     whole = predict_part(small, _all_of(small), given, network)
     found = _at_size(_second_look(small, whole, given, network), light.shape)
     if hints.box is None or hints.points or _fills(found.mask, hints.box):
-        return replace(found, sureness=found.sureness * _obeyed(found.mask, hints))
+        return replace(found, confidence=found.confidence * _obeyed(found.mask, hints))
     cover = grabcut(light, hints.box).astype(np.float32)
-    weights = (network or MaskNetwork.shipped()).sureness
+    weights = (network or MaskNetwork.shipped()).confidence_weights
     evidence = of_another_mask(found.evidence, found.cover, cover)
-    sureness = sureness_of(evidence, weights)
-    return replace(found, cover=cover, evidence=evidence, sureness=sureness)
+    confidence = confidence_of(evidence, weights)
+    return replace(found, cover=cover, evidence=evidence, confidence=confidence)
 
 
 def _obeyed(mask: np.ndarray, hints: Hints) -> float:
@@ -172,7 +172,7 @@ def _second_look(
 ) -> FoundMask:
     """Run the second pass on what the first pass found, and refine its outline."""
     inside = _meant(first.cover, hints)
-    weights = (network or MaskNetwork.shipped()).sureness
+    weights = (network or MaskNetwork.shipped()).confidence_weights
     if not inside.any():
         return FoundMask(np.zeros_like(first.cover), 0.0, first.counts, no_evidence(first))
     part = _around(mask_box(inside), light.shape)
@@ -188,7 +188,7 @@ def _second_look(
         outside[top : top + high, left : left + wide] = False
         cover[outside] = 0
     evidence = evidence_of(first, second, first.cover[part.slices])
-    return FoundMask(cover, sureness_of(evidence, weights), first.counts, evidence)
+    return FoundMask(cover, confidence_of(evidence, weights), first.counts, evidence)
 
 
 def _averaged(looks: list[PartPrediction]) -> PartPrediction:

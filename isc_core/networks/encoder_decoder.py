@@ -134,16 +134,50 @@ class PhotoNetwork(EncoderDecoder):
         Levels that the answer is read from, the coarsest ones: two numbers for each channel.
     answers : int
         Numbers of the answer.
+    stored : tuple of str
+        Names in the archive: of the answer's second layer, and of the calibration.
     dense : tuple of (inputs, outputs) ndarray
         The two layers of the answer.
     offsets : tuple of (outputs,) ndarray
+    calibration : (n,) ndarray
+        What is fitted after the training.
     """
 
     coarse: ClassVar[int]
     answers: ClassVar[int]
+    stored: ClassVar[tuple[str, str]]
 
     dense: tuple[np.ndarray, ...]
     offsets: tuple[np.ndarray, ...]
+    calibration: np.ndarray
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> Self:
+        """Build the network.
+
+        Parameters
+        ----------
+        parameters : Parameters
+            The content of its archive.
+
+        Returns
+        -------
+        PhotoNetwork
+            Of the class on which it is called.
+
+        Raises
+        ------
+        InputError, KeyError
+            If the parameters do not fit.
+        """
+        others, (answer, calibration) = parameters.others, cls.stored
+        return cls(
+            parameters.weights,
+            parameters.biases,
+            (others["hidden_weight"], others[f"{answer}_weight"]),
+            (others["hidden_bias"], others[f"{answer}_bias"]),
+            others[calibration],
+        )
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""

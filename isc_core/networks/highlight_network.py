@@ -37,7 +37,7 @@ from .scene_network import channels_of as photo_channels_of
 REACHES = (2, 5, 11)  # of the sizes, pixels of a frame of `SIDE`
 INPUTS = 7 + len(REACHES)
 _SMOOTH = 0.35  # pixels of the frame: noise has bright details, too
-_SURE = 30.0  # largest log odds
+_LARGEST_ODDS = 30.0  # logarithm
 _LEAST = 1e-6
 
 
@@ -103,7 +103,7 @@ def predict_highlights(
     light, details, variance = (np.zeros_like(values) for _ in range(3))
     reaches = [max(1, round(reach * scale)) for reach in REACHES]
     for k, band in enumerate(brightness_bands(values, mask, reaches)):
-        probability = 1 / (1 + np.exp(np.clip(doubt - odds[..., k], -_SURE, _SURE)))
+        probability = 1 / (1 + np.exp(np.clip(doubt - odds[..., k], -_LARGEST_ODDS, _LARGEST_ODDS)))
         light += band * probability
         details += band
         variance += np.square(band) * (probability * (1 - probability))

@@ -13,7 +13,7 @@ regression on held-out photos gives the confidence (`masking.evidence`).
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
-selection", CVPR 2016, doi:10.1109/CVPR.2016.47; sureness: J. Platt, "Probabilistic outputs for
+selection", CVPR 2016, doi:10.1109/CVPR.2016.47; confidence: J. Platt, "Probabilistic outputs for
 support vector machines", 1999. Weights, training pictures and losses are our own: `python -m
 training.masks.mask_network`.
 
@@ -27,13 +27,12 @@ import numpy as np
 
 from .encoder_decoder import PhotoNetwork
 from .layers import DARK, softmax
-from .loader import Parameters
 
 SIDE = 96  # pixels of the network's frame
 INPUTS = 9
 POINT = 2.5  # pixels: radius of a point's disc
 COARSE = 2  # levels that the number of objects is read from, the coarsest ones
-SURENESS = 6
+EVIDENCE = 6  # numbers that the confidence in a mask is computed from
 _LEAST = 1e-6
 
 
@@ -47,50 +46,21 @@ class Count(IntEnum):
 
 @dataclass(frozen=True)
 class MaskNetwork(PhotoNetwork):
-    """The mask network; its answer is the log odds of `Count`.
-
-    Attributes
-    ----------
-    sureness : (SURENESS,) ndarray
-        Weights of the log odds that a mask is right, see `isc_core.masking.evidence`.
-    """
+    """The mask network; its answer is the log odds of `Count`."""
 
     title = "mask network"
     file = "mask_network.npz"
     inputs, outputs, coarse, answers = INPUTS, 1, COARSE, len(Count)
+    stored = "count", "sureness"  # the names in trained archives
 
-    sureness: np.ndarray
+    @property
+    def confidence_weights(self) -> np.ndarray:
+        """Weights (EVIDENCE,) of the log odds that a mask is right, see `masking.evidence`."""
+        return self.calibration
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""
-        return super().fits() and self.sureness.shape == (SURENESS,)
-
-    @classmethod
-    def from_parameters(cls, parameters: Parameters) -> "MaskNetwork":
-        """Build the network.
-
-        Parameters
-        ----------
-        parameters : Parameters
-            The content of its archive.
-
-        Returns
-        -------
-        MaskNetwork
-
-        Raises
-        ------
-        InputError, KeyError
-            If the parameters do not fit.
-        """
-        others = parameters.others
-        return cls(
-            parameters.weights,
-            parameters.biases,
-            (others["hidden_weight"], others["count_weight"]),
-            (others["hidden_bias"], others["count_bias"]),
-            others["sureness"],
-        )
+        return super().fits() and self.calibration.shape == (EVIDENCE,)
 
     def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict the mask and the number of objects.

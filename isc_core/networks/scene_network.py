@@ -38,7 +38,6 @@ from ..scene.shading_estimate import ShadingEstimate
 from .encoder_decoder import PhotoNetwork
 from .frame import NetworkFrame, at_full_size, framed
 from .layers import inputs_of, softmax
-from .loader import Parameters
 
 SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
 INPUTS = 6
@@ -105,19 +104,17 @@ class RawPrediction:
 
 @dataclass(frozen=True)
 class SceneNetwork(PhotoNetwork):
-    """The scene network; its answer is the light.
-
-    Attributes
-    ----------
-    temperatures : (4,) ndarray
-        Factors of the scales, by `TEMPERATURES`.
-    """
+    """The scene network; its answer is the light."""
 
     title = "scene network"
     file = "scene_network.npz"
     inputs, outputs, coarse, answers = INPUTS, CHANNELS, COARSE, GLOBAL
+    stored = "light", "temperatures"
 
-    temperatures: np.ndarray
+    @property
+    def temperatures(self) -> np.ndarray:
+        """Factors (4,) of the scales, by `TEMPERATURES`."""
+        return self.calibration
 
     def fits(self) -> bool:
         """Return whether the parts fit each other."""
@@ -125,33 +122,6 @@ class SceneNetwork(PhotoNetwork):
             super().fits()
             and self.temperatures.shape == (len(TEMPERATURES),)
             and bool((self.temperatures > 0).all())
-        )
-
-    @classmethod
-    def from_parameters(cls, parameters: Parameters) -> "SceneNetwork":
-        """Build the network.
-
-        Parameters
-        ----------
-        parameters : Parameters
-            The content of its archive.
-
-        Returns
-        -------
-        SceneNetwork
-
-        Raises
-        ------
-        InputError, KeyError
-            If the parameters do not fit.
-        """
-        others = parameters.others
-        return cls(
-            parameters.weights,
-            parameters.biases,
-            (others["hidden_weight"], others["light_weight"]),
-            (others["hidden_bias"], others["light_bias"]),
-            others["temperatures"],
         )
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:

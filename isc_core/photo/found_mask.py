@@ -16,7 +16,7 @@ class FoundMask:
     ----------
     cover : (H, W) float32 ndarray
         Fraction of each pixel that the object covers.
-    sureness : float
+    confidence : float
         Confidence: the probability that the overlap (IoU) with the intended object is at least .5.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several objects.
@@ -25,7 +25,7 @@ class FoundMask:
     """
 
     cover: np.ndarray
-    sureness: float
+    confidence: float
     counts: np.ndarray
     evidence: np.ndarray
 

@@ -36,7 +36,7 @@ class PhotoSource:
         What was assumed or left out.
     cropped : bool
         The metadata give a focal length, but of a frame of another shape: it does not hold.
-    sureness : float or None
+    confidence : float or None
         Of a mask that was found automatically or by hints, see `FoundMask`.
     """
 
@@ -48,7 +48,7 @@ class PhotoSource:
     colour_profile: str = ""
     notes: tuple[ReadingNote, ...] = ()
     cropped: bool = False
-    sureness: float | None = None
+    confidence: float | None = None
 
 
 @dataclass(frozen=True)

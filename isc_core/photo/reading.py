@@ -177,7 +177,7 @@ def _photo(
             "" if raster.space is None else raster.space.name,
             tuple(_notes(raster, used, linear, mask)),
             cropped,
-            None if found is None else found.sureness,
+            None if found is None else found.confidence,
         ),
         found=found,
         cover=cover,

@@ -8,7 +8,7 @@ that stays.
 Equation: the network expects specular light s, with a standard deviation
 (`networks.highlight_network`); `doubt` is subtracted from its log odds. Where the odds are right,
 taking s off lowers the expected squared error; s of less than a fifth of a detail stays. From the
-photo as a whole nothing is taken unless t = log(I / (I - s)) stands out (`support.sure_ratio`) by
+photo as a whole nothing is taken unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
 `stands_out`. D = I exp(-t), and `light_tint` limits the colour of the removed light. Confidence is
 1 / (1 + e / u), e the deviation and u a tenth of the mean light.
 
@@ -17,7 +17,7 @@ Citation: see `networks.highlight_network`.
 Limits: those of the network. Clipped pixels: see `support.clipped`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,39 +32,20 @@ from ..scene.decomposition import Separation
 from .support.checks import check_arrays
 from .support.layers import diffuse_layers
 from .support.light_tint import limit_tint
-from .support.sure_ratio import highlights_stand_out
+from .support.ratio_bound import RemovalOptions, highlights_stand_out
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
 _MIN_SHARE = 1e-3  # of a channel that stays
 _LEAST_LIKELY = 0.2  # share of a detail that is specular: less stays
 
 
-@dataclass(frozen=True)
-class NetworkOptions:
-    """When light is taken off.
-
-    Attributes
-    ----------
-    doubt : float
-        Subtracted from the log odds that a bright detail is a highlight; not negative.
-    stands_out : float
-        By how much the strongest highlight exceeds what is usual on the object.
-    tint : float
-        How coloured the removed light may be, see `support.light_tint`; at least 1.
-    """
-
-    doubt: float = 0.0
-    stands_out: float = 0.6
-    tint: float = 1.5
-
-
-VARIANTS: dict[str, NetworkOptions] = {"improved": NetworkOptions()}
+VARIANTS = {"improved": RemovalOptions(doubt=0.0)}
 
 
 def separate(
     image: np.ndarray,
     mask: np.ndarray,
-    options: NetworkOptions | None = None,
+    options: RemovalOptions | None = None,
     *,
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
@@ -77,7 +58,7 @@ def separate(
     image : (H, W, 3) ndarray
         Linear light.
     mask : (H, W) bool ndarray
-    options : NetworkOptions, optional
+    options : RemovalOptions, optional
     clipped : (H, W) bool ndarray, optional
     monitor : Monitor, optional
     network : HighlightNetwork, optional
@@ -94,7 +75,7 @@ def separate(
     Cancelled
         If the user cancels.
     """
-    options, monitor = options or NetworkOptions(), monitor or Monitor()
+    options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     if options.doubt < 0 or options.stands_out < 0 or not options.tint >= 1:
         raise InputError(
             "the method network needs doubt and stands_out at least 0 and tint at least 1"

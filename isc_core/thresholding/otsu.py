@@ -115,7 +115,9 @@ class OtsuObjective:
         row.
         """
         self.evaluations += len(thresholds)
-        ends = np.pad(thresholds + 1, ((0, 0), (1, 1)), constant_values=((0, 0), (0, LEVELS)))
+        rows, count = thresholds.shape
+        ends = np.zeros((rows, count + 2), np.intp)
+        ends[:, 1:-1], ends[:, -1] = thresholds + 1, LEVELS
         return self.terms[ends[:, :-1], ends[:, 1:]].sum(axis=1)
 
 

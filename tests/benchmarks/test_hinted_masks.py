@@ -25,7 +25,7 @@ def test_hints_lie_on_the_thing_and_beside_it() -> None:
             assert not outside.any() and width * height < 2 * truth.sum()
 
 
-def test_the_table_sorts_by_kind_and_by_sureness() -> None:
+def test_the_table_sorts_by_kind_and_by_confidence() -> None:
     found = [("box", 0.9, 0.99), ("points", 0.2, 0.3), ("points and not", 0.8, 0.6)]
     text = report([Judged(*one) for one in found])
     assert "| box | 1 | 0.900 | 0.900 | 100.0% (100-100) | 99.0% |" in text

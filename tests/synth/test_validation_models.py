@@ -170,7 +170,7 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     seen = np.repeat(
         (left + 1.0 * (left > 0.5))[..., None], 3, axis=2
     )  # so that joint goes beyond MDR
-    monkeypatch.setattr(joint, "sure_ratio", lambda *given: seen)
+    monkeypatch.setattr(joint, "ratio_lower_bound", lambda *given: seen)
     monkeypatch.setattr(joint, "lowers_energy", kept)
     answers = dict(run_models(stage_inputs(truth, ("diffuse",)), EVERY, Monitor()).items())
     for name in (PLAIN, *SEPARATING_MODELS):

@@ -64,7 +64,7 @@ def observed(
 
     Returns
     -------
-    evidence : (N, SURENESS) ndarray
+    evidence : (N, EVIDENCE) ndarray
     right : (N,) bool ndarray
     whole : (N,) bool ndarray
         False where the mask shows nothing or several things: it is refused, however sure.

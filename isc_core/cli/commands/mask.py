@@ -119,6 +119,9 @@ def _each(file: Path, options: argparse.Namespace) -> list[str]:
 def _write(photo: Photo, path: Path) -> str:
     """Write the mask of a photo; return what to print."""
     write_mask(path, photo.mask if photo.found is None else photo.found.cover)
-    pixels, sureness = int(photo.mask.sum()), photo.original.sureness
-    found = _SOURCES[photo.original.mask_from] if sureness is None else f"confidence {sureness:.0%}"
+    pixels, source = int(photo.mask.sum()), photo.original
+    if source.confidence is None:
+        found = _SOURCES[source.mask_from]
+    else:
+        found = f"confidence {source.confidence:.0%}"
     return f"{path}: {pixels} pixels, {found}; check it before you use it"

@@ -105,10 +105,10 @@ def how_found(photo: Photo) -> str:
         "" for a mask that was given, or that has no confidence.
     """
     source = photo.original
-    if source.sureness is None:
+    if source.confidence is None:
         return ""
     how = "from your hints" if source.mask_from == "hints" else "automatically"
-    return f"the mask was found {how} (confidence {source.sureness:.0%})"
+    return f"the mask was found {how} (confidence {source.confidence:.0%})"
 
 
 def _box(text: str) -> Box:

@@ -120,7 +120,7 @@ def test_decompose_finds_the_mask_and_says_so(
     assert "found automatically" in capsys.readouterr().out
     assert overlap(mask_in(tmp_path / "out" / "mask.png"), truth) > 0.95
     given = json.loads((tmp_path / "out" / "decomposition.json").read_text())["input"]
-    assert given["mask_from"] == "automatic" and 0.5 <= given["mask_sureness"] <= 1
+    assert given["mask_from"] == "automatic" and 0.5 <= given["mask_confidence"] <= 1
     again = tmp_path / "again"
     mask = tmp_path / "out" / "mask.png"
     assert isc("decompose", path, "--mask", mask, "-o", again, *QUICK) == 0

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from isc_core.masking.evidence import (
+    confidence_of,
     evidence_of,
     no_evidence,
     of_another_mask,
-    sureness_of,
 )
 from isc_core.masking.frames import PartPrediction
-from isc_core.networks.mask_network import SURENESS
+from isc_core.networks.mask_network import EVIDENCE
 
 COUNTS = np.array([0.05, 0.9, 0.05])
 
@@ -24,7 +24,7 @@ def look(inside: float, outside: float) -> PartPrediction:
 def test_evidence_is_one_and_five_log_odds() -> None:
     sure = look(0.99, 0.01)
     evidence = evidence_of(sure, sure, sure.cover)
-    assert evidence.shape == (SURENESS,) and evidence[0] == 1
+    assert evidence.shape == (EVIDENCE,) and evidence[0] == 1
     assert evidence[1] == pytest.approx(np.log(9)) == evidence[2]
     assert evidence[3] > 5, "both looks are the same"
 
@@ -38,10 +38,10 @@ def test_masks_that_differ_or_that_are_vague_have_less_evidence() -> None:
     assert (no_evidence(sure)[2:] < same[2:]).all()
 
 
-def test_sureness_is_a_probability() -> None:
-    weights = np.ones(SURENESS)
-    assert sureness_of(np.zeros(SURENESS), weights) == 0.5
-    assert sureness_of(np.full(SURENESS, 0.5), weights) > 0.9
+def test_the_confidence_is_a_probability() -> None:
+    weights = np.ones(EVIDENCE)
+    assert confidence_of(np.zeros(EVIDENCE), weights) == 0.5
+    assert confidence_of(np.full(EVIDENCE, 0.5), weights) > 0.9
 
 
 def test_another_mask_than_the_looks_is_less_sure() -> None:

@@ -57,7 +57,7 @@ def test_the_mirrored_photo_has_the_mirrored_mask() -> None:
     light, _ = balls(ONE)
     found, mirrored = find_mask(light), find_mask(light[:, ::-1])
     assert overlap(mirrored.mask[:, ::-1], found.mask) > 0.99
-    assert mirrored.sureness == pytest.approx(found.sureness, abs=0.02)
+    assert mirrored.confidence == pytest.approx(found.confidence, abs=0.02)
 
 
 def test_the_mask_is_the_same_on_any_number_of_threads() -> None:
@@ -87,7 +87,7 @@ def test_hints_make_a_mask_sure_or_not() -> None:
     light, _ = balls(ONE)
     right = find_mask(light, Hints(points=((100, 75),)))
     wrong = find_mask(light, Hints(points=((12, 12), (190, 20)), others=((100, 75), (90, 70))))
-    assert right.sureness > 0.8 and wrong.sureness < right.sureness - 0.3
+    assert right.confidence > 0.8 and wrong.confidence < right.confidence - 0.3
 
 
 def test_each_thing_is_found() -> None:
@@ -106,7 +106,7 @@ def test_a_photo_without_mask_is_read(tmp_path: Path) -> None:
     light, (truth,) = balls(ONE)
     photo = read_photo(photo_of(light, tmp_path / "ball.png"), finder=MaskSearch())
     assert photo.original.mask_from == "automatic" and photo.found is not None
-    assert photo.original.sureness == photo.found.sureness >= 0.5
+    assert photo.original.confidence == photo.found.confidence >= 0.5
     assert overlap(photo.mask, truth) > 0.95
 
 
@@ -135,7 +135,7 @@ def test_hints_come_before_the_alpha_channel(tmp_path: Path) -> None:
     hints = Hints(points=((50, 80),), others=((150, 75),))
     photo = read_photo(tmp_path / "two.png", finder=MaskSearch(hints))
     assert photo.original.mask_from == "hints" and not photo.mask[75, 150]
-    assert photo.found is not None and photo.original.sureness == photo.found.sureness
+    assert photo.found is not None and photo.original.confidence == photo.found.confidence
 
 
 def test_each_part_of_a_given_mask_becomes_a_photo(tmp_path: Path) -> None:

@@ -1,12 +1,13 @@
-"""How much of what the scene network expects of highlights is sure, and whether a photo has any.
+"""A lower bound of the highlights that a network expects, and whether a photo has any.
 
 Problem: the network also takes some bright albedo for highlights, and light that is wrongly taken
 off does more harm than a highlight that stays.
 
 Equation: the network expects y = log(I / D) with a Laplace distribution of scale b. At a pixel,
-t = max(y - d b, 0) is sure, d = `doubt`: more than what is there is removed with a probability of
-exp(-d) / 2 only, so that the expected error falls. Highlights stand out in a photo if t, opened so
-that texture of a few pixels does not count, exceeds its 90th percentile by `stands_out` somewhere.
+t = max(y - d b, 0) is a lower bound of y, d = `doubt`: more than what is there is removed with a
+probability of exp(-d) / 2 only, so that the expected error falls. Highlights stand out in a photo
+if t, opened so that texture of a few pixels does not count, exceeds its 90th percentile by
+`stands_out` somewhere.
 
 Citation: see `networks.scene_network`; grey opening: J. Serra, "Image Analysis and Mathematical
 Morphology", 1982.
@@ -27,26 +28,27 @@ _SPECK = 0.005  # of the object's diagonal
 
 
 @dataclass(frozen=True)
-class SureRatioOptions:
-    """When light is taken off.
+class RemovalOptions:
+    """When light that a network expects to be a highlight is removed.
 
     Attributes
     ----------
     doubt : float
-        Number of error scales that y has to exceed; not negative.
+        What is subtracted from the network's expectation; not negative. Of a log ratio, in error
+        scales (`ratio_lower_bound`); of the log odds of a highlight, as it is.
     stands_out : float
         By how much the strongest highlight exceeds what is usual on the object.
     tint : float
         How coloured the removed light may be, see `light_tint`; at least 1.
     """
 
-    doubt: float = 1.6
+    doubt: float
     stands_out: float = 0.6
     tint: float = 1.5
 
 
-def sure_ratio(seen: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
-    """Return how much of the predicted log ratio of a photo and its diffuse image is sure.
+def ratio_lower_bound(seen: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
+    """Return a lower bound of the predicted log ratio of a photo and its diffuse image.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
-"""What is sure of the highlights that the scene network expects, and whether there are any."""
+"""A lower bound of the highlights that the scene network expects, and whether there are any."""
 
 from dataclasses import replace
 
 import numpy as np
 
 from isc_core.networks.scene_network import predict_scene
-from isc_core.separation.support.sure_ratio import highlights_stand_out, sure_ratio
+from isc_core.separation.support.ratio_bound import highlights_stand_out, ratio_lower_bound
 
 
 def test_doubt_removes_less() -> None:
@@ -18,11 +18,11 @@ def test_doubt_removes_less() -> None:
     spot = 0.5 * np.exp(-((x - 0.3) ** 2 + (y - 0.3) ** 2) / 0.02)
     image = ((0.5 * shading + spot)[..., None] * mask[..., None] * np.ones(3)).astype(np.float32)
     seen = predict_scene(image, mask)
-    ratios = [sure_ratio(seen, doubt) for doubt in (0, 1, 3)]
+    ratios = [ratio_lower_bound(seen, doubt) for doubt in (0, 1, 3)]
     np.testing.assert_array_equal(ratios[0], seen.log_ratio)
     assert ratios[0].sum() > ratios[1].sum() > ratios[2].sum()
-    sure = replace(seen, ratio_scale=np.zeros_like(seen.ratio_scale))
-    np.testing.assert_array_equal(sure_ratio(sure, 3), seen.log_ratio)
+    certain = replace(seen, ratio_scale=np.zeros_like(seen.ratio_scale))
+    np.testing.assert_array_equal(ratio_lower_bound(certain, 3), seen.log_ratio)
 
 
 def test_specks_and_even_layers_do_not_stand_out() -> None:
