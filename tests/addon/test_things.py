@@ -127,7 +127,7 @@ def test_all_come_in_one_undo_step_and_update_changes_them(
     addon: Any, shelf: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The operator that has the undo step is called once; Blender undoes in windows only."""
-    use(addon, shelf, own_scene=False, max_size=24)
+    use(addon, shelf, own_scene=False, max_size=24, model="naive")
     placed = []
 
     def place(staged: list[Any], **given: Any) -> Any:
@@ -153,10 +153,10 @@ def test_all_come_in_one_undo_step_and_update_changes_them(
 @pytest.mark.slow
 def test_cancel_leaves_nothing_half_made(addon: Any, shelf: Path) -> None:
     """At any step of the import, when some things are made and others are not."""
-    use(addon, shelf, own_scene=False, max_size=32)
+    use(addon, shelf, own_scene=False, max_size=32, model="naive")
     before = census(addon)
     request = request_from_settings(addon.context.scene)
-    for steps in (0, 1, 11, 20):
+    for steps in (0, 1, 8, 16):
         run = begin_run(operators.create_decompose_run(addon.context, request))
         while run.step().state == "running":
             pass
@@ -169,8 +169,8 @@ def test_cancel_leaves_nothing_half_made(addon: Any, shelf: Path) -> None:
         assert census(addon) == before and not run.folder.exists()
 
 
-def started(addon: Any, shelf: Path, size: int) -> Any:
-    use(addon, shelf, own_scene=False, max_size=size)
+def started(addon: Any, shelf: Path, size: int, model: str = "mdr") -> Any:
+    use(addon, shelf, own_scene=False, max_size=size, model=model)
     request = request_from_settings(addon.context.scene)
     return begin_run(operators.create_decompose_run(addon.context, request))
 
@@ -221,7 +221,7 @@ def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: st
 
 @pytest.mark.slow
 def test_a_thing_that_fails_leaves_the_others(addon: Any, shelf: Path) -> None:
-    run = started(addon, shelf, 25)
+    run = started(addon, shelf, 25, model="naive")
     (run.folder / "result" / "2").mkdir(parents=True)
     (run.folder / "result" / "2" / "diary.txt").write_text("mine")
     while not advance_run(addon.context, run):
