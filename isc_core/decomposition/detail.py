@@ -9,14 +9,20 @@ of the photo's mean channel, the fine changes on a level are
     d = I - S(s) - U L,
 
 L being the low frequencies of I - S on the coarsest level (periods above `_PERIOD` of the object's
-length), and U linear interpolation. From the coarsest level on, the relief R of a level is that
-which explains d (`shading.relief_from_shading`), found from 2 U R of the level before. The height
-is that of the solve plus b R of the finest level; b, which is 0 for paint, is what the whole object
-says (`shading.relief_evidence`). On the coarsest level R loses its low frequencies
-too, so that no level moves the overall shape; the light stays as it is.
+length), and U linear interpolation. Edges of paint (`shading.paint_edges`) stay in L, which is a
+bilateral average (`imaging.cross_bilateral`), and d counts little beside them: a Gaussian average
+would leave lines along each edge in d, and these are no relief.
+
+From the coarsest level on, the relief R of a level is that which explains d
+(`shading.relief_from_shading`), found from 2 U R of the level before. The height is that of the
+solve plus b R of the finest level; b, which is 0 for paint, is what the whole object says
+(`shading.relief_evidence`). On the coarsest level R loses its low frequencies too, so that no level
+moves the overall shape; the light stays as it is.
 
 Citation: see `shading.relief_from_shading`; pyramid: P. J. Burt, E. H. Adelson, IEEE Trans. Comm.
-31, 1983, doi:10.1109/TCOM.1983.1095851.
+31, 1983, doi:10.1109/TCOM.1983.1095851; smooth light apart from edges: F. Durand, J. Dorsey, "Fast
+bilateral filtering for the display of high-dynamic-range images", SIGGRAPH 2002,
+doi:10.1145/566654.566574.
 
 Tiles: a value depends on pixels near it alone, so relief is the same, bit for bit, for tiles of any
 size.
@@ -34,11 +40,13 @@ import numpy as np
 
 from ..imaging.blocks import block_means, means_inside
 from ..imaging.bounding_box import mask_slices
+from ..imaging.cross_bilateral import CrossBilateral
 from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian, masked_low_pass
 from ..imaging.tiles import Place, tiles_of
 from ..progress import Monitor
+from ..shading.paint_edges import ONE_PAINT, paint_guide, uniformity
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
 from ..shading.relief_from_shading import (
     REACH,
@@ -97,20 +105,20 @@ class _Smooth:
 
     Attributes
     ----------
-    maps : (h, w, 3) float32 ndarray
-        Slopes dz/dx and dz/dy of the smooth surface, and low frequencies of log light less log
-        shading: of the level, or of the next coarser one.
+    maps : (h, w, 4) float32 ndarray
+        Slopes dz/dx and dz/dy of the smooth surface, low frequencies of log light less log shading,
+        and how far there is one paint: of the level, or of the next coarser one.
     coarser : bool
     """
 
     maps: np.ndarray
     coarser: bool
 
-    def at(self, place: Place) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        """Return slopes (n, m) and low frequencies (n, m) at rows and columns of even numbers."""
+    def at(self, place: Place) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
+        """Return slopes, low frequencies and uniformity (n, m) at rows and columns of even ends."""
         part = doubled_at(self.maps, place) if self.coarser else self.maps[place]
-        right, down, low = (np.ascontiguousarray(part[..., k]) for k in range(3))
-        return (right, down), low
+        right, down, low, uniform = (np.ascontiguousarray(part[..., k]) for k in range(4))
+        return (right, down), low, uniform
 
     def finer(self, shape: tuple[int, ...]) -> "_Smooth":
         """Return the same for the next finer level; `shape` is that of this one."""
@@ -261,7 +269,7 @@ class Pyramid:
         """Return what the whole object says of relief; None where it is too small."""
         telling, found = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest()), []
         for level, _, smooth in telling:
-            slope, _ = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
+            slope, _, _ = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
             gain = shading_gain(slope, self.light)
             found.append(evidence_of(level.image / level.mean, level.mask, gain))
         return mean_evidence(found)
@@ -315,8 +323,12 @@ class Pyramid:
     def _coarsest(self) -> _Smooth:
         level = self.levels[-1]
         left = _log_light(level.image, level.mask, level.mean) - log_shading(self.slope, self.light)
-        low = _low_frequencies(left, level.mask, self.frame.length / 2**self.frame.halvings)
-        return _Smooth(np.stack([*self.slope, low], axis=2), False)
+        guide = paint_guide(level.image / level.mean, level.mask, left)
+        sigma = _SIGMA * _PERIOD * self.frame.length / 2**self.frame.halvings
+        smoother = CrossBilateral.of(guide, level.mask, sigma, ONE_PAINT)
+        low = _continued(smoother.low_pass(left), level.mask)
+        uniform = uniformity(guide, level.mask)
+        return _Smooth(np.stack([*self.slope, low, uniform], axis=2), False)
 
 
 @dataclass(frozen=True)
@@ -359,8 +371,13 @@ def _log_light(image: np.ndarray, mask: np.ndarray, mean: np.float32) -> np.ndar
 
 def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:
     """Low frequencies (H, W) of a level's map inside the mask, continued a little beyond it."""
-    low = np.where(mask, masked_low_pass(values, mask, _SIGMA * _PERIOD * length), 0)
-    return np.where(mask, low, masked_gaussian(low, mask, 1.0))
+    return _continued(masked_low_pass(values, mask, _SIGMA * _PERIOD * length), mask)
+
+
+def _continued(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """A map (H, W) inside the mask, continued a little beyond it."""
+    inside = np.where(mask, values, 0)
+    return np.where(mask, inside, masked_gaussian(inside, mask, 1.0))
 
 
 def _enlarged(relief: np.ndarray) -> np.ndarray:
@@ -390,9 +407,9 @@ def _refined(
     for k, tile in enumerate(tiles):
         monitor.report("fine relief", k / len(tiles))
         mask = level.mask[tile.outer]
-        slope, low = smooth.at(tile.outer)
+        slope, low, uniform = smooth.at(tile.outer)
         change = _log_light(level.image[tile.outer], mask, level.mean) - low
         change -= log_shading(slope, light)
-        refined = relief_from_shading(change, mask, slope, light, relief[tile.outer])
+        refined = relief_from_shading(change, mask * uniform, slope, light, relief[tile.outer])
         found[tile.inner] = np.where(mask, refined, 0)[tile.own]  # tiles end with the object
     return found

@@ -7,15 +7,15 @@ the slope, the photo says nothing.
 Equation: with s_0 the slopes of the smooth surface, S log shading as a function of the slope, and d
 the fine changes of log light, the height r of the relief has the least
 
-    sum over the object of (d - (S(s_0 + grad r) - S(s_0)))^2
+    sum over the object of v^2 (d - (S(s_0 + grad r) - S(s_0)))^2
     + rho^2 sum of |grad r|^2 / (1 + |s_0|^2)
 
-that is, its slopes are expected to be Gaussian, of equal strength in all directions and in every
-octave, larger where the surface is seen from the side; rho is the noise of d over their standard
-deviation. S is made linear at an estimate from an image of half the size. The sum then is quadratic
-in r, and a few Chebyshev iterations, preconditioned by the sums of its matrix' rows, find what that
-estimate lacks: coarser relief is known, and the finest converges at once. Every value depends on
-pixels up to `REACH` away, by the same operations wherever they lie.
+with the weight v of each pixel. That is, its slopes are expected to be Gaussian, of equal strength
+in all directions and in every octave, larger where the surface is seen from the side; rho is the
+noise of d over their standard deviation. S is made linear at an estimate from an image of half the
+size. The sum then is quadratic in r, and a few Chebyshev iterations, preconditioned by the sums of
+its matrix' rows, find what that estimate lacks: coarser relief is known, and the finest converges
+at once. Every value depends on pixels up to `REACH` away, by the same operations wherever they lie.
 
 Citation: linear shape from shading: A. Pentland, "Linear shape from shading", IJCV 4, 1990,
 doi:10.1007/BF00054993; iteration: G. H. Golub, R. S. Varga, "Chebyshev semi-iterative methods",
@@ -130,7 +130,7 @@ def shading_gain(slope: Slopes, light: np.ndarray) -> Slopes:
 
 
 def relief_from_shading(
-    change: np.ndarray, inside: np.ndarray, slope: Slopes, light: np.ndarray, relief: np.ndarray
+    change: np.ndarray, weight: np.ndarray, slope: Slopes, light: np.ndarray, relief: np.ndarray
 ) -> np.ndarray:
     """Refine an estimate of the relief by what an image of this size shows beyond half of it.
 
@@ -138,8 +138,8 @@ def relief_from_shading(
     ----------
     change : (H, W) float32 ndarray
         Fine changes of log light, d.
-    inside : (H, W) bool ndarray
-        Where they count.
+    weight : (H, W) ndarray
+        How much they count, v, in [0, 1].
     slope : tuple of (H, W) float32 ndarray
         Of the smooth surface, dz/dx and dz/dy, x right and y down.
     light : (9,) ndarray
@@ -158,8 +158,8 @@ def relief_from_shading(
     g1, g2 = shading_gain(whole, light)
     left = change - (log_shading(whole, light) - log_shading(slope, light))
     left += g1 * tilt[0] + g2 * tilt[1]
-    left *= inside
-    g1, g2 = g1 * inside, g2 * inside
+    left *= weight
+    g1, g2 = g1 * weight, g2 * weight
     steepness = np.minimum(1 + slope[0] * slope[0] + slope[1] * slope[1], np.float32(_STEEPEST))
     prior = np.float32(RHO**2) / steepness
     across, down, both = g1 * g1 + prior, g2 * g2 + prior, g1 * g2

@@ -74,6 +74,20 @@ def test_the_place_in_the_frame_does_not_matter() -> None:
     assert np.array_equal(moved[5:-30, 11:-2], fine_relief(diffuse, mask, height, LIGHT, 4096))
 
 
+def test_edges_of_paint_are_no_relief_and_relief_beside_them_stays() -> None:
+    diffuse, mask, height = ball(240)
+    smooth = 0.5 * shaded(height, LIGHT, mask)[1]
+    columns = np.arange(240)
+    paint = np.where((columns // 40 % 2)[:, None], (0.9, 0.4, 0.3), (0.3, 0.5, 0.9))
+    bumps, plain, printed, both = (
+        Pyramid.of(image, mask, height, LIGHT).relief(4096)
+        for image in (diffuse, smooth, paint * smooth, paint * diffuse)
+    )
+    assert (printed - plain)[mask].std() < 0.2 * bumps[mask].std()
+    away = mask & (np.abs(columns % 40 - 20) < 12)
+    assert np.corrcoef(both[away], bumps[away])[0, 1] > 0.95
+
+
 def test_cancelling_stops_it() -> None:
     diffuse, mask, height = ball(97)
     with pytest.raises(Cancelled):
