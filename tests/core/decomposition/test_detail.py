@@ -85,7 +85,7 @@ def test_edges_of_paint_are_no_relief_and_relief_beside_them_stays() -> None:
     )
     assert (printed - plain)[mask].std() < 0.2 * bumps[mask].std()
     away = mask & (np.abs(columns % 40 - 20) < 12)
-    assert np.corrcoef(both[away], bumps[away])[0, 1] > 0.95
+    assert np.corrcoef(both[away], bumps[away])[0, 1] > 0.9
 
 
 def test_cancelling_stops_it() -> None:
