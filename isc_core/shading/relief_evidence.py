@@ -17,7 +17,7 @@ The probability of relief is logistic in c and r,
 
 Relief is multiplied by
 
-    b(p) = (p - .4) / .3, at least 0 and at most 1,
+    b(p) = (p - .3) / .3, at least 0 and at most 1,
 
 so that nothing is added where paint is clearly more likely, and all of it where relief is. The
 weights are fitted to the choice set of rendered bodies by `benchmarks.detail.relief_rule`.
@@ -44,7 +44,7 @@ _SMOOTH = 2.0  # standard deviation of the average, pixels
 _DARK = 0.01  # of the object's mean light
 _LEAST_GAIN = 0.05
 _FEWEST = 30  # blocks
-_NOTHING, _ALL = 0.4, 0.7  # probabilities: up to the one nothing is added, from the other all
+_NOTHING, _ALL = 0.3, 0.6  # probabilities: up to the one nothing is added, from the other all
 
 
 @dataclass(frozen=True)
