@@ -24,7 +24,7 @@ def test_a_body_left_out_does_not_decide_about_itself() -> None:
 
 
 def test_what_is_explained_and_invented_follows_from_the_added_shares() -> None:
-    shares, probability = np.array(SHARES), np.array([0.55, 0.4, 0.7, 0.55])
+    shares, probability = np.array(SHARES), np.array([0.45, 0.3, 0.6, 0.45])
     gained = (1 - (1 - shares) ** 2)[:, None]
     relief = {"explained": gained, "error": 0 * gained, "energy": 2 + 0 * gained}
     paint = {"explained": 0 * gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained}
