@@ -8,17 +8,29 @@ deviation s of each component,
   cost = w/n_v * sum over valid pixels of |t - m|^2 / (2 s^2).
 The term of the `silhouette` stays beside it.
 
-Citation: none; the quadratic term of a Gaussian likelihood.
+The solver can start from the shape that the normals add up to: m is averaged over blocks of pixels,
+as the network is coarser than the solver, and the slopes of the blocks are integrated in least
+squares. Where normals are uncertain, m is short and the shape is flat.
+
+Citation: the quadratic term of a Gaussian likelihood; integration: B. K. P. Horn, M. J. Brooks,
+"The variational approach to shape from shading", CVGIP 33, 1986,
+doi:10.1016/0734-189X(86)90114-3.
 
 Limits: s is the deviation of one pixel, while errors of neighbours are correlated; w compensates
-for that on average.
+for that on average. The shape is one sheet: jumps of depth become slopes.
 """
 
 import numpy as np
 from scipy import ndimage
 
+from ..baselines.poisson import integrate
+from ..imaging.blocks import block_means
+from ..imaging.framing import continued_height
 from ..scene.normal_estimate import NormalEstimate
 from .silhouette import ExpectedNormals
+
+_STEEPEST = 0.95  # largest in-plane part of a block's normal
+_TOLERANCE = 1e-3  # of the integration: the solver goes on from there
 
 
 def normals_from_prediction(
@@ -49,3 +61,36 @@ def normals_from_prediction(
     deviation = predicted.deviation[nearest].astype(float)
     maps = (-normal[..., 1], normal[..., 0], 1 / deviation**2)
     return ExpectedNormals(*(np.where(mask, values, 0) for values in maps))
+
+
+def predicted_height(predicted: ExpectedNormals, mask: np.ndarray, block: int) -> np.ndarray:
+    """Return the height that predicted normals add up to, in blocks of pixels.
+
+    Parameters
+    ----------
+    predicted : ExpectedNormals
+        Of `normals_from_prediction`.
+    mask : (H, W) bool ndarray
+        The object, not empty.
+    block : int
+        Side of a block, in pixels.
+
+    Returns
+    -------
+    (ceil(H / block), ceil(W / block)) ndarray
+        Toward the viewer, in blocks, of mean 0 on each part of the object; continued beyond it.
+    """
+    padding = [(0, -n % block) for n in mask.shape]
+    maps = np.stack([mask, predicted.down * mask, predicted.right * mask], axis=2)
+    maps = block_means(np.pad(maps, (*padding, (0, 0))), block)
+    cover = maps[..., 0]
+    inside = cover >= min(0.5, float(cover.max()))
+    down, right = (maps[..., k] / np.maximum(cover, 1e-6) for k in (1, 2))
+    shrink = np.minimum(1, _STEEPEST / np.maximum(np.hypot(down, right), 1e-6))
+    toward = np.sqrt(1 - shrink**2 * (down**2 + right**2))
+    slope_down, slope_right = -shrink * down / toward, -shrink * right / toward
+    step_down, step_right = np.zeros((2, *cover.shape))
+    step_down[:-1] = (slope_down[1:] + slope_down[:-1]) / 2
+    step_right[:, :-1] = (slope_right[:, 1:] + slope_right[:, :-1]) / 2
+    height = integrate(step_right, step_down, inside, _TOLERANCE)
+    return continued_height(np.where(inside, height, 0), inside)

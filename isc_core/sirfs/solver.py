@@ -26,6 +26,7 @@ from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
 from .illumination import stack, unstack
+from .normal_prior import predicted_height
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
 from .settings import Start
@@ -34,6 +35,7 @@ STAGE = "shape and light"
 MOST_THREADS = 64  # more only wait for each other
 # Level of the pyramid: finer detail of the start belongs to the silhouette, not to the shape.
 _START_LEVEL = 2
+_PREDICTED_LEVEL = 1  # about as fine as the network that predicts the normals
 # Evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
 # differ.
 _TRIAL = 80
@@ -323,13 +325,22 @@ class ParameterVector:
         """
         p, x = self._problem, np.zeros_like(self.x)
         self._set_light(x, (start.light - 1) * p.priors.light.offset)
-        if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
-            level = min(_START_LEVEL, len(self.shapes) - 1)
+        if self.shapes and p.observation is None:
+            self._place_shape(start, self.levels(x))
+        return x
+
+    def _place_shape(self, start: Start, levels: list[np.ndarray]) -> None:
+        """Write the shape of a start into one of the levels, which are 0."""
+        p = self._problem
+        if start.predicted and p.predicted_normals is not None:
+            level = min(_PREDICTED_LEVEL, len(levels) - 1)
+            levels[level][...] = predicted_height(p.predicted_normals, p.mask, 2**level)
+        elif start.dome and p.silhouette is not None:
+            level = min(_START_LEVEL, len(levels) - 1)
             height = start.dome * p.silhouette.dome
             for _ in range(level):
                 height = down(height) / _COARSER
-            self.levels(x)[level][...] = height
-        return x
+            levels[level][...] = height
 
     def of(self, height: np.ndarray, light: np.ndarray) -> np.ndarray:
         """Return the vector of a height and a light.

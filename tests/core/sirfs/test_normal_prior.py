@@ -8,7 +8,7 @@ import pytest
 from isc_core.scene.normal_estimate import NormalEstimate
 from isc_core.shading.spherical_harmonics import normal_from_reference
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.normal_prior import normals_from_prediction
+from isc_core.sirfs.normal_prior import normals_from_prediction, predicted_height
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import isc_weights
@@ -26,6 +26,42 @@ def test_the_field_is_in_the_reference_s_frame_and_goes_on_beyond_what_was_seen(
     np.testing.assert_allclose(np.dstack([field.right, -field.down])[inner], normal[inner][:, :2])
     np.testing.assert_allclose(field.precision[mask], 25)
     assert not field.precision[~mask].any()
+
+
+@pytest.mark.parametrize("block", [1, 2, 4])
+def test_the_normals_of_a_ball_add_up_to_the_ball(block: int) -> None:
+    normal, mask = ball()
+    field = normals_from_prediction(NormalEstimate(normal, np.where(mask, 0.2, 0)), mask)
+    assert field is not None
+    height = predicted_height(field, mask, block) * block
+    assert height.shape == tuple(-(-n // block) for n in mask.shape)
+    assert np.isfinite(height).all()
+    rows, columns = (np.arange(n) * block + (block - 1) / 2 for n in height.shape)
+    radius, middle = (mask.shape[0] - 1) / 2 * 0.9, (mask.shape[0] - 1) / 2
+    square = radius**2 - (rows[:, None] - middle) ** 2 - (columns - middle) ** 2
+    true = np.sqrt(np.maximum(square, 0))
+    inner = true > 0.6 * radius
+    assert np.ptp((height - true)[inner]) < 0.1 * np.ptp(true[inner])
+
+
+def test_uncertain_normals_add_up_to_a_flatter_shape() -> None:
+    normal, mask = ball()
+    sure, unsure = (
+        normals_from_prediction(NormalEstimate(k * normal, np.where(mask, 0.2, 0)), mask)
+        for k in (1.0, 0.5)
+    )
+    assert sure is not None and unsure is not None
+    heights = [predicted_height(field, mask, 2) for field in (sure, unsure)]
+    assert 0.2 < np.ptp(heights[1]) / np.ptp(heights[0]) < 0.6
+
+
+def test_a_block_of_one_pixel_has_no_shape() -> None:
+    mask = np.zeros((5, 7), bool)
+    mask[2, 3] = True
+    seen = NormalEstimate(np.where(mask[..., None], (0.6, 0, 0.8), 0), np.where(mask, 0.2, 0))
+    field = normals_from_prediction(seen, mask)
+    assert field is not None
+    np.testing.assert_array_equal(predicted_height(field, mask, 2), np.zeros((3, 4)))
 
 
 @pytest.mark.slow

@@ -11,8 +11,11 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor, ProgressEvent
 from isc_core.scene.known_inputs import DepthObservation
+from isc_core.scene.normal_estimate import NormalEstimate
+from isc_core.shading.spherical_harmonics import normal_from_reference
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.illumination import unstack
+from isc_core.sirfs.normal_prior import normals_from_prediction
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.settings import Start
@@ -260,6 +263,24 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
         observation=DepthObservation(scene.height),
     )
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"
+
+
+def test_it_begins_with_the_shape_that_predicted_normals_add_up_to() -> None:
+    scene = hemisphere()
+    plain = make_problem(scene)
+    normal = normal_from_reference(normals(scene.height))
+    told = NormalEstimate(np.where(scene.mask[..., None], normal, 0), np.where(scene.mask, 0.1, 0))
+    problem = replace(
+        plain,
+        predicted_normals=normals_from_prediction(told, scene.mask),
+        weights=replace(plain.weights, starts=(Start(dome=1, predicted=True),)),
+    )
+    unmoved = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(iterations=0))
+    inner = ndimage.binary_erosion(scene.mask, iterations=4)
+    off = (solve(problem, unmoved).height - scene.height)[inner]
+    assert np.ptp(off) < 0.15 * np.ptp(scene.height[inner])
+    measured = replace(problem, observation=DepthObservation(scene.height))
+    assert not solve(measured, unmoved).height.any(), "what was measured decides"
 
 
 def test_it_goes_on_from_a_given_height_and_light() -> None:
