@@ -11,7 +11,7 @@ is noise), the log light I and the log shading S of the smooth surface. Relief h
 chroma, and changes brightness less than most print does: k is small. With the range e of g over the
 3 x 3 pixels around a pixel, the paint is uniform by exp(-e^2 / (2 w^2)).
 
-The numbers were chosen on the choice set of `benchmarks.detail.sets`.
+The numbers were chosen on the validation set of `benchmarks.detail.sets`.
 
 Citation: none; that chroma tells paint from shading is classical: B. V. Funt, M. S. Drew,
 M. Brockington, "Recovering shading from color images", ECCV 1992, doi:10.1007/3-540-55426-2_15.
