@@ -25,16 +25,15 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
-from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
-from training.masks.backgrounds import crop, read_crops
-from training.masks.composites import Composites
+from training.masks.composites import CompositeDraws, Composites
 from training.masks.held_out import SIDE, masked_picture
-from training.masks.ingredients import Ingredients
+from training.masks.ingredients import panoramas_in
+from training.masks.packs import Ingredients
 
 KINDS = ("box", "points", "points and not")
-_BACKGROUNDS, _BATCH, _SEED = 60, 8, 5
+_BATCH, _SEED = 8, 5
 _MOST_MARGIN = 0.15  # of a box, of the thing's width or height
 _LEAST = 200  # pixels of a thing
 _RIGHT = 0.5  # overlap
@@ -77,11 +76,11 @@ def composites(
     """
     rng = np.random.default_rng(_SEED)
     torch.manual_seed(_SEED)
-    judged = [one.radiance for one in read_crops(panoramas, 0) if one.judged]
-    grounds = [_coded(crop(judged, rng, SIDE)) for _ in range(_BACKGROUNDS)]
     pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
-    bodies = Ingredients(np.stack(pictures), np.stack(grounds))
-    compose, made = Composites(bodies, _BATCH, SIDE, hinted=1, shares=(0, 0.5, 0.5)), 0
+    judged, patterns = panoramas_in(panoramas, 0, judged=True), np.zeros((1, 8, 8), np.uint8)
+    draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0.5, 0.5), grounds=(0, 0))
+    compose = Composites(Ingredients(np.stack(pictures), judged, patterns), draw, SIDE)
+    made = 0
     while made < count:
         batch = compose(rng)
         for photo, frame, mask in zip(batch.photo, batch.frame, batch.mask, strict=True):
@@ -90,11 +89,6 @@ def composites(
             if made < count and truth.sum() >= _LEAST:
                 made += 1
                 yield photo.permute(1, 2, 0).numpy()[place], truth
-
-
-def _coded(light: np.ndarray) -> np.ndarray:
-    coded = linear_to_srgb(np.clip(light, 0, 1))
-    return np.asarray(np.rint(255 * coded).transpose(2, 0, 1), np.uint8)
 
 
 def drawn_hints(truth: np.ndarray, kind: str, rng: np.random.Generator) -> Hints:

@@ -1,221 +1,332 @@
 """Backgrounds of composites: crops of panoramas, tables before them, plain backdrops.
 
 Problem: what stands behind a thing in a photo is a room, a street or a wood, a table with a pattern
-before one of them, or a wall and a cloth of one colour.
+before one of them, or a wall and a cloth of one colour. None is to be seen twice.
 
 Equation: a crop is the perspective picture of a camera in the panorama's middle: pixel (x, y) sees
 along R (x tan(f / 2), y tan(f / 2), -1) for a field of view f and a turn R. A table is a plane
-below the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h).
+below the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h). The pattern is
+blurred by a Gaussian whose Fourier transform is exp(-2 pi^2 s^2 f^2).
 
 Limits: panoramas of 512 columns are soft in narrow crops.
 """
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
+import torch
 
-from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.photo import read_linear
+from ..world.random_draws import log_uniforms
+from ..world.tensor_batch import TensorBatch, chosen
 
-from ..world.environments import read_panoramas
-from ..world.patterns import Atlas
-from ..world.random_draws import log_uniform
-
-SIDE = 160
-_FILES = (".exr", ".hdr")
-_PLAIN, _TABLE = 0.2, 0.45  # shares of backgrounds: plain ones; tables before crops or plain ones
+SHARES = (0.2, 0.45)  # of backgrounds: plain ones; tables before crops or plain ones
+_PATTERN_PIXEL = 0.3  # standard deviation of the blur of a pattern, pixels of the table's front
+_SPARSE = 3  # every third row and column says how bright a crop is
 
 
 @dataclass(frozen=True)
-class Surroundings:
-    """A panorama at the resolution of its file.
+class Crops(TensorBatch):
+    """Perspective pictures of panoramas.
 
     Attributes
     ----------
-    radiance : (rows, 2 rows, 3) float32 ndarray
-        Linear.
-    judged : bool
-        Kept for judging.
+    panorama : (B,) tensor
+        Which it is, as a share of all, in [0, 1).
+    half : (B,) tensor
+        Tangent of half of the field of view.
+    turn : (B, 3, 3) tensor
+        R of the module, for rows.
+    azimuth : (B,) tensor
+        Radians.
+    quantile, exposure : (B,) tensor
+        The share of the pixels that are darker than that which gets this light.
     """
 
-    radiance: np.ndarray
-    judged: bool
+    panorama: torch.Tensor
+    half: torch.Tensor
+    turn: torch.Tensor
+    azimuth: torch.Tensor
+    quantile: torch.Tensor
+    exposure: torch.Tensor
 
 
-def read_crops(folder: Path, seed: int) -> list[Surroundings]:
-    """Read panoramas as they are, with the split of `read_panoramas`.
+@dataclass(frozen=True)
+class Backdrops(TensorBatch):
+    """Walls and cloths of one colour.
+
+    Attributes
+    ----------
+    shown : (B,) bool tensor
+        Instead of a crop.
+    colour : (B, 3) tensor
+    slope : (B, 2) tensor
+        Of the log light, right and down.
+    vignette : (B,) tensor
+    grain, width : (B,) tensor
+        Standard deviation of a faint texture's log light, and its size in pixels.
+    """
+
+    shown: torch.Tensor
+    colour: torch.Tensor
+    slope: torch.Tensor
+    vignette: torch.Tensor
+    grain: torch.Tensor
+    width: torch.Tensor
+
+
+@dataclass(frozen=True)
+class Tables(TensorBatch):
+    """Tables before backgrounds.
+
+    Attributes
+    ----------
+    shown : (B,) bool tensor
+    pattern : (B,) tensor
+        Which it is, as a share of all, in [0, 1).
+    horizon, edge : (B,) tensor
+        h of the module; where the table ends.
+    tilt : (B,) tensor
+        By how much rows fall to the right.
+    spin, scale : (B,) tensor
+        Of the pattern; radians.
+    offset : (B, 2) tensor
+    first, second : (B, 3) tensor
+        Its colours.
+    fall : (B, 2) tensor
+        Of the log light, right and down.
+    """
+
+    shown: torch.Tensor
+    pattern: torch.Tensor
+    horizon: torch.Tensor
+    edge: torch.Tensor
+    tilt: torch.Tensor
+    spin: torch.Tensor
+    scale: torch.Tensor
+    offset: torch.Tensor
+    first: torch.Tensor
+    second: torch.Tensor
+    fall: torch.Tensor
+
+
+@dataclass(frozen=True)
+class Grounds(TensorBatch):
+    """What is drawn of the backgrounds of a batch.
+
+    Attributes
+    ----------
+    window : (B, 2, 2) tensor
+        Scale and place, right and down, of what is shown of a picture.
+    crops : Crops
+    backdrops : Backdrops
+    tables : Tables
+    """
+
+    window: torch.Tensor
+    crops: Crops
+    backdrops: Backdrops
+    tables: Tables
+
+
+def draw_grounds(
+    rng: np.random.Generator, number: int, shares: tuple[float, float] = SHARES
+) -> Grounds:
+    """Draw backgrounds.
 
     Parameters
     ----------
-    folder : Path
-    seed : int
-        Chooses which are judged.
-
-    Returns
-    -------
-    list of Surroundings
-
-    Raises
-    ------
-    InputError
-        If there is none, or one cannot be used.
-    """
-    judged = {one.name: one.judged for one in read_panoramas(folder, seed)}
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in _FILES)
-    return [Surroundings(read_linear(path, "linear"), judged[path.stem]) for path in files]
-
-
-def background(
-    panoramas: list[np.ndarray], atlas: Atlas, rng: np.random.Generator, side: int = SIDE
-) -> np.ndarray:
-    """Draw a background.
-
-    Parameters
-    ----------
-    panoramas : list of (rows, 2 rows, 3) ndarray
-    atlas : Atlas
     rng : numpy.random.Generator
-    side : int
-        Pixels.
+    number : int
+    shares : tuple of float
+        Of plain ones, and of those with a table.
 
     Returns
     -------
-    (3, side, side) uint8 ndarray
-        sRGB.
+    Grounds
+        On the CPU.
     """
-    plain = rng.random() < _PLAIN
-    light = backdrop(rng, side) if plain else crop(panoramas, rng, side)
-    if rng.random() < _TABLE:
-        light = before(light, atlas, rng)
-    coded = linear_to_srgb(np.clip(light, 0, 1))
-    return np.asarray(np.rint(255 * coded).clip(0, 255).transpose(2, 0, 1), np.uint8)
-
-
-def crop(panoramas: list[np.ndarray], rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw a perspective picture of one of several panoramas.
-
-    Parameters
-    ----------
-    panoramas : list of (rows, 2 rows, 3) ndarray
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side, 3) float32 ndarray
-        Linear, exposed so that most of it is below 1.
-    """
-    panorama = panoramas[int(rng.integers(len(panoramas)))]
-    rows = len(panorama)
-    half = np.tan(np.radians(log_uniform(rng, 35, 105)) / 2)
-    across = ((np.arange(side) + 0.5) * (2 / side) - 1) * half
-    x, y = np.meshgrid(across, -across)
-    rays = np.stack([x, y, -np.ones_like(x)], axis=-1)
-    rays = rays @ (_turn(2, rng.normal(0, 5)) @ _turn(0, rng.normal(10, 18)))
-    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
-    polar = np.arccos(np.clip(rays[..., 1], -1, 1)) * (rows / np.pi) - 0.5
-    turn = np.arctan2(rays[..., 0], -rays[..., 2]) + rng.uniform(0, 2 * np.pi)
-    column = turn * (rows / np.pi) - 0.5
-    at = [np.clip(polar, 0, rows - 1), column]
-    picture = np.stack(
-        [
-            ndimage.map_coordinates(panorama[..., c], at, order=1, mode="grid-wrap")
-            for c in range(3)
-        ],
-        axis=-1,
+    zoom = rng.uniform(0.6, 1, (number, 1))
+    place = (1 - zoom) * rng.uniform(-1, 1, (number, 2))
+    scale = zoom * np.stack([rng.choice([-1, 1], number), np.ones(number)], axis=1)
+    return Grounds(
+        torch.from_numpy(np.stack([scale, place], axis=1)).float(),
+        _draw_crops(rng, number),
+        _draw_backdrops(rng, number, shares[0]),
+        _draw_tables(rng, number, shares[1]),
     )
-    bright = np.quantile(picture.max(axis=-1), rng.uniform(0.6, 0.98))
-    return np.asarray(picture * (rng.uniform(0.4, 1) / max(float(bright), 1e-6)), np.float32)
 
 
-def _turn(axis: int, degrees: float) -> np.ndarray:
+def _draw_crops(rng: np.random.Generator, number: int) -> Crops:
+    turn = _turns(2, rng.normal(0, 5, number)) @ _turns(0, rng.normal(10, 18, number))
+    return Crops.of(
+        {
+            "panorama": rng.random(number),
+            "half": np.tan(np.radians(log_uniforms(rng, 35, 105, number)) / 2),
+            "turn": turn,
+            "azimuth": rng.uniform(0, 2 * np.pi, number),
+            "quantile": rng.uniform(0.6, 0.98, number),
+            "exposure": rng.uniform(0.4, 1, number),
+        }
+    )
+
+
+def _turns(axis: int, degrees: np.ndarray) -> np.ndarray:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    matrix = np.eye(3)
+    matrix = np.tile(np.eye(3), (len(degrees), 1, 1))
     one, other = (k for k in range(3) if k != axis)
-    matrix[one, one] = matrix[other, other] = c
-    matrix[one, other], matrix[other, one] = -s, s
+    matrix[:, one, one] = matrix[:, other, other] = c
+    matrix[:, one, other], matrix[:, other, one] = -s, s
     return matrix
 
 
-def backdrop(rng: np.random.Generator, side: int) -> np.ndarray:
-    """Draw a plain backdrop: one colour, with gradients of light, a vignette, a faint texture.
+def _draw_backdrops(rng: np.random.Generator, number: int, share: float) -> Backdrops:
+    return Backdrops.of(
+        {
+            "shown": rng.random(number) < share,
+            "colour": _colours(rng, number),
+            "slope": rng.normal(0, 0.35, (number, 2)),
+            "vignette": rng.uniform(0, 0.4, number),
+            "grain": rng.uniform(0.01, 0.08, number) * (rng.random(number) < 0.4),
+            "width": rng.uniform(1, 8, number),
+        }
+    )
+
+
+def _draw_tables(rng: np.random.Generator, number: int, share: float) -> Tables:
+    near = rng.random(number) < 0.75
+    horizon = np.where(near, rng.uniform(-2.5, 0.4, number), rng.uniform(-8, -1, number))
+    edge = np.maximum(rng.uniform(-0.1, 0.7, number), horizon + 0.15)
+    first, two = _colours(rng, number), rng.random((number, 1)) > 0.35
+    return Tables.of(
+        {
+            "shown": rng.random(number) < share,
+            "pattern": rng.random(number),
+            "horizon": horizon,
+            "edge": np.where(rng.random(number) < 0.7, edge, -2.0),
+            "tilt": rng.normal(0, 0.05, number),
+            "spin": rng.uniform(0, 2 * np.pi, number),
+            "scale": log_uniforms(rng, 0.3, 4, number),
+            "offset": rng.random((number, 2)),
+            "first": first,
+            "second": first * np.exp(two * rng.normal(0, 0.5, (number, 3))),
+            "fall": rng.normal((0, 0.1), (0.3, 0.25), (number, 2)),
+        }
+    )
+
+
+def _colours(rng: np.random.Generator, number: int) -> np.ndarray:
+    """Colours (N, 3) of walls, cloths and tables, linear: mostly pale."""
+    spread = np.where(rng.random((number, 1)) < 0.7, 0.12, 0.6)
+    tint = spread * rng.normal(0, 1, (number, 3))
+    grey = log_uniforms(rng, 0.03, 0.9, (number, 1))
+    return np.asarray(grey * np.exp(tint - tint.mean(axis=1, keepdims=True)))
+
+
+class Backgrounds:
+    """Shows backgrounds on the device that holds panoramas and patterns.
 
     Parameters
     ----------
-    rng : numpy.random.Generator
-    side : int
-
-    Returns
-    -------
-    (side, side, 3) float32 ndarray
+    panoramas : (P, rows, 2 rows, 3) tensor
         Linear.
+    patterns : (M, side, side) uint8 tensor
     """
-    across = (np.arange(side) + 0.5) * (2 / side) - 1
-    x, y = np.meshgrid(across, across)
-    slope = rng.normal(0, 0.35, 2)
-    log_light = slope[0] * x + slope[1] * y - rng.uniform(0, 0.4) * (x**2 + y**2)
-    if rng.random() < 0.4:
-        coarse = rng.normal(0, rng.uniform(0.02, 0.2), (side, side))
-        log_light += ndimage.gaussian_filter(coarse, width := rng.uniform(0.5, 4)) * width
-    return np.asarray(colour(rng) * np.exp(log_light)[..., None], np.float32)
+
+    def __init__(self, panoramas: torch.Tensor, patterns: torch.Tensor) -> None:
+        self._panoramas, self._patterns = panoramas, patterns
+
+    def __call__(self, drawn: Grounds, side: int) -> torch.Tensor:
+        """Show backgrounds.
+
+        Parameters
+        ----------
+        drawn : Grounds
+            On the device.
+        side : int
+            Pixels.
+
+        Returns
+        -------
+        (B, 3, side, side) tensor
+            Linear, in [0, 1].
+        """
+        across = (torch.arange(side, device=drawn.window.device) + 0.5) * (2 / side) - 1
+        line = drawn.window[:, 0, :, None] * across + drawn.window[:, 1, :, None]
+        x, y = torch.broadcast_tensors(line[:, 0, None], line[:, 1, :, None])
+        light = self._cropped(drawn.crops, x, y)
+        plain = drawn.backdrops.shown[:, None, None, None]
+        light = torch.where(plain, _backdrop(drawn.backdrops, x, y), light)
+        return self._before(light, drawn.tables, x, y).clamp(0, 1).permute(0, 3, 1, 2)
+
+    def _cropped(self, drawn: Crops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+        rows, half = self._panoramas.shape[1], drawn.half[:, None, None]
+        rays = torch.stack([x * half, -y * half, -torch.ones_like(x)], dim=-1)
+        rays = torch.einsum("bhwi,bij->bhwj", rays, drawn.turn)
+        up = rays[..., 1] / rays.norm(dim=-1)
+        turn = torch.atan2(rays[..., 0], -rays[..., 2]) + drawn.azimuth[:, None, None]
+        at = (up.clamp(-1, 1).arccos(), turn)
+        row, column = (angle * (rows / torch.pi) - 0.5 for angle in at)
+        which = chosen(drawn.panorama, len(self._panoramas))
+        picture = _looked_up(self._panoramas, which, row.clamp(0, rows - 1), column)
+        bright = picture[:, ::_SPARSE, ::_SPARSE].amax(-1).flatten(1).sort(1).values
+        place = (drawn.quantile * (bright.shape[1] - 1)).round().long()
+        bright = bright.gather(1, place[:, None])[:, 0].clamp(min=1e-6)
+        return picture * (drawn.exposure / bright)[:, None, None, None]
+
+    def _before(
+        self, light: torch.Tensor, drawn: Tables, x: torch.Tensor, y: torch.Tensor
+    ) -> torch.Tensor:
+        side, size = x.shape[-1], self._patterns.shape[-1]
+        value = {name: part[:, None, None] for name, part in vars(drawn).items()}
+        y = y + value["tilt"] * x
+        away = (y - value["horizon"]).clamp(min=0.05)
+        u, v = x * value["scale"] / away, 1.5 * value["scale"] / away
+        sine, cosine = value["spin"].sin(), value["spin"].cos()
+        row = (sine * u + cosine * v + value["offset"][..., 0]) * size
+        column = (cosine * u - sine * v + value["offset"][..., 1]) * size
+        maps = self._patterns[chosen(drawn.pattern, len(self._patterns))]
+        maps = _blurred(maps, drawn.scale * (_PATTERN_PIXEL / side))[..., None]
+        grey = _looked_up(maps, torch.arange(len(maps), device=maps.device), row, column)
+        fall = value["fall"][..., 0] * x + value["fall"][..., 1] * y
+        table = torch.lerp(value["first"], value["second"], grey) * fall.exp()[..., None]
+        share = ((y - value["edge"]) * (side / 4)).clamp(0, 1) * value["shown"]
+        return torch.lerp(light, table, share[..., None])
 
 
-def colour(rng: np.random.Generator) -> np.ndarray:
-    """Draw a colour of a wall, a cloth or a table: mostly pale.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-
-    Returns
-    -------
-    (3,) ndarray
-        Linear.
-    """
-    tint = rng.normal(0, 0.12 if rng.random() < 0.7 else 0.6, 3)
-    return np.asarray(log_uniform(rng, 0.03, 0.9) * np.exp(tint - tint.mean()))
+def _backdrop(drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    value = {name: part[:, None, None] for name, part in vars(drawn).items()}
+    side = x.shape[-1]
+    noise = torch.randn(len(x), side, side, 1, device=x.device)
+    place = torch.arange(side, device=x.device) / value["width"]
+    row, column = torch.broadcast_tensors(place.mT, place)
+    which = torch.arange(len(x), device=x.device)
+    log_light = value["grain"] * _looked_up(noise, which, row, column)[..., 0]
+    log_light = log_light + value["slope"][..., 0] * x + value["slope"][..., 1] * y
+    log_light = log_light - value["vignette"] * (x.square() + y.square())
+    return value["colour"] * log_light.exp()[..., None]
 
 
-def before(light: np.ndarray, atlas: Atlas, rng: np.random.Generator) -> np.ndarray:
-    """Put a table with a pattern, or of one colour, before a picture.
+def _blurred(patterns: torch.Tensor, deviation: torch.Tensor) -> torch.Tensor:
+    """Patterns (B, side, side) of 8 bits that repeat, in [0, 1]; the deviation in their sides."""
+    side = patterns.shape[-1]
+    waves = [torch.fft.fftfreq(side, 1 / side), torch.fft.rfftfreq(side, 1 / side)]
+    rows, columns = (one.to(patterns.device).square() for one in waves)
+    power = deviation.square()[:, None, None] * (rows[:, None] + columns)
+    found = torch.fft.rfft2(patterns.float() / 255) * torch.exp(-2 * torch.pi**2 * power)
+    return torch.fft.irfft2(found, s=(side, side))
 
-    Parameters
-    ----------
-    light : (side, side, 3) ndarray
-        Linear.
-    atlas : Atlas
-    rng : numpy.random.Generator
 
-    Returns
-    -------
-    (side, side, 3) float32 ndarray
-    """
-    side = len(light)
-    horizon = rng.uniform(-2.5, 0.4) if rng.random() < 0.75 else rng.uniform(-8, -1)
-    edge = max(rng.uniform(-0.1, 0.7), horizon + 0.15) if rng.random() < 0.7 else -2.0
-    across = (np.arange(side) + 0.5) * (2 / side) - 1
-    x, y = np.meshgrid(across, across)
-    y = y + rng.normal(0, 0.05) * x
-    away = np.maximum(y - horizon, 0.05)
-    turn, scale = rng.uniform(0, 2 * np.pi), log_uniform(rng, 0.3, 4)
-    u, v = x / away * scale, scale * 1.5 / away
-    pattern = atlas.maps[int(rng.integers(len(atlas.maps)))].astype(np.float32) / 255
-    size = len(pattern)
-    at = [
-        (np.sin(turn) * u + np.cos(turn) * v + rng.random()) * size,
-        (np.cos(turn) * u - np.sin(turn) * v + rng.random()) * size,
-    ]
-    grey = ndimage.map_coordinates(
-        ndimage.gaussian_filter(pattern, 0.3 * size / side * scale, mode="wrap"),
-        at,
-        order=1,
-        mode="grid-wrap",
-    )[..., None]
-    first = colour(rng)
-    second = first if rng.random() < 0.35 else first * np.exp(rng.normal(0, 0.5, 3))
-    fall = np.exp(rng.normal(0, 0.3) * x + rng.normal(0.1, 0.25) * y)[..., None]
-    table = (first + grey * (second - first)) * fall
-    share = np.clip((y - edge) * side / 4, 0, 1)[..., None]
-    return np.asarray(light + share * (table - light), np.float32)
+def _looked_up(
+    maps: torch.Tensor, which: torch.Tensor, row: torch.Tensor, column: torch.Tensor
+) -> torch.Tensor:
+    """Interpolate in one of several maps (P, rows, columns, C) that repeat, for each photo."""
+    (rows, columns), which = maps.shape[1:3], which[:, None, None]
+    top, left = row.floor(), column.floor()
+
+    def at(down: int, right: int) -> torch.Tensor:
+        place = ((top + down) % rows).long(), ((left + right) % columns).long()
+        return maps[which, *place].float()
+
+    right, down = (column - left)[..., None], (row - top)[..., None]
+    upper, lower = (torch.lerp(at(k, 0), at(k, 1), right) for k in (0, 1))
+    return torch.lerp(upper, lower, down)

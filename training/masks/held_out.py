@@ -18,13 +18,12 @@ from isc_core.photo import read_photo
 
 from ..networks.scene_batches import read_world
 from ..world.files import Split
-from .backgrounds import background, read_crops
-from .composites import Composites
-from .ingredients import Ingredients, cut_out, lit_bodies
+from .composites import CompositeDraws, Composites
+from .ingredients import cut_out, lit_bodies, panoramas_in
+from .packs import Ingredients
 
 SIDE = 320  # pixels of a composite's longer side
 _PICTURE = 256  # of a body
-_BACKGROUNDS = 150
 _BATCH = 8
 PARTS = ("A", "B")
 
@@ -50,7 +49,7 @@ class HeldOut:
 def held_out_ingredients(
     world: Path, panoramas: Path, part: str, photos: Path | None = None, seed: int = 0
 ) -> Ingredients:
-    """Light held-out bodies and draw backgrounds of held-out panoramas.
+    """Light held-out bodies, and read held-out panoramas.
 
     Parameters
     ----------
@@ -72,14 +71,13 @@ def held_out_ingredients(
     half, rng = PARTS.index(part), np.random.default_rng([seed, 11, PARTS.index(part)])
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.BODY,), seed)
-    kept = [one.radiance for one in read_crops(panoramas, seed) if one.judged][half::2]
-    grounds = [background(kept, found.atlas, rng, SIDE) for _ in range(_BACKGROUNDS)]
     if photos is not None:
         pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
     else:
         found.views[Split.BODY][:] = found.views[Split.BODY][half::2]
-        pictures = list(lit_bodies(found, Split.BODY, found.judged, 1, rng, _PICTURE))
-    return Ingredients(np.stack(pictures), np.stack(grounds))
+        pictures = list(lit_bodies(found, Split.BODY, found.judged, rng, _PICTURE))
+    kept = panoramas_in(panoramas, seed, judged=True)[half::2]
+    return Ingredients(np.stack(pictures), kept, found.atlas.maps)
 
 
 def masked_picture(path: Path) -> np.ndarray:
@@ -118,7 +116,7 @@ def held_out_composites(
     HeldOut
     """
     shares = tuple(float(kind == count) for kind in Count)
-    compose = Composites(ingredients, _BATCH, SIDE, hinted=0, shares=shares)
+    compose = Composites(ingredients, CompositeDraws(_BATCH, hinted=0, shares=shares), SIDE)
     rng, made = np.random.default_rng([seed, int(count)]), 0
     torch.manual_seed(seed)
     while made < number:

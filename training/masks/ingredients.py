@@ -1,17 +1,20 @@
-"""What composites are made of: lit bodies cut out, and backgrounds, kept as pictures of 8 bits.
+"""What composites are made of: bodies lit and cut out, panoramas, and patterns of tables.
 
   python -m training.masks.ingredients WORLD --panoramas DIR -o FOLDER
 
-Problem: the mask network sees a hundred thousand photos of things before other things. Lighting a
-body takes as long as a step of the network, pasting it a hundredth of that: bodies are lit once and
+Problem: the mask network sees millions of photos of things before other things. Lighting a body
+takes as long as a step of the network, pasting it a hundredth of that: bodies are lit once and
 pasted many times, each time elsewhere, in another size, before another background.
+
+FOLDER/learned.npz and FOLDER/judged.npz are compressed (`training.masks.packs`) so that they may
+travel to another machine. `--first 3` after `--rounds 3` lights the bodies in other ways than the
+run before, for a second folder beside the first.
 
 Limits: a body is not lit by the background that it is pasted before.
 """
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,70 +22,34 @@ import torch
 from torch.nn import functional
 
 from isc_core.errors import InputError
-from isc_core.io.atomic import new_file
-from isc_core.io.npy import read_array
+from isc_core.photo import read_linear
 
 from ..networks.scene_batches import World, read_world
 from ..world.camera import encoded_srgb
+from ..world.environments import read_panoramas
 from ..world.files import Split
 from ..world.lit_pictures import make_pictures
 from ..world.pictures import stacked
 from ..world.recipes import Shares, draw_recipe
 from ..world.view_batches import batch_of
-from .backgrounds import background, read_crops
+from .packs import SUFFIX, Ingredients
 
 SIDE = 128  # pixels of a picture
 LENGTH = 120  # longer side of a body in it
 _LIT = 8  # views lit together
 _WHITE = 0.99  # share of a body's pixels that are darker than white
 _LEAST_COVER = 0.02  # of a picture: smaller bodies are left out
-BACKGROUNDS = 3000
 SETS = ("learned", "judged")
-
-
-@dataclass(frozen=True)
-class Ingredients:
-    """Pictures to compose photos from.
-
-    Attributes
-    ----------
-    bodies : (N, 4, SIDE, SIDE) uint8 ndarray
-        sRGB and cover; the longer side of each body is `LENGTH` pixels.
-    backgrounds : (M, 3, side, side) uint8 ndarray
-        sRGB.
-    """
-
-    bodies: np.ndarray
-    backgrounds: np.ndarray
-
-    @classmethod
-    def read(cls, folder: Path, name: str) -> "Ingredients":
-        """Read what `main` wrote.
-
-        Parameters
-        ----------
-        folder : Path
-        name : {"learned", "judged"}
-
-        Returns
-        -------
-        Ingredients
-
-        Raises
-        ------
-        InputError
-            If the folder has no such files.
-        """
-        return cls(
-            *(read_array(folder / f"{part}_{name}.npy") for part in ("bodies", "backgrounds"))
-        )
+ROWS = 256  # of panoramas
+_BRIGHTEST = 6e4  # that half floats hold
+_FILES = (".exr", ".hdr")
+_PATTERNS = 600
 
 
 def lit_bodies(
     world: World,
     split: Split,
     environments: np.ndarray,
-    rounds: int,
     rng: np.random.Generator,
     side: int = SIDE,
 ) -> np.ndarray:
@@ -94,8 +61,6 @@ def lit_bodies(
     split : Split
     environments : (N,) ndarray of int
         Those of the bank that may light.
-    rounds : int
-        How often each view is lit, each time in other light and paint.
     rng : numpy.random.Generator
     side : int
         Pixels of a picture.
@@ -103,21 +68,17 @@ def lit_bodies(
     Returns
     -------
     (N, 4, side, side) uint8 ndarray
-        As `Ingredients.bodies`.
+        As `packs.Ingredients.bodies`.
     """
     views, shares, found = world.views[split], Shares(), list[np.ndarray]()
-    for _ in range(rounds):
-        for start in range(0, len(views), _LIT):
-            some = views[start : start + _LIT]
-            recipes = stacked(
-                [
-                    draw_recipe(one.directions, world.atlas, environments, rng, shares)
-                    for one in some
-                ]
-            )
-            lit = make_pictures(batch_of(some), recipes, world.bank)
-            light = (lit.layers[:, :3] + lit.layers[:, 3:6]).float()
-            found += cut_out(light, lit.cover.float(), side)
+    for start in range(0, len(views), _LIT):
+        some = views[start : start + _LIT]
+        recipes = stacked(
+            [draw_recipe(one.directions, world.atlas, environments, rng, shares) for one in some]
+        )
+        lit = make_pictures(batch_of(some), recipes, world.bank)
+        light = (lit.layers[:, :3] + lit.layers[:, 3:6]).float()
+        found += cut_out(light, lit.cover.float(), side)
     return np.stack(found)
 
 
@@ -156,10 +117,35 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Itera
         yield (255 * coded).round().clamp(0, 255).byte().numpy()
 
 
-def _write(path: Path, values: np.ndarray) -> None:
-    with new_file(path) as temporary, temporary.open("wb") as file:
-        np.save(file, values)
-    print(f"{path}: {len(values)}", flush=True)
+def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
+    """Read panoramas at one size, with the split of `read_panoramas`.
+
+    Parameters
+    ----------
+    folder : Path
+    seed : int
+        Chooses which are judged.
+    judged : bool
+        Read those, or else the others.
+
+    Returns
+    -------
+    (N, ROWS, 2 ROWS, 3) float16 ndarray
+        Linear.
+
+    Raises
+    ------
+    InputError
+        If there is none, or one cannot be used.
+    """
+    wanted = {one.name for one in read_panoramas(folder, seed) if one.judged == judged}
+    size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
+    for path in sorted(folder.iterdir()):
+        if path.suffix.lower() in _FILES and path.stem in wanted:
+            light = torch.from_numpy(read_linear(path, "linear")).permute(2, 0, 1)[None].float()
+            light = functional.interpolate(light, size, mode="bilinear", antialias=True)[0]
+            found.append(light.clamp(max=_BRIGHTEST).permute(1, 2, 0).numpy().astype(np.float16))
+    return np.stack(found)
 
 
 def main() -> None:
@@ -171,25 +157,27 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--rounds", type=int, default=1, help="lights of each view (default: %(default)s)")
+    add("--first", type=int, default=0, help="number of the first (default: %(default)s)")
     add("--seed", type=int, default=0, help="default: %(default)s")
     add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="where to write")
     given = parser.parse_args()
     try:
         world = read_world([given.world], given.panoramas, (Split.TRAIN, Split.BODY), given.seed)
-        crops = read_crops(given.panoramas, given.seed)
+        panoramas = [panoramas_in(given.panoramas, given.seed, k == 1) for k in range(2)]
     except InputError as error:
         parser.error(str(error))
     given.output.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(given.seed)
     splits = zip(SETS, (Split.TRAIN, Split.BODY), (world.learned, world.judged), strict=True)
     for k, (name, split, environments) in enumerate(splits):
-        rng = np.random.default_rng([given.seed, k])
-        panoramas = [one.radiance for one in crops if one.judged == (name == "judged")]
-        count = BACKGROUNDS if name == "learned" else BACKGROUNDS // 5
-        grounds = np.stack([background(panoramas, world.atlas, rng) for _ in range(count)])
-        _write(given.output / f"backgrounds_{name}.npy", grounds)
-        bodies = lit_bodies(world, split, environments, given.rounds, rng)
-        _write(given.output / f"bodies_{name}.npy", bodies)
+        rounds = range(given.first, given.first + given.rounds)
+        bodies = [
+            lit_bodies(world, split, environments, np.random.default_rng([given.seed, k, n]))
+            for n in rounds
+        ]
+        made = Ingredients(np.concatenate(bodies), panoramas[k], world.atlas.maps[:_PATTERNS])
+        path = given.output / f"{name}{SUFFIX}"
+        print(f"{path}: {len(made.bodies)} bodies, {made.write(path) / 1e6:.1f} MB", flush=True)
 
 
 if __name__ == "__main__":

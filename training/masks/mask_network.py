@@ -1,8 +1,9 @@
 """Fit the network of `isc_core.networks.mask_network`.
 
-  python -m training.masks.mask_network FOLDER [--weights NPZ] [--minutes N] -o MASK.npz
+  python -m training.masks.mask_network FOLDER ... [--weights NPZ] [--minutes N] -o MASK.npz
 
-FOLDER holds the ingredients that `python -m training.masks.ingredients` writes. Photos are composed
+FOLDER holds the ingredients that `python -m training.masks.ingredients` writes; bodies are those of
+all folders. Photos are composed
 while the network learns (`training.masks.composites`), and none is used twice. `--weights` starts
 from an archive that an earlier run wrote, `--resume` continues an interrupted one; without either,
 the levels down start as the shipped scene network's. `--side 64` sees photos smaller, which is half
@@ -26,9 +27,10 @@ from isc_core.io.npy import read_arrays
 from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
-from .composites import Composites
-from .ingredients import Ingredients
+from .composites import CompositeDraws, Composites
+from .ingredients import SETS
 from .mask_module import MaskNetworkModule
+from .packs import SUFFIX, Ingredients
 
 SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
 
@@ -39,7 +41,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     add = parser.add_argument
-    add("folder", type=Path, metavar="FOLDER", help="ingredients of composites")
+    add("folders", type=Path, nargs="+", metavar="FOLDER", help="ingredients of composites")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--side", type=int, default=SIDE, metavar="PX", help="of photos (default: %(default)s)")
     add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
@@ -50,18 +52,19 @@ def main() -> None:
     torch.manual_seed(options.seed)
     network = MaskNetworkModule()
     try:
-        learned, judged = (Ingredients.read(arguments.folder, k) for k in ("learned", "judged"))
+        learned, judged = (
+            Ingredients.read([folder / f"{name}{SUFFIX}" for folder in arguments.folders])
+            for name in SETS
+        )
         weights = None if arguments.weights is None else read_arrays(arguments.weights)
         network.begin(weights)
     except InputError as error:
         parser.error(str(error))
-    fit(
-        network,
-        Composites(learned, options.batch, arguments.side, arguments.hinted, varied=True),
-        replace(SCHEDULE, rate=arguments.rate),
-        options,
-        Composites(judged, options.batch, arguments.side),
-    )
+    draw = CompositeDraws(options.batch, arguments.hinted, varied=True)
+    compose = Composites(learned, draw, arguments.side, options.device)
+    held_out = Composites(judged, CompositeDraws(options.batch), arguments.side, options.device)
+    schedule = replace(SCHEDULE, rate=arguments.rate)
+    fit(network, draw, schedule, options, held_out, compose.finished)
 
 
 if __name__ == "__main__":

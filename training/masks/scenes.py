@@ -1,198 +1,237 @@
-"""What stands where in a composite.
+"""What stands where in composites, drawn for a whole batch at once.
 
 Limits: a scene of one thing has others only in its background or cut by its frame; they are at
 most half as long.
 """
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+import torch
 
 from isc_core.networks.mask_network import Count
 
-from ..world.random_draws import log_uniform
-from .ingredients import SIDE
+from ..world.random_draws import log_uniforms
+from ..world.tensor_batch import TensorBatch
+from .ingredients import LENGTH, SIDE
 
-MEANT = int(Count.ONE)
 SHARES = (0.17, 0.58, 0.25)  # of scenes without a thing, with one, with several
+MOST = 8  # things of a scene
 _TINY = 0.2  # of the frame: things half as long may stand where there is none to be found
 _HEAPS = 0.35  # of scenes with several
-_SHAPES = ((1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625))
+_AROUND = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes of 0 to 4 things besides
+_SHAPES = np.array([(1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625)])
+_ROWS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns and rows of things in order
 
 
 @dataclass(frozen=True)
-class Thing:
-    """A body in a scene.
+class Scenes(TensorBatch):
+    """What the photos of a batch show.
 
     Attributes
     ----------
-    body : int
-    length : float
-        Its longer side, pixels of a frame of `SIDE`.
-    angle : float
-        Radians.
-    mirror : float
-        -1 or 1.
-    place : (2,) ndarray
-        Its middle, right and down from that of the frame, half the frame's side being 1.
-    gain : (3,) ndarray
-        Its mean light.
-    shear : tuple of float
-        k_x and k_y of its cast shadow.
-    touch : (2,) ndarray
-        By how much the shadow where it touches is moved, as `place`.
-    strength : tuple of float
-        Of the cast shadow and of that where it touches, 0 to 1.
-    blur : int
-        Of its shadows, 0 to 3.
-    stretch : tuple of float
-        Factors along the picture's axes.
-    channels : tuple of int
-        Those of its picture that are shown as red, green and blue.
-    """
-
-    body: int
-    length: float
-    angle: float
-    mirror: float
-    place: np.ndarray
-    gain: np.ndarray
-    shear: tuple[float, float]
-    touch: np.ndarray
-    strength: tuple[float, float]
-    blur: int
-    stretch: tuple[float, float] = (1.0, 1.0)
-    channels: tuple[int, ...] = (0, 1, 2)
-
-
-@dataclass(frozen=True)
-class Scene:
-    """What a photo shows.
-
-    Attributes
-    ----------
-    shape : tuple of float
-        Width and height of the photo over the longer one.
-    level : float
+    shape : (B, 2) tensor
+        Width and height of a photo over the longer one.
+    level : (B,) tensor
         Mean light of the background.
-    things : list of Thing
-        From the back to the front.
-    meant : list of int
-        Those that a mask without hints covers.
-    count : int
+    count : (B,) int64 tensor
         Of `Count`.
     """
 
-    shape: tuple[float, float]
-    level: float
-    things: list[Thing]
-    meant: list[int]
-    count: int
+    shape: torch.Tensor
+    level: torch.Tensor
+    count: torch.Tensor
 
 
-def draw_scene(rng: np.random.Generator, bodies: int, shares: tuple[float, ...] = SHARES) -> Scene:
-    """Draw a scene.
+@dataclass(frozen=True)
+class Things(TensorBatch):
+    """The bodies of a batch: photo by photo, from the back to the front.
+
+    Attributes
+    ----------
+    photo, layer : (N,) int64 tensor
+        In which photo a thing stands, and how many things stand behind it.
+    meant : (N,) bool tensor
+        A mask without hints covers it.
+    body : (N,) tensor
+        Which it is, as a share of all bodies, in [0, 1).
+    length : (N,) tensor
+        Its longer side, pixels of a frame of `SIDE`.
+    angle : (N,) tensor
+        Radians.
+    mirror : (N,) tensor
+        -1 or 1.
+    place : (N, 2) tensor
+        Its middle, right and down from that of the frame, half the frame's side being 1.
+    gain : (N, 3) tensor
+        Its mean light.
+    shear : (N, 2) tensor
+        k_x and k_y of its cast shadow.
+    touch : (N, 2) tensor
+        By how much the shadow where it touches is moved, as `place`.
+    strength : (N, 2) tensor
+        Of the cast shadow and of that where it touches, 0 to 1.
+    blur : (N,) int64 tensor
+        Of its shadows, 0 to 3.
+    stretch : (N,) tensor
+        Factor along the picture's first axis; the other has its inverse.
+    channels : (N, 3) int64 tensor
+        Those of its picture that are shown as red, green and blue.
+    """
+
+    photo: torch.Tensor
+    layer: torch.Tensor
+    meant: torch.Tensor
+    body: torch.Tensor
+    length: torch.Tensor
+    angle: torch.Tensor
+    mirror: torch.Tensor
+    place: torch.Tensor
+    gain: torch.Tensor
+    shear: torch.Tensor
+    touch: torch.Tensor
+    strength: torch.Tensor
+    blur: torch.Tensor
+    stretch: torch.Tensor
+    channels: torch.Tensor
+
+    @property
+    def to_body(self) -> torch.Tensor:
+        """The affine maps (N, 2, 3) from the frame to the bodies' pictures, for `affine_grid`."""
+        c, s = self.angle.cos(), self.angle.sin()
+        across = self.mirror / self.stretch
+        turn = torch.stack([across * c, across * s, -s * self.stretch, c * self.stretch], 1)
+        turn = turn.view(-1, 2, 2) * (LENGTH / self.length)[:, None, None]
+        return torch.cat([turn, -turn @ self.place[..., None]], 2)
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Up to MOST things of each photo: (B, MOST) arrays; `place` has an axis more."""
+
+    size: np.ndarray
+    place: np.ndarray
+    present: np.ndarray
+    meant: np.ndarray
+
+
+def draw_scenes(
+    rng: np.random.Generator, number: int, shares: tuple[float, ...] = SHARES
+) -> tuple[Scenes, Things]:
+    """Draw scenes.
 
     Parameters
     ----------
     rng : numpy.random.Generator
-    bodies : int
-        How many there are to choose from.
+    number : int
+        Of photos.
     shares : tuple of float
         Of scenes without a thing, with one, with several.
 
     Returns
     -------
-    Scene
+    scenes : Scenes
+    things : Things
+        On the CPU.
     """
-    shape = _SHAPES[int(rng.integers(len(_SHAPES)))]
-    short = SIDE * min(shape)
-    level = 0.2 * math.exp(rng.normal(0, 0.5))
-    count = int(rng.choice(len(shares), p=shares))
-    things, meant = list[Thing](), list[int]()
-    if count == Count.SEVERAL:
-        things = _several(rng, bodies, np.array(shape), short, level)
-        meant = list(range(len(things)))
-    else:
-        length = min(SIDE * log_uniform(rng, 0.27, 0.95), 1.1 * short)
-        shown = length if count == Count.ONE else _TINY * SIDE
-        things = _around(rng, bodies, np.array(shape), shown, level)
-        if count == Count.ONE:
-            meant = [len(things)]
-            things.append(_thing(rng, bodies, length, _middle(rng, shape, length), level))
-    return Scene(shape, level, things, meant, count)
+    shape = _SHAPES[rng.integers(len(_SHAPES), size=number)]
+    level = 0.2 * np.exp(rng.normal(0, 0.5, number))
+    count = rng.choice(len(shares), number, p=shares)
+    few, many = _around(rng, shape, count == Count.ONE), _several(rng, shape)
+    crowded = (count == Count.SEVERAL)[:, None]
+    photo, layer = np.nonzero(np.where(crowded, many.present, few.present))
+
+    def chosen(name: str) -> np.ndarray:
+        one, other = (getattr(places, name)[photo, layer] for places in (few, many))
+        which = crowded[photo, 0].reshape(-1, *[1] * (one.ndim - 1))
+        return np.where(which, other, one)
+
+    things = _things(rng, chosen("size"), level[photo])
+    things |= {"photo": photo, "layer": layer}
+    things |= {"meant": chosen("meant"), "place": chosen("place")}
+    scenes = {"shape": shape, "level": level, "count": count}
+    return Scenes.of(scenes), Things.of(things)
 
 
-def _thing(
-    rng: np.random.Generator, bodies: int, length: float, place: np.ndarray, level: float
-) -> Thing:
-    upright = rng.random() < 0.7
-    fall = rng.uniform(0.12, 0.5) * (1 if rng.random() < 0.5 else -1)
-    brightness = level * math.exp(rng.normal(0.1, 0.6))
-    cast = rng.uniform(0.2, 0.85) if rng.random() < 0.6 else 0.0
-    touching = rng.uniform(0.1, 0.7) if rng.random() < 0.7 else 0.0
-    size = length / SIDE
-    return Thing(
-        int(rng.integers(bodies)),
-        length,
-        rng.normal(0, 0.12) if upright else rng.uniform(0, 2 * math.pi),
-        float(rng.choice([-1, 1])),
-        place,
-        brightness * np.exp(rng.normal(0, 0.1, 3)),
-        (rng.uniform(-1, 1), fall),
-        np.array([rng.normal(0, 0.06), rng.uniform(0, 0.12)]) * size * 2,
-        (cast, touching),
-        int(rng.integers(4)),
+def _things(
+    rng: np.random.Generator, length: np.ndarray, level: np.ndarray
+) -> dict[str, np.ndarray]:
+    """All that does not depend on where things stand."""
+    number = len(length)
+    upright = rng.random(number) < 0.7
+    brightness = level * np.exp(rng.normal(0.1, 0.6, number))
+    fall = rng.uniform(0.12, 0.5, number) * rng.choice([-1, 1], number)
+    touch = np.stack([rng.normal(0, 0.06, number), rng.uniform(0, 0.12, number)], 1)
+    strength = rng.uniform((0.2, 0.1), (0.85, 0.7), (number, 2))
+    return {
+        "body": rng.random(number),
+        "length": length,
+        "angle": np.where(upright, rng.normal(0, 0.12, number), rng.uniform(0, 2 * np.pi, number)),
+        "mirror": rng.choice([-1.0, 1.0], number),
+        "gain": brightness[:, None] * np.exp(rng.normal(0, 0.1, (number, 3))),
+        "shear": np.stack([rng.uniform(-1, 1, number), fall], 1),
+        "touch": touch * (length / SIDE * 2)[:, None],
+        "strength": strength * (rng.random((number, 2)) < (0.6, 0.7)),
+        "blur": rng.integers(4, size=number),
+        "stretch": np.ones(number),
+        "channels": np.tile(np.arange(3), (number, 1)),
+    }
+
+
+def _around(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> _Places:
+    """Things of the background, and such as the frame cuts; before them one, where it is single."""
+    number, short = len(shape), SIDE * shape.min(axis=1)
+    length = np.minimum(SIDE * log_uniforms(rng, 0.27, 0.95, number), 1.1 * short)
+    shown = np.where(single, length, _TINY * SIDE)[:, None]
+    small = shown * rng.uniform(0.15, 0.5, (number, MOST))
+    inside = shape[:, None] * rng.uniform(-1, 1, (number, MOST, 2))
+    large = np.minimum(
+        short[:, None] * rng.uniform(0.2, 0.8, (number, MOST)),
+        1.3 * np.maximum(shown, 0.3 * SIDE),
     )
+    turn = rng.uniform(0, 2 * np.pi, (number, MOST))
+    edge = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    edge /= np.abs(edge).max(axis=-1, keepdims=True)
+    off = rng.uniform(0.1, 0.7, (number, MOST)) * large / SIDE
+    cut = rng.random((number, MOST)) < 0.5
+    size = np.where(cut, large, small)
+    place = np.where(cut[..., None], edge * (shape[:, None] + off[..., None]), inside)
+    others = rng.choice(len(_AROUND), number, p=_AROUND)
+    rows = np.flatnonzero(single)
+    size[rows, others[rows]] = length[rows]
+    place[rows, others[rows]] = _middle(rng, shape, length)[rows]
+    slots = np.arange(MOST)
+    meant = single[:, None] & (slots == others[:, None])
+    return _Places(size, place, meant | (slots < others[:, None]), meant)
 
 
-def _middle(rng: np.random.Generator, shape: tuple[float, float], length: float) -> np.ndarray:
-    """A place of the thing that is meant: somewhere near the middle, seldom cut by the frame."""
-    free = np.maximum(np.array(shape) - length / SIDE, 0)
-    place = free * rng.normal(0, 0.4, 2).clip(-1, 1)
-    if rng.random() < 0.15:
-        place = place + rng.normal(0, 0.35, 2) * length / SIDE
-    return place
+def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """Places of the things that are meant: somewhere near the middle, seldom cut by the frame."""
+    part = (length / SIDE)[:, None]
+    place = np.maximum(shape - part, 0) * rng.normal(0, 0.4, shape.shape).clip(-1, 1)
+    cut = rng.random((len(shape), 1)) < 0.15
+    return np.asarray(place + cut * rng.normal(0, 0.35, shape.shape) * part)
 
 
-def _around(
-    rng: np.random.Generator, bodies: int, shape: np.ndarray, length: float, level: float
-) -> list[Thing]:
-    """Things of the background, and such as the frame cuts, before which one of a length stands."""
-    found = []
-    for _ in range(int(rng.choice([0, 1, 2, 3, 4], p=[0.42, 0.2, 0.16, 0.12, 0.1]))):
-        if rng.random() < 0.5:
-            size = length * rng.uniform(0.15, 0.5)
-            place = shape * rng.uniform(-1, 1, 2)
-        else:
-            size = min(SIDE * min(shape) * rng.uniform(0.2, 0.8), 1.3 * max(length, 0.3 * SIDE))
-            turn = rng.uniform(0, 2 * math.pi)
-            edge = np.array([math.cos(turn), math.sin(turn)])
-            edge = edge / np.abs(edge).max()
-            place = edge * (shape + rng.uniform(0.1, 0.7) * size / SIDE)
-        found.append(_thing(rng, bodies, size, place, level))
-    return found
-
-
-def _several(
-    rng: np.random.Generator, bodies: int, shape: np.ndarray, short: float, level: float
-) -> list[Thing]:
+def _several(rng: np.random.Generator, shape: np.ndarray) -> _Places:
     """Things of similar size side by side, or a heap of them."""
-    if rng.random() < _HEAPS:
-        length = short * log_uniform(rng, 0.3, 0.7)
-        spread = rng.uniform(0.4, 1)
-        places = shape * spread * rng.uniform(-1, 1, (int(rng.integers(5, 9)), 2))
-    else:
-        columns, rows = ((2, 1), (3, 1), (2, 2), (1, 2), (2, 1))[int(rng.integers(5))]
-        if shape[0] < shape[1]:
-            columns, rows = rows, columns
-        cell = 2 * shape / [columns, rows]
-        length = SIDE / 2 * min(cell) * rng.uniform(0.5, 0.95)
-        grid = np.stack(np.meshgrid(np.arange(columns), np.arange(rows)), -1).reshape(-1, 2)
-        free = np.maximum(cell - 2 * length / SIDE, 0) / 2
-        places = (grid + 0.5) * cell - shape + free * rng.uniform(-1, 1, (len(grid), 2))
-    sizes = length * rng.uniform(0.7, 1.05, len(places))
-    return [
-        _thing(rng, bodies, size, place, level) for size, place in zip(sizes, places, strict=True)
-    ]
+    number, slots = len(shape), np.arange(MOST)
+    heap = rng.random(number) < _HEAPS
+    spread = rng.uniform(0.4, 1, (number, 1, 1))
+    heaped = shape[:, None] * spread * rng.uniform(-1, 1, (number, MOST, 2))
+    grid = _ROWS[rng.integers(len(_ROWS), size=number)]
+    grid = np.where(shape[:, :1] < shape[:, 1:], grid[:, ::-1], grid)
+    cell = 2 * shape / grid
+    length = np.where(
+        heap,
+        SIDE * shape.min(axis=1) * log_uniforms(rng, 0.3, 0.7, number),
+        SIDE / 2 * cell.min(axis=1) * rng.uniform(0.5, 0.95, number),
+    )
+    free = np.maximum(cell - 2 * (length / SIDE)[:, None], 0)[:, None] / 2
+    column, row = slots % grid[:, :1], slots // grid[:, :1]
+    ordered = (np.stack([column, row], axis=-1) + 0.5) * cell[:, None] - shape[:, None]
+    ordered = ordered + free * rng.uniform(-1, 1, (number, MOST, 2))
+    count = np.where(heap, rng.integers(5, MOST + 1, number), grid.prod(axis=1))
+    present = slots < count[:, None]
+    size = length[:, None] * rng.uniform(0.7, 1.05, (number, MOST))
+    return _Places(size, np.where(heap[:, None, None], heaped, ordered), present, present)

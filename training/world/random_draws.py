@@ -18,3 +18,23 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
         In [low, high].
     """
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def log_uniforms(
+    rng: np.random.Generator, low: float, high: float, size: int | tuple[int, ...]
+) -> np.ndarray:
+    """Draw numbers whose logarithms are uniform.
+
+    Parameters
+    ----------
+    rng : np.random.Generator
+    low, high : float
+        Bounds; 0 < `low` <= `high`.
+    size : int or tuple of int
+
+    Returns
+    -------
+    ndarray
+        In [low, high].
+    """
+    return np.asarray(np.exp(rng.uniform(np.log(low), np.log(high), size)))

@@ -1,18 +1,27 @@
-"""Batches: dataclasses of tensors, and a pool from which batches are drawn several times.
+"""Batches: dataclasses of tensors or of such batches, and a pool that batches are drawn from.
+
+Rows of a pool are drawn several times.
 
 Limits: the tensors of a batch have equal first axes, unless a subclass says otherwise.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Generic, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
+import numpy as np
 import torch
 
 
 @dataclass(frozen=True)
 class TensorBatch:
-    """Base of dataclasses whose attributes are tensors."""
+    """Base of dataclasses whose attributes are tensors, or batches themselves."""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+        # between processes, many small tensors travel slowly: each is a file of shared memory
+        parts = [getattr(self, one.name) for one in fields(self)]
+        arrays = [part.numpy() if isinstance(part, torch.Tensor) else part for part in parts]
+        return _from_arrays, (type(self), arrays)
 
     def __len__(self) -> int:
         return len(getattr(self, fields(self)[0].name))
@@ -48,6 +57,25 @@ class TensorBatch:
         return replace(self, **{one.name: getattr(self, one.name)[which] for one in fields(self)})
 
     @classmethod
+    def of(cls, arrays: dict[str, np.ndarray]) -> Self:
+        """Make a batch of arrays: floats as float32, whole numbers as int64.
+
+        Parameters
+        ----------
+        arrays : dict of str to ndarray
+            By the names of the attributes.
+
+        Returns
+        -------
+        TensorBatch
+            On the CPU.
+        """
+        parts = {name: torch.from_numpy(np.ascontiguousarray(one)) for name, one in arrays.items()}
+        return cls(
+            **{name: one.float() if one.is_floating_point() else one for name, one in parts.items()}
+        )
+
+    @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
         """Concatenate batches.
 
@@ -63,6 +91,26 @@ class TensorBatch:
         """
         names = [one.name for one in fields(cls)]
         return cls(**{name: torch.cat([getattr(part, name) for part in parts]) for name in names})
+
+
+def _from_arrays(kind: type[TensorBatch], arrays: list[Any]) -> TensorBatch:
+    return kind(*(torch.from_numpy(a) if isinstance(a, np.ndarray) else a for a in arrays))
+
+
+def chosen(shares: torch.Tensor, number: int) -> torch.Tensor:
+    """Return which of a number of rows shares of that number mean.
+
+    Parameters
+    ----------
+    shares : (b,) tensor
+        In [0, 1].
+    number : int
+
+    Returns
+    -------
+    (b,) int64 tensor
+    """
+    return (shares * number).long().clamp(max=number - 1)
 
 
 Batch = TypeVar("Batch", bound=TensorBatch)
@@ -119,4 +167,4 @@ class Pool(Generic[Batch]):
         """
         if self._rows is None:
             raise ValueError("the pool is empty")
-        return self._rows.chosen((shares * len(self._rows)).long())
+        return self._rows.chosen(chosen(shares, len(self._rows)))

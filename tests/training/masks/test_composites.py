@@ -1,6 +1,8 @@
 """Composites show what their masks and hints say."""
 
+import pickle
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,9 +13,11 @@ import torch
 
 from isc_core.networks.mask_network import SIDE as FRAME
 from isc_core.networks.mask_network import Count, channels_of
-from training.masks.composites import Composites, draw_hints, frames
-from training.masks.ingredients import LENGTH, SIDE, Ingredients, cut_out
+from training.masks.composites import CompositeDraws, Composites, frames
+from training.masks.ingredients import LENGTH, SIDE, cut_out
 from training.masks.mask_module import MaskNetworkModule, network_channels
+from training.masks.packs import Ingredients
+from training.masks.scenes import MOST
 
 
 @pytest.fixture(autouse=True)
@@ -25,18 +29,19 @@ def one_thread() -> Iterator[None]:
 
 
 def ingredients() -> Ingredients:
-    """White discs and bars, and black backgrounds."""
+    """White discs and bars, and black surroundings."""
     bodies = np.zeros((2, 4, SIDE, SIDE), np.uint8)
     y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
     bodies[0, 3] = 255 * (x**2 + y**2 < (LENGTH / 2) ** 2)
     bodies[1, 3] = 255 * ((abs(x) < LENGTH / 2) & (abs(y) < LENGTH / 6))
     bodies[:, :3] = 255 * (bodies[:, 3:] > 0)
-    return Ingredients(bodies, np.zeros((3, 3, 160, 160), np.uint8))
+    dark = np.zeros((3, 32, 64, 3), np.float16)
+    return Ingredients(bodies, dark, np.zeros((2, 16, 16), np.uint8))
 
 
 def drawn(count: Count, hinted: float = 0, size: int = 12, side: int = FRAME) -> Composites:
     shares = tuple(float(kind == count) for kind in Count)
-    return Composites(ingredients(), size, side, hinted, shares)
+    return Composites(ingredients(), CompositeDraws(size, hinted, shares, (0, 0)), side)
 
 
 @pytest.mark.parametrize("count", list(Count))
@@ -57,20 +62,6 @@ def test_bodies_are_brighter_than_a_black_background() -> None:
     for photo, mask, frame in zip(grey, batch.mask, batch.frame, strict=True):
         away = (mask == 0) & (frame > 0)
         assert photo[mask > 0.9].median() > 3 * photo[away].median() + 1e-3
-
-
-def test_hints_lie_where_they_say() -> None:
-    truth = np.zeros((FRAME, FRAME), bool)
-    truth[20:60, 30:80] = True
-    inside = np.ones_like(truth)
-    rng = np.random.default_rng(0)
-    given = [draw_hints(truth, inside, rng) for _ in range(40)]
-    for points, others, box in given:
-        # discs reach over the outline by their radius
-        assert not points[:15].any() and not others[25:55, 35:75].any()
-        if box.any():
-            assert (box[truth] > 0).mean() > 0.8 and (box > 0).sum() < 2 * truth.sum()
-    assert all(any(one[k].any() for one in given) for k in range(3))
 
 
 def test_hinted_photos_have_one_thing_or_none() -> None:
@@ -101,7 +92,7 @@ def test_the_channels_are_those_of_the_core() -> None:
 
 
 def test_frames_are_centred() -> None:
-    frame = frames(np.array([[1.0, 0.75]]), 32)[0, 0]
+    frame = frames(torch.tensor([[1.0, 0.75]]), 32)[0, 0]
     assert frame.sum() == 32 * 24 and torch.equal(frame, frame.flip(0))
 
 
@@ -117,3 +108,39 @@ def test_the_network_learns_bright_bodies() -> None:
         optimizer.step()
         losses.append(float(loss.detach()))
     assert np.mean(losses[-5:]) < 0.8 * np.mean(losses[:5])
+
+
+@pytest.mark.parametrize("varied", [False, True])
+def test_a_device_composes_without_telling_numbers(varied: bool) -> None:
+    # tensors of the device "meta" have shapes only: whoever asks for a number of one fails
+    draw = CompositeDraws(6, 0.5, varied=varied)
+    compose = Composites(ingredients(), draw, 64, "meta")
+    batch = compose.finished(draw(np.random.default_rng(0)))
+    wanted = Composites(ingredients(), draw, 64)(np.random.default_rng(0))
+    for found, known in zip(vars(batch).values(), vars(wanted).values(), strict=True):
+        assert found.is_meta and found.shape == known.shape and found.dtype == known.dtype
+
+
+def test_draws_of_a_seed_are_the_same_after_a_way_between_processes() -> None:
+    draw = CompositeDraws(6, 0.5, varied=True)
+    compose, photos = Composites(ingredients(), draw, 64), []
+    for sent in (False, True):
+        batch = draw(np.random.default_rng(7))
+        batch = pickle.loads(pickle.dumps(batch)) if sent else batch
+        torch.manual_seed(0)
+        photos.append(compose.finished(batch))
+    for one, other in zip(*(vars(photo).values() for photo in photos), strict=True):
+        assert torch.equal(one, other)
+
+
+def test_no_pixel_shows_two_things() -> None:
+    compose, draw = drawn(Count.SEVERAL, size=40), CompositeDraws(40, 0, (0, 0, 1))
+    batch = draw(np.random.default_rng(2))
+    assert int(batch.things.layer.max()) == MOST - 1, "there are heaps"
+    alone = [
+        compose.finished(
+            replace(batch, things=replace(batch.things, meant=batch.things.layer == k))
+        ).mask
+        for k in range(MOST)
+    ]
+    assert torch.allclose(torch.stack(alone).sum(0), compose.finished(batch).mask, atol=1e-4)

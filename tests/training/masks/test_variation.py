@@ -1,5 +1,7 @@
 """Varied composites show the same scenes with other shapes and colours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,32 +10,36 @@ pytest.importorskip("torch")
 import torch
 
 from isc_core.networks.mask_network import SIDE
-from training.masks.composites import Composites
-from training.masks.scenes import draw_scene
-from training.masks.variation import varied_light, varied_scene
+from training.masks.composites import CompositeDraws, Composites
+from training.masks.scenes import draw_scenes
+from training.masks.variation import ground_variation, match, varied_light, varied_things
 
 from .test_composites import ingredients
 
 
-def test_things_are_stretched_and_keep_their_area() -> None:
+def test_things_are_stretched_and_keep_their_place() -> None:
     rng = np.random.default_rng(0)
-    scene = draw_scene(rng, 5, (0, 0, 1))
-    varied = varied_scene(scene, rng)
-    assert [one.place.tolist() for one in varied.things] == [
-        one.place.tolist() for one in scene.things
-    ]
-    stretches = np.array([one.stretch for one in varied.things])
-    np.testing.assert_allclose(stretches.prod(axis=1), 1)
-    assert np.ptp(stretches) > 0.05
-    assert all(sorted(one.channels) == [0, 1, 2] for one in varied.things)
+    _, things = draw_scenes(rng, 50, (0, 0, 1))
+    varied, _ = varied_things(things, rng)
+    assert torch.equal(varied.place, things.place)
+    assert float(varied.stretch.log().std()) == pytest.approx(0.15, abs=0.03)
+    assert (varied.channels.sort(1).values == torch.arange(3)).all()
+    exchanged = (varied.channels != torch.arange(3)).any(1).float().mean()
+    assert 0.15 < float(exchanged) < 0.35  # one order in six is the same
+    assert float(varied.body.mean()) < 0.45 < float(things.body.mean()), "thin ones are more often"
 
 
 def test_masks_of_varied_composites_cover_as_much() -> None:
-    areas = []
-    for varied in (False, True):
-        compose = Composites(ingredients(), 24, SIDE, 0, (0, 1, 0), varied)
-        mask = compose(np.random.default_rng(1)).mask
-        areas.append(mask.flatten(1).sum(1).numpy())
+    draw = CompositeDraws(24, 0, (0, 1, 0), varied=True)
+    compose = Composites(ingredients(), draw, SIDE)
+    batch = draw(np.random.default_rng(1))
+    plain = replace(
+        batch,
+        things=replace(batch.things, stretch=torch.ones(len(batch.things))),
+        thing_variation=None,
+        ground_variation=None,
+    )
+    areas = [compose.finished(one).mask.flatten(1).sum(1).numpy() for one in (plain, batch)]
     ratio = areas[1] / areas[0]
     assert np.median(ratio) == pytest.approx(1, abs=0.05) and np.ptp(ratio) > 0.01
 
@@ -41,10 +47,35 @@ def test_masks_of_varied_composites_cover_as_much() -> None:
 def test_backgrounds_keep_their_brightness_in_other_colours() -> None:
     light = torch.rand(40, 3, 16, 16, generator=torch.Generator().manual_seed(0)) + 0.1
     light = light * torch.tensor([0.2, 0.5, 1.0])[None, :, None, None]
-    varied = varied_light(light.clone(), np.random.default_rng(0))
+    drawn = ground_variation(np.random.default_rng(0), 40)
+    whole = replace(drawn, parted=torch.zeros_like(drawn.parted))
+    varied = varied_light(light.clone(), whole)
     assert varied.shape == light.shape and bool((varied > 0).all())
     brightness = varied.mean((1, 2, 3)) / light.mean((1, 2, 3))
     assert float(brightness.min()) > 0.7 and float(brightness.max()) < 1.5
     order = varied.mean((2, 3)).argsort(1)
     kept = (order == torch.tensor([0, 1, 2])).all(1).float().mean()
     assert 0.5 < float(kept) < 0.95
+
+
+def test_some_backgrounds_change_at_a_line() -> None:
+    light = torch.ones(60, 3, 32, 32)
+    drawn = ground_variation(np.random.default_rng(1), 60)
+    varied = varied_light(light, drawn)
+    parted = varied.flatten(1).std(1) > 0.02
+    assert not bool(parted[~drawn.parted[:, 0]].any())
+    assert 0.15 < float(parted.float().mean()) < 0.45
+
+
+def test_matched_things_have_the_colour_of_what_they_cover() -> None:
+    rng = np.random.default_rng(0)
+    _, things = draw_scenes(rng, 40, (0, 1, 0))
+    _, drawn = varied_things(things, rng)
+    cover = torch.zeros(len(things), 1, 16, 16)
+    cover[:, :, 4:12, 4:12] = 1
+    light = torch.tensor([0.2, 0.3, 0.4])[:, None, None].expand(len(things), 3, 16, 16)
+    body = 0.8 * cover.expand(-1, 3, -1, -1)
+    found = match(body, cover, light, drawn)
+    assert torch.equal(found[~drawn.matched], body[~drawn.matched])
+    factor = found[drawn.matched][:, :, 8, 8] / torch.tensor([0.2, 0.3, 0.4])
+    assert float(factor.log().abs().max()) < 0.9 and float(factor.log().mean()) < 0.2

@@ -1,0 +1,43 @@
+"""Ingredients survive the way through a file."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from isc_core.errors import InputError
+from training.masks.ingredients import SIDE
+from training.masks.packs import Ingredients
+
+
+def ingredients(bodies: int) -> Ingredients:
+    """Discs with gradients, before what is smooth."""
+    y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
+    cover = np.clip(60 - np.hypot(x, y), 0, 1)
+    colours = np.stack([128 + x, 128 - y, 200 + 0 * x]) * (cover > 0)
+    disc = np.concatenate([colours, 255 * cover[None]]).round().astype(np.uint8)
+    panoramas = np.exp(np.random.default_rng(0).normal(0, 2, (2, 8, 16, 3))).astype(np.float16)
+    patterns = np.random.default_rng(1).integers(256, size=(3, 8, 8)).astype(np.uint8)
+    return Ingredients(np.stack([disc] * bodies), panoramas, patterns)
+
+
+def test_files_are_read_as_they_were_written(tmp_path: Path) -> None:
+    sizes = [ingredients(k).write(tmp_path / f"{k}.npz") for k in (1, 2)]
+    assert sizes[1] < 2 * 10_000
+    found, wanted = Ingredients.read([tmp_path / "1.npz", tmp_path / "2.npz"]), ingredients(3)
+    np.testing.assert_array_equal(found.bodies[:, 3], wanted.bodies[:, 3])
+    np.testing.assert_array_equal(found.patterns, wanted.patterns)
+    np.testing.assert_allclose(found.panoramas, wanted.panoramas, rtol=0.016)
+    off = np.abs(found.bodies[:, :3].astype(int) - wanted.bodies[:, :3])
+    off = off.transpose(0, 2, 3, 1)[wanted.bodies[:, 3] > 0]
+    assert off.mean() < 2 and off.max() < 20, "the rim, too, keeps its colours"
+
+
+def test_what_holds_no_ingredients_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "learned.npz"
+    for write in (lambda: None, lambda: path.write_bytes(b"nothing")):
+        write()
+        with pytest.raises(InputError, match=r"learned\.npz holds no ingredients"):
+            Ingredients.read([path])

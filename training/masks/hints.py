@@ -1,0 +1,158 @@
+"""Points and boxes as a user gives them, for a whole batch at once.
+
+Equation: the pixel that a share u of the pixels of a set S chooses is the first at which the
+running count of S exceeds u |S|.
+
+Limits: pixels are drawn evenly; people point at the middle.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+
+from isc_core.networks.mask_network import POINT
+
+from ..world.tensor_batch import TensorBatch
+
+_POINTS = 3  # most of one kind
+_NOTHING, _SAME = 0.06, 0.6  # shares: hints at the background; at what is meant without hints
+_VISIBLE = 40  # pixels of a thing that a hint may mean
+
+
+@dataclass(frozen=True)
+class HintDraws(TensorBatch):
+    """What is drawn of the hints of a batch.
+
+    Attributes
+    ----------
+    given : (B,) bool tensor
+        The photo has hints.
+    nothing, same : (B,) bool tensor
+        They lie on the background; on what is meant without hints.
+    preferred : (B, MOST) tensor
+        Else on the visible thing with the largest number.
+    points : (B, 2, _POINTS) tensor
+        Shares of the pixels: on the object, on the background; above 1: no point.
+    box : (B,) bool tensor
+        There is a box.
+    margins : (B, 4) tensor
+        Its distance from the object above, below, left and right, of the object's sides.
+    """
+
+    given: torch.Tensor
+    nothing: torch.Tensor
+    same: torch.Tensor
+    preferred: torch.Tensor
+    points: torch.Tensor
+    box: torch.Tensor
+    margins: torch.Tensor
+
+
+def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -> HintDraws:
+    """Draw hints.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    number : int
+        Of photos.
+    share : float
+        Of photos with hints.
+    most : int
+        Things of a photo.
+
+    Returns
+    -------
+    HintDraws
+        On the CPU.
+    """
+    kind = rng.random(number)
+    counts = rng.integers(1, _POINTS + 1, (number, 2, 1))
+    counts[:, 0, 0] *= kind < 0.7
+    counts[:, 1, 0] *= rng.random(number) < 0.35
+    points = rng.random((number, 2, _POINTS)) + 2 * (np.arange(_POINTS) >= counts)
+    return HintDraws.of(
+        {
+            "given": rng.random(number) < share,
+            "nothing": rng.random(number) < _NOTHING,
+            "same": rng.random(number) < _SAME,
+            "preferred": rng.random((number, most)),
+            "points": points,
+            "box": kind > 0.5,
+            "margins": rng.normal(0.03, 0.04, (number, 4)).clip(-0.06, 0.2),
+        }
+    )
+
+
+def hinted(covers: torch.Tensor, meant: torch.Tensor, draws: HintDraws) -> torch.Tensor:
+    """Choose the things that hints mean.
+
+    Parameters
+    ----------
+    covers : (B, T, H, W) tensor
+        What is seen of each thing.
+    meant : (B, T) bool tensor
+        What is meant without hints.
+    draws : HintDraws
+
+    Returns
+    -------
+    (B, T) bool tensor
+        At most one of each photo; none: the background.
+    """
+    seen = (covers > 0.5).sum((2, 3)) > _VISIBLE
+    alone = meant & (meant.sum(1, keepdim=True) == 1)
+    preferred = draws.preferred[:, : covers.shape[1]] + 2 * (alone & draws.same[:, None])
+    preferred = torch.where(seen, preferred, -1)
+    best = preferred == preferred.amax(1, keepdim=True)
+    return best & seen & ~draws.nothing[:, None]
+
+
+def hint_maps(truth: torch.Tensor, inside: torch.Tensor, draws: HintDraws) -> torch.Tensor:
+    """Draw the maps that the network sees.
+
+    Parameters
+    ----------
+    truth : (B, H, W) bool tensor
+        What is meant; empty: points lie on the background.
+    inside : (B, H, W) bool tensor
+        The frame.
+    draws : HintDraws
+
+    Returns
+    -------
+    (B, 3, H, W) tensor
+        Points on the object, points on the background, the box; 0 without hints.
+    """
+    some = truth.any(2).any(1)[:, None, None]
+    known, others = torch.where(some, truth, inside), inside & ~truth
+    maps = [_discs(where, draws.points[:, k]) for k, where in enumerate((known, others))]
+    box = _box(truth, draws.margins) & inside & some & draws.box[:, None, None]
+    return torch.stack([*maps, box], 1).float() * draws.given[:, None, None, None]
+
+
+def _discs(where: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
+    """Discs (B, H, W) around points, given as shares (B, K) of the pixels of sets."""
+    counted = where.flatten(1).cumsum(1)
+    total = counted[:, -1:]
+    at = torch.searchsorted(counted, (shares * total).long(), right=True)
+    width = where.shape[2]
+    row, column = ((part)[..., None] for part in (at // width, at % width))
+    off = [torch.arange(n, device=where.device) for n in where.shape[1:]]
+    tall, wide = (off[0] - row).square(), (off[1] - column).square()
+    disc = tall[..., :, None] + wide[..., None, :] <= POINT**2
+    return (disc & ((shares < 1) & (total > 0))[..., None, None]).any(1)
+
+
+def _box(truth: torch.Tensor, margins: torch.Tensor) -> torch.Tensor:
+    """Boxes (B, H, W) around sets."""
+    sides = []
+    for axis, off in ((2, margins[:, :2]), (1, margins[:, 2:])):
+        line = truth.any(axis)
+        place = torch.arange(line.shape[1], device=truth.device)
+        first = torch.where(line, place, line.shape[1]).amin(1, keepdim=True)
+        last = torch.where(line, place + 1, 0).amax(1, keepdim=True)
+        low, high = (first - off[:, :1] * (last - first)), (last + off[:, 1:] * (last - first))
+        sides.append((place >= low.round()) & (place < high.round()))
+    return sides[0][:, :, None] & sides[1][:, None, :]
