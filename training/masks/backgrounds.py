@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from torch.nn import functional
 
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch, chosen
@@ -30,6 +31,8 @@ class Crops(TensorBatch):
 
     Attributes
     ----------
+    photo : (B,) int64 tensor
+        In which photos they are.
     panorama : (B,) tensor
         Which it is, as a share of all, in [0, 1).
     half : (B,) tensor
@@ -42,6 +45,7 @@ class Crops(TensorBatch):
         The share of the pixels that are darker than that which gets this light.
     """
 
+    photo: torch.Tensor
     panorama: torch.Tensor
     half: torch.Tensor
     turn: torch.Tensor
@@ -56,8 +60,8 @@ class Backdrops(TensorBatch):
 
     Attributes
     ----------
-    shown : (B,) bool tensor
-        Instead of a crop.
+    photo : (B,) int64 tensor
+        In which photos they are.
     colour : (B, 3) tensor
     slope : (B, 2) tensor
         Of the log light, right and down.
@@ -66,7 +70,7 @@ class Backdrops(TensorBatch):
         Standard deviation of a faint texture's log light, and its size in pixels.
     """
 
-    shown: torch.Tensor
+    photo: torch.Tensor
     colour: torch.Tensor
     slope: torch.Tensor
     vignette: torch.Tensor
@@ -80,7 +84,8 @@ class Tables(TensorBatch):
 
     Attributes
     ----------
-    shown : (B,) bool tensor
+    photo : (B,) int64 tensor
+        In which photos they are.
     pattern : (B,) tensor
         Which it is, as a share of all, in [0, 1).
     horizon, edge : (B,) tensor
@@ -96,7 +101,7 @@ class Tables(TensorBatch):
         Of the log light, right and down.
     """
 
-    shown: torch.Tensor
+    photo: torch.Tensor
     pattern: torch.Tensor
     horizon: torch.Tensor
     edge: torch.Tensor
@@ -119,7 +124,9 @@ class Grounds(TensorBatch):
         Scale and place, right and down, of what is shown of a picture.
     crops : Crops
     backdrops : Backdrops
+        In all other photos.
     tables : Tables
+        Before some of either.
     """
 
     window: torch.Tensor
@@ -148,18 +155,21 @@ def draw_grounds(
     zoom = rng.uniform(0.6, 1, (number, 1))
     place = (1 - zoom) * rng.uniform(-1, 1, (number, 2))
     scale = zoom * np.stack([rng.choice([-1, 1], number), np.ones(number)], axis=1)
+    plain, table = (rng.random(number) < share for share in shares)
     return Grounds(
         torch.from_numpy(np.stack([scale, place], axis=1)).float(),
-        _draw_crops(rng, number),
-        _draw_backdrops(rng, number, shares[0]),
-        _draw_tables(rng, number, shares[1]),
+        _draw_crops(rng, np.flatnonzero(~plain)),
+        _draw_backdrops(rng, np.flatnonzero(plain)),
+        _draw_tables(rng, np.flatnonzero(table)),
     )
 
 
-def _draw_crops(rng: np.random.Generator, number: int) -> Crops:
+def _draw_crops(rng: np.random.Generator, photo: np.ndarray) -> Crops:
+    number = len(photo)
     turn = _turns(2, rng.normal(0, 5, number)) @ _turns(0, rng.normal(10, 18, number))
     return Crops.of(
         {
+            "photo": photo,
             "panorama": rng.random(number),
             "half": np.tan(np.radians(log_uniforms(rng, 35, 105, number)) / 2),
             "turn": turn,
@@ -179,10 +189,11 @@ def _turns(axis: int, degrees: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def _draw_backdrops(rng: np.random.Generator, number: int, share: float) -> Backdrops:
+def _draw_backdrops(rng: np.random.Generator, photo: np.ndarray) -> Backdrops:
+    number = len(photo)
     return Backdrops.of(
         {
-            "shown": rng.random(number) < share,
+            "photo": photo,
             "colour": _colours(rng, number),
             "slope": rng.normal(0, 0.35, (number, 2)),
             "vignette": rng.uniform(0, 0.4, number),
@@ -192,14 +203,15 @@ def _draw_backdrops(rng: np.random.Generator, number: int, share: float) -> Back
     )
 
 
-def _draw_tables(rng: np.random.Generator, number: int, share: float) -> Tables:
+def _draw_tables(rng: np.random.Generator, photo: np.ndarray) -> Tables:
+    number = len(photo)
     near = rng.random(number) < 0.75
     horizon = np.where(near, rng.uniform(-2.5, 0.4, number), rng.uniform(-8, -1, number))
     edge = np.maximum(rng.uniform(-0.1, 0.7, number), horizon + 0.15)
     first, two = _colours(rng, number), rng.random((number, 1)) > 0.35
     return Tables.of(
         {
-            "shown": rng.random(number) < share,
+            "photo": photo,
             "pattern": rng.random(number),
             "horizon": horizon,
             "edge": np.where(rng.random(number) < 0.7, edge, -2.0),
@@ -233,7 +245,9 @@ class Backgrounds:
     """
 
     def __init__(self, panoramas: torch.Tensor, patterns: torch.Tensor) -> None:
-        self._panoramas, self._patterns = panoramas, patterns
+        self._number, self._rows = panoramas.shape[:2]
+        tower = panoramas.float().flatten(0, 1).permute(2, 0, 1)[None]  # one above the other
+        self._panoramas, self._patterns = _periodic(tower), patterns
 
     def __call__(self, drawn: Grounds, side: int) -> torch.Tensor:
         """Show backgrounds.
@@ -253,22 +267,32 @@ class Backgrounds:
         across = (torch.arange(side, device=drawn.window.device) + 0.5) * (2 / side) - 1
         line = drawn.window[:, 0, :, None] * across + drawn.window[:, 1, :, None]
         x, y = torch.broadcast_tensors(line[:, 0, None], line[:, 1, :, None])
-        light = self._cropped(drawn.crops, x, y)
-        plain = drawn.backdrops.shown[:, None, None, None]
-        light = torch.where(plain, _backdrop(drawn.backdrops, x, y), light)
-        return self._before(light, drawn.tables, x, y).clamp(0, 1).permute(0, 3, 1, 2)
+        light = x.new_empty(len(x), 3, side, side)
+        for show, parts in (
+            (self._cropped, drawn.crops),
+            (_backdrop, drawn.backdrops),
+            (self._before, drawn.tables),
+        ):
+            if len(parts):
+                at = parts.photo
+                light[at] = show(light[at], parts, x[at], y[at])
+        return light.clamp(0, 1)
 
-    def _cropped(self, drawn: Crops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-        rows, half = self._panoramas.shape[1], drawn.half[:, None, None]
+    def _cropped(
+        self, _: torch.Tensor, drawn: Crops, x: torch.Tensor, y: torch.Tensor
+    ) -> torch.Tensor:
+        rows, half = self._rows, drawn.half[:, None, None]
         rays = torch.stack([x * half, -y * half, -torch.ones_like(x)], dim=-1)
         rays = torch.einsum("bhwi,bij->bhwj", rays, drawn.turn)
         up = rays[..., 1] / rays.norm(dim=-1)
         turn = torch.atan2(rays[..., 0], -rays[..., 2]) + drawn.azimuth[:, None, None]
         at = (up.clamp(-1, 1).arccos(), turn)
         row, column = (angle * (rows / torch.pi) - 0.5 for angle in at)
-        which = chosen(drawn.panorama, len(self._panoramas))
-        picture = _looked_up(self._panoramas, which, row.clamp(0, rows - 1), column)
-        bright = picture[:, ::_SPARSE, ::_SPARSE].amax(-1).flatten(1).sort(1).values
+        floor = rows * chosen(drawn.panorama, self._number)[:, None, None]
+        place = (floor + row.clamp(0, rows - 1), column)
+        picture = _looked_up(self._panoramas, *(one.flatten(0, 1)[None] for one in place))
+        picture = picture[0].unflatten(1, row.shape[:2]).transpose(0, 1)
+        bright = picture[..., ::_SPARSE, ::_SPARSE].amax(1).flatten(1).sort(1).values
         place = (drawn.quantile * (bright.shape[1] - 1)).round().long()
         bright = bright.gather(1, place[:, None])[:, 0].clamp(min=1e-6)
         return picture * (drawn.exposure / bright)[:, None, None, None]
@@ -285,25 +309,25 @@ class Backgrounds:
         row = (sine * u + cosine * v + value["offset"][..., 0]) * size
         column = (cosine * u - sine * v + value["offset"][..., 1]) * size
         maps = self._patterns[chosen(drawn.pattern, len(self._patterns))]
-        maps = _blurred(maps, drawn.scale * (_PATTERN_PIXEL / side))[..., None]
-        grey = _looked_up(maps, torch.arange(len(maps), device=maps.device), row, column)
+        maps = _blurred(maps, drawn.scale * (_PATTERN_PIXEL / side))[:, None]
+        grey = _looked_up(_periodic(maps), row, column)
         fall = value["fall"][..., 0] * x + value["fall"][..., 1] * y
-        table = torch.lerp(value["first"], value["second"], grey) * fall.exp()[..., None]
-        share = ((y - value["edge"]) * (side / 4)).clamp(0, 1) * value["shown"]
-        return torch.lerp(light, table, share[..., None])
+        first, second = drawn.first[..., None, None], drawn.second[..., None, None]
+        table = torch.lerp(first, second, grey) * fall.exp()[:, None]
+        share = ((y - value["edge"]) * (side / 4)).clamp(0, 1)
+        return torch.lerp(light, table, share[:, None])
 
 
-def _backdrop(drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+def _backdrop(_: torch.Tensor, drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     value = {name: part[:, None, None] for name, part in vars(drawn).items()}
     side = x.shape[-1]
-    noise = torch.randn(len(x), side, side, 1, device=x.device)
+    noise = torch.randn(len(x), 1, side, side, device=x.device)
     place = torch.arange(side, device=x.device) / value["width"]
     row, column = torch.broadcast_tensors(place.mT, place)
-    which = torch.arange(len(x), device=x.device)
-    log_light = value["grain"] * _looked_up(noise, which, row, column)[..., 0]
+    log_light = value["grain"] * _looked_up(_periodic(noise), row, column)[:, 0]
     log_light = log_light + value["slope"][..., 0] * x + value["slope"][..., 1] * y
     log_light = log_light - value["vignette"] * (x.square() + y.square())
-    return value["colour"] * log_light.exp()[..., None]
+    return drawn.colour[..., None, None] * log_light.exp()[:, None]
 
 
 def _blurred(patterns: torch.Tensor, deviation: torch.Tensor) -> torch.Tensor:
@@ -316,17 +340,13 @@ def _blurred(patterns: torch.Tensor, deviation: torch.Tensor) -> torch.Tensor:
     return torch.fft.irfft2(found, s=(side, side))
 
 
-def _looked_up(
-    maps: torch.Tensor, which: torch.Tensor, row: torch.Tensor, column: torch.Tensor
-) -> torch.Tensor:
-    """Interpolate in one of several maps (P, rows, columns, C) that repeat, for each photo."""
-    (rows, columns), which = maps.shape[1:3], which[:, None, None]
-    top, left = row.floor(), column.floor()
+def _periodic(maps: torch.Tensor) -> torch.Tensor:
+    """Maps (B, C, rows, columns) that repeat, with their first row and column again at the end."""
+    return functional.pad(maps, (0, 1, 0, 1), mode="circular")
 
-    def at(down: int, right: int) -> torch.Tensor:
-        place = ((top + down) % rows).long(), ((left + right) % columns).long()
-        return maps[which, *place].float()
 
-    right, down = (column - left)[..., None], (row - top)[..., None]
-    upper, lower = (torch.lerp(at(k, 0), at(k, 1), right) for k in (0, 1))
-    return torch.lerp(upper, lower, down)
+def _looked_up(maps: torch.Tensor, row: torch.Tensor, column: torch.Tensor) -> torch.Tensor:
+    """Interpolate (B, C, H, W) in what `_periodic` returns, at rows and columns (B, H, W)."""
+    rows, columns = (size - 1 for size in maps.shape[2:])
+    grid = torch.stack([column % columns / columns, row % rows / rows], dim=-1) * 2 - 1
+    return functional.grid_sample(maps, grid, padding_mode="border", align_corners=True)
