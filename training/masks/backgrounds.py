@@ -268,19 +268,16 @@ class Backgrounds:
         line = drawn.window[:, 0, :, None] * across + drawn.window[:, 1, :, None]
         x, y = torch.broadcast_tensors(line[:, 0, None], line[:, 1, :, None])
         light = x.new_empty(len(x), 3, side, side)
-        for show, parts in (
-            (self._cropped, drawn.crops),
-            (_backdrop, drawn.backdrops),
-            (self._before, drawn.tables),
-        ):
-            if len(parts):
-                at = parts.photo
-                light[at] = show(light[at], parts, x[at], y[at])
+        crops, backdrops, tables = drawn.crops, drawn.backdrops, drawn.tables
+        if len(at := crops.photo):
+            light[at] = self._cropped(crops, x[at], y[at])
+        if len(at := backdrops.photo):
+            light[at] = _backdrop(backdrops, x[at], y[at])
+        if len(at := tables.photo):
+            light[at] = self._before(light[at], tables, x[at], y[at])
         return light.clamp(0, 1)
 
-    def _cropped(
-        self, _: torch.Tensor, drawn: Crops, x: torch.Tensor, y: torch.Tensor
-    ) -> torch.Tensor:
+    def _cropped(self, drawn: Crops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
         rows, half = self._rows, drawn.half[:, None, None]
         rays = torch.stack([x * half, -y * half, -torch.ones_like(x)], dim=-1)
         rays = torch.einsum("bhwi,bij->bhwj", rays, drawn.turn)
@@ -318,7 +315,7 @@ class Backgrounds:
         return torch.lerp(light, table, share[:, None])
 
 
-def _backdrop(_: torch.Tensor, drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+def _backdrop(drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     value = {name: part[:, None, None] for name, part in vars(drawn).items()}
     side = x.shape[-1]
     noise = torch.randn(len(x), 1, side, side, device=x.device)
