@@ -155,13 +155,18 @@ def draw_grounds(
     zoom = rng.uniform(0.6, 1, (number, 1))
     place = (1 - zoom) * rng.uniform(-1, 1, (number, 2))
     scale = zoom * np.stack([rng.choice([-1, 1], number), np.ones(number)], axis=1)
-    plain, table = (rng.random(number) < share for share in shares)
+    plain, table = (_some(rng, number, share) for share in shares)
     return Grounds(
         torch.from_numpy(np.stack([scale, place], axis=1)).float(),
-        _draw_crops(rng, np.flatnonzero(~plain)),
-        _draw_backdrops(rng, np.flatnonzero(plain)),
-        _draw_tables(rng, np.flatnonzero(table)),
+        _draw_crops(rng, np.setdiff1d(np.arange(number), plain)),
+        _draw_backdrops(rng, plain),
+        _draw_tables(rng, table),
     )
+
+
+def _some(rng: np.random.Generator, number: int, share: float) -> np.ndarray:
+    """A share of so many photos: nearly always equally many, which devices like."""
+    return np.sort(rng.permutation(number)[: int(number * share + rng.random())])
 
 
 def _draw_crops(rng: np.random.Generator, photo: np.ndarray) -> Crops:

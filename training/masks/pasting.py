@@ -79,7 +79,7 @@ class CutOuts:
             cover = coded[:, 3:].float() / 255
             shown = torch.arange(len(rows), device=rows.device)[:, None]
             colours = coded[shown, things.channels[rows]]
-            layers = torch.cat([self._linear[colours.int()] * cover, cover], dim=1)
+            layers = torch.cat([self._linear[colours.long()] * cover, cover], dim=1)
             size = [len(rows), 4, side, side]
             grid = functional.affine_grid(theta[rows], size, align_corners=False)
             found[rows] = functional.grid_sample(layers, grid, align_corners=False)
