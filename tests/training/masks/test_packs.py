@@ -8,6 +8,8 @@ import pytest
 pytest.importorskip("torch")
 
 from isc_core.errors import InputError
+from isc_core.networks.mask_network import MaskNetwork
+from training.masks import mask_network
 from training.masks.ingredients import SIDE
 from training.masks.packs import Ingredients
 
@@ -41,3 +43,31 @@ def test_what_holds_no_ingredients_is_refused_in_one_line(tmp_path: Path) -> Non
         write()
         with pytest.raises(InputError, match=r"learned\.npz holds no ingredients"):
             Ingredients.read([path])
+
+
+def test_a_network_learns_from_two_folders(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folders = [tmp_path / name for name in ("one", "two")]
+    for folder in folders:
+        folder.mkdir()
+        for name in ("learned", "judged"):
+            ingredients(1).write(folder / f"{name}.npz")
+    given = ["--side", "32", "--batch", "2", "--steps", "2", "--threads", "1", "--workers", "1"]
+    path = tmp_path / "out.npz"
+    monkeypatch.setattr("sys.argv", ["mask_network", *map(str, folders), *given, "-o", str(path)])
+    mask_network.main()
+    MaskNetwork.read(path)
+    printed = capsys.readouterr().out
+    assert "step 2: loss" in printed and "held out: loss" in printed and "nan" not in printed
+
+
+def test_a_folder_without_ingredients_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "out.npz"
+    monkeypatch.setattr("sys.argv", ["mask_network", str(tmp_path), "-o", str(path)])
+    with pytest.raises(SystemExit) as stopped:
+        mask_network.main()
+    assert stopped.value.code == 2 and not path.exists()
+    assert "learned.npz holds no ingredients" in capsys.readouterr().err
