@@ -22,13 +22,13 @@ from isc_core.networks.mask_network import Count
 from ..world.camera import draw_camera, exposed, photographed
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
-from . import backgrounds, scenes
+from .backgrounds import SHARES as GROUND_SHARES
 from .backgrounds import Backgrounds, Grounds, draw_grounds
 from .hints import HintDraws, draw_hints, hint_maps, hinted
 from .ingredients import LENGTH, SIDE
 from .packs import Ingredients
 from .pasting import CutOuts, shadows
-from .scenes import MOST, Scenes, Things, draw_scenes
+from .scenes import MOST, SHARES, Scenes, Things, draw_scenes
 from .variation import (
     GroundVariation,
     ThingVariation,
@@ -149,8 +149,8 @@ class CompositeDraws:
 
     size: int
     hinted: float = 0.5
-    shares: tuple[float, ...] = scenes.SHARES
-    grounds: tuple[float, float] = backgrounds.SHARES
+    shares: tuple[float, ...] = SHARES
+    grounds: tuple[float, float] = GROUND_SHARES
     varied: bool = False
 
     def __call__(self, rng: np.random.Generator) -> CompositeDraw:
