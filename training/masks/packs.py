@@ -2,8 +2,8 @@
 
 Equation: colours of bodies are JPEG files, at a quality at which they lose less than in the photos
 that they become part of. Outside of a body they go on as the mean of the colours around, so that
-its rim keeps its colour. Covers, and panoramas as half floats with 6 of their 10 binary digits, are
-differences from the pixel before, compressed by LZMA.
+its rim keeps its colour. Covers, and differences between neighbouring pixels of patterns and of
+panoramas, which are half floats with 6 of their 10 binary digits, are compressed by LZMA.
 
 Limits: colours are off by some hundredths, panoramas by up to 1 %.
 """
@@ -23,7 +23,7 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
 SUFFIX = ".npz"
-_FORMAT, _QUALITY = 1, 90
+_FORMAT, _QUALITY = 1, 85
 _AROUND = 15  # pixels: as wide as two of JPEG's blocks
 _DROPPED = 4  # binary digits of half floats
 _DAMAGES = (ValueError, KeyError, OSError, BadZipFile, EOFError, lzma.LZMAError)
@@ -66,7 +66,7 @@ class Ingredients:
             "format": np.array(_FORMAT),
             "colours": np.frombuffer(b"".join(files), np.uint8),
             "sizes": np.array([len(one) for one in files]),
-            "covers": _stream(np.diff(self.bodies[:, 3], prepend=np.uint8(0))),
+            "covers": _stream(np.ascontiguousarray(self.bodies[:, 3])),
             # high bytes first: they hardly ever change
             "panoramas": _stream(np.stack([steps >> 8, steps & 255]).astype(np.uint8)),
             "rows": np.array(self.panoramas.shape[1]),
@@ -117,8 +117,7 @@ def _unpacked(data: dict[str, np.ndarray]) -> Ingredients:
     ends = np.cumsum(data["sizes"])
     parts = np.split(data["colours"], ends[:-1])
     colours = np.stack([np.asarray(Image.open(io.BytesIO(one.tobytes()))) for one in parts])
-    covers = _bytes(data["covers"]).reshape(colours.shape[:3])
-    covers = np.cumsum(covers, axis=2, dtype=np.uint8)[:, None]
+    covers = _bytes(data["covers"]).reshape(colours.shape[:3])[:, None]
     rows, side = int(data["rows"]), int(data["side"])
     high, low = _bytes(data["panoramas"]).reshape(2, -1, rows, 2 * rows, 3).astype(np.uint16)
     digits = np.cumsum((high << 8) | low, axis=2, dtype=np.uint16) << _DROPPED
@@ -146,7 +145,7 @@ def _jpeg(body: np.ndarray) -> bytes:
 
 
 def _stream(values: np.ndarray) -> np.ndarray:
-    return np.frombuffer(lzma.compress(values.tobytes(), preset=4), np.uint8)
+    return np.frombuffer(lzma.compress(values.tobytes(), preset=6), np.uint8)
 
 
 def _bytes(stream: np.ndarray) -> np.ndarray:
