@@ -136,7 +136,7 @@ def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
     Raises
     ------
     InputError
-        If there is none, or one cannot be used.
+        If there is none of the set, or one cannot be used.
     """
     wanted = {one.name for one in read_panoramas(folder, seed) if one.judged == judged}
     size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
@@ -145,6 +145,8 @@ def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
             light = torch.from_numpy(read_linear(path, "linear")).permute(2, 0, 1)[None].float()
             light = functional.interpolate(light, size, mode="bilinear", antialias=True)[0]
             found.append(light.clamp(max=_BRIGHTEST).permute(1, 2, 0).numpy().astype(np.float16))
+    if not found:
+        raise InputError(f"{folder} has too few panoramas to keep one for judging: six are enough")
     return np.stack(found)
 
 
