@@ -95,6 +95,7 @@ class Case:
     kind: Kind
     view: View
     mesh: Mesh
+    tracer: Tracer
     albedo: np.ndarray
     alpha: float
     ior: float
@@ -107,23 +108,23 @@ class Case:
     radius: np.ndarray
 
 
-def placed_view(mesh: Mesh, rng: np.random.Generator) -> tuple[View, Mesh]:
-    """A view of a body, and its mesh as `trace_view` placed it."""
-    meshes: list[Mesh] = []
+def placed_view(mesh: Mesh, rng: np.random.Generator) -> tuple[View, Mesh, Tracer]:
+    """A view of a body, its mesh as `trace_view` placed it, and that mesh's tracer."""
+    made: list[tuple[Mesh, Tracer]] = []
 
     class Spy(Tracer):
         def __init__(self, placed: Mesh) -> None:
-            meshes.append(placed)
             super().__init__(placed)
+            made.append((placed, self))
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(views_module, "Tracer", Spy)
         view = trace_view("body", "family", mesh, rng)
-    return view, meshes[-1]
+    return view, *made[-1]
 
 
 def make_case(kind: Kind, mesh: Mesh, rng: np.random.Generator) -> Case:
-    view, placed = placed_view(mesh, rng)
+    view, placed, tracer = placed_view(mesh, rng)
     count = int(rng.integers(1, 4))
     lamps = float(kind not in (Kind.SMOOTH, Kind.STUDIO))
     around = studio(rng)
@@ -134,6 +135,7 @@ def make_case(kind: Kind, mesh: Mesh, rng: np.random.Generator) -> Case:
         kind,
         view,
         placed,
+        tracer,
         albedo=rng.uniform(0.05, 0.9, 3),
         alpha=math.exp(rng.uniform(math.log(0.08), math.log(0.5))),
         ior=rng.uniform(1.3, 1.8),
@@ -224,8 +226,7 @@ def truth(case: Case, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rendered_lights(case),
         Camera(SIDE, SIDE, SIDE / 2, case.view.distance),
     )
-    tracer = Tracer(case.mesh)
-    whole = find_surface(scene, tracer)
+    whole = find_surface(scene, case.tracer)
     np.testing.assert_array_equal(whole.mask, case.view.mask)
     some = Surface(
         whole.mask,
@@ -235,7 +236,7 @@ def truth(case: Case, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         whole.uv[chosen],
         scene.material.at(whole.uv[chosen]),
     )
-    found = light_surface(some, scene.material, scene.lights, tracer, RenderOptions(samples=96))
+    found = light_surface(some, scene.material, scene.lights, case.tracer, RenderOptions(samples=96))
     return found.shading, found.specular
 
 
