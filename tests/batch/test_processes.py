@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 from collections import Counter
 from contextlib import suppress
@@ -16,6 +17,7 @@ from isc_core.batch.attempts import MAX_CRASHES
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED
 from isc_core.batch.run_batch import run_batch
+from isc_core.cli.main import main
 from tests.batch.conftest import batch, rows
 from tests.batch.tasks import obedient
 from tests.core.command_line import isc_command, run_isc, through_terminal
@@ -92,7 +94,7 @@ def test_a_worker_that_is_lost_while_it_starts_is_started_again(
         "--model",
         "retinex",
         "--workers",
-        "2",
+        "1",
         "--memory",
         "0",
     ]
@@ -113,18 +115,27 @@ def test_a_worker_that_is_lost_while_it_starts_is_started_again(
     assert (tmp_path / "out" / "one" / "mesh.glb").is_file()
 
 
-@pytest.mark.slow
-def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) -> None:
+def test_what_is_wrong_with_the_run_is_one_line(
+    photos: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
     """Found before any worker starts."""
-    without = "import sys; sys.modules['dask'] = None"
-    for words, before, told in (
-        ((photos,), without, "pip install 'dask[distributed]>="),
-        ((tmp_path / "none.csv",), "", "none.csv: cannot be read"),
-        ((photos, "--model", "nosuch"), "", 'unknown model "nosuch"'),
-        ((photos, "--timeout", "-1"), "", "is not above 0"),
-    ):
-        done = run_isc("batch", *words, "-o", tmp_path / "out", before=before)
-        assert done.returncode == 2, done.stderr
-        assert told in done.stderr
-        lines = [line for line in done.stderr.splitlines() if line != "isc: reading the inputs"]
-        assert len(lines) == 1, done.stderr
+
+    def never(*values: object) -> None:
+        raise AssertionError("no worker may start")
+
+    monkeypatch.setattr("isc_core.batch.run_batch.connected", never)
+
+    def told(*words: object) -> str:
+        assert main(["batch", *map(str, words), "-o", str(tmp_path / "out")]) == 2
+        lines = capsys.readouterr().err.splitlines()
+        (line,) = (line for line in lines if line != "isc: reading the inputs")
+        return line
+
+    assert "none.csv: cannot be read" in told(tmp_path / "none.csv")
+    assert 'unknown model "nosuch"' in told(photos, "--model", "nosuch")
+    assert "is not above 0" in told(photos, "--timeout", "-1")
+    monkeypatch.setitem(sys.modules, "dask", None)
+    assert "pip install 'dask[distributed]>=" in told(photos)

@@ -25,6 +25,8 @@ from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.numerics.kernel_library import shipped_library
 from isc_core.photo import read_photo
+from isc_core.prior_fitting.absolute_color import TableFitOptions
+from isc_core.prior_fitting.fit import FitOptions
 from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.known_inputs import CODE, read_height, read_light
 from isc_core.result_files.result_folder import load
@@ -77,8 +79,9 @@ def test_the_examples_in_the_help_are_commands(capsys: pytest.CaptureFixture[str
             r"^  isc (\S+ \S.*?)(?:  .*)?$", capsys.readouterr().out.partition("examples:")[2], re.M
         )
     assert len(found) >= 10
+    parser = build_parser()
     for example in found:
-        assert callable(build_parser().parse_args(example.split()).run), example
+        assert callable(parser.parse_args(example.split()).run), example
 
 
 def test_the_modules_name_runs_the_command() -> None:
@@ -533,8 +536,15 @@ def test_what_is_evaluated_explains_the_image(
 
 @pytest.mark.slow
 def test_priors_are_fitted_to_the_chosen_objects(
-    shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    shared: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """In a few steps of the fit; whole fits are tested where it is."""
+    steps = TableFitOptions(max_steps=4, runs=1)
+    few = FitOptions(iterations=4, absolute=steps, grey_absolute=steps)
+    monkeypatch.setattr("isc_core.prior_fitting.fit.FitOptions", lambda: few)
     root, path = shared / "data" / "mit_berkeley_train", tmp_path / "priors.npz"
     assert isc("fit-priors", root, "--objects", "box", "-o", path) == 2
     assert "at least two" in capfd.readouterr().err

@@ -1,7 +1,8 @@
-"""`isc batch --each`: a result, a row and a thumbnail for each thing of a photo."""
+"""`isc batch --each`: a result, a row and a thumbnail for each object of a photo."""
 
 import csv
 import json
+import shutil
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
@@ -20,21 +21,35 @@ from tests.core.command_line import ball_codes, write_image
 EACH = replace(QUICK, each=True)
 
 
-@pytest.fixture
-def shelf(tmp_path: Path) -> Path:
-    """A photo of two balls on black, and one of nothing."""
-    folder = tmp_path / "photos"
+@pytest.fixture(scope="module")
+def first_shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder `photos` with a photo of two balls on black and one of nothing, and what a run has
+    made of them in `out`.
+    """
+    place = tmp_path_factory.mktemp("shelf")
+    folder = place / "photos"
     folder.mkdir()
     ball = ball_codes(12.0)
     write_image(folder / "shelf.png", np.concatenate([ball, 0.8 * ball], axis=1).astype("uint16"))
     write_image(folder / "empty.png", np.full((40, 40, 3), 9000, "uint16"))
-    return folder
-
-
-def test_each_thing_has_a_result_a_row_and_a_thumbnail(shelf: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
-    done = run_batch(batch(shelf, output=out, recipe=EACH))
+    done = run_batch(batch(folder, output=place / "out", recipe=EACH))
     assert done == Counter({DONE: 2, FAILED: 1})
+    return place
+
+
+@pytest.fixture
+def shelf(first_shelf: Path, tmp_path: Path) -> Path:
+    """The photos, to be changed at will."""
+    return Path(shutil.copytree(first_shelf / "photos", tmp_path / "photos"))
+
+
+@pytest.fixture
+def out(first_shelf: Path, tmp_path: Path) -> Path:
+    """The output of the first run, to be changed at will."""
+    return Path(shutil.copytree(first_shelf / "out", tmp_path / "out"))
+
+
+def test_each_object_has_a_result_a_row_and_a_thumbnail(out: Path) -> None:
     left, right = (load(out / "shelf" / number) for number in "12")
     columns = left.mask.shape[1]
     assert left.mask[:, : columns // 2].any() and not left.mask[:, columns // 2 :].any()
@@ -52,27 +67,25 @@ def test_each_thing_has_a_result_a_row_and_a_thumbnail(shelf: Path, tmp_path: Pa
         assert (out / "thumbnails" / "each" / "shelf" / f"{number}.jpg").is_file()
 
 
-def test_it_makes_what_isc_decompose_makes(shelf: Path, tmp_path: Path) -> None:
-    run_batch(batch(shelf / "shelf.png", output=tmp_path / "out", recipe=EACH))
+def test_it_makes_what_isc_decompose_makes(shelf: Path, out: Path, tmp_path: Path) -> None:
     words = ["decompose", shelf / "shelf.png", "--each", "--model", "retinex", "--engine", "numpy"]
     assert main([str(word) for word in (*words, "-o", tmp_path / "alone", "-q")]) == 0
     for place in ("1", "2"):
         for name in set(DECOMPOSITION_FILES) - {"decomposition.json"}:
-            made = (tmp_path / "out" / "shelf" / place / name).read_bytes()
+            made = (out / "shelf" / place / name).read_bytes()
             assert made == (tmp_path / "alone" / place / name).read_bytes(), name
 
 
-def test_what_is_finished_is_skipped_and_the_rest_is_made(shelf: Path, tmp_path: Path) -> None:
-    given = batch(shelf / "shelf.png", output=tmp_path / "out", recipe=EACH)
-    run_batch(given)
-    (tmp_path / "out" / "thumbnails" / "each" / "shelf" / "1.jpg").unlink()
+def test_what_is_finished_is_skipped_and_the_rest_is_made(shelf: Path, out: Path) -> None:
+    given = batch(shelf / "shelf.png", output=out, recipe=EACH)
+    (out / "thumbnails" / "each" / "shelf" / "1.jpg").unlink()
     assert run_batch(given) == Counter({SKIPPED: 2})
-    assert (tmp_path / "out" / "thumbnails" / "each" / "shelf" / "1.jpg").is_file()
-    (tmp_path / "out" / "shelf" / "2" / "mesh.glb").unlink()
+    assert (out / "thumbnails" / "each" / "shelf" / "1.jpg").is_file()
+    (out / "shelf" / "2" / "mesh.glb").unlink()
     assert run_batch(given) == Counter({SKIPPED: 1, DONE: 1})
 
 
-def test_a_thing_that_fails_stops_no_other(shelf: Path, tmp_path: Path) -> None:
+def test_an_object_that_fails_stops_no_other(shelf: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     (out / "shelf" / "1").mkdir(parents=True)
     (out / "shelf" / "1" / "diary.txt").write_text("mine")
@@ -84,22 +97,20 @@ def test_a_thing_that_fails_stops_no_other(shelf: Path, tmp_path: Path) -> None:
     assert run_batch(given) == Counter({DONE: 1, SKIPPED: 1})
 
 
-def test_results_of_things_that_are_no_longer_there_go(shelf: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
+def test_results_of_objects_that_are_no_longer_there_go(shelf: Path, out: Path) -> None:
     given = batch(shelf / "shelf.png", output=out, recipe=EACH)
-    run_batch(given)
     write_image(shelf / "shelf.png", ball_codes(12.0))
     assert run_batch(given) == Counter({DONE: 1})
     assert [path.name for path in (out / "shelf").iterdir()] == ["1"]
     assert len(list((out / "thumbnails" / "each" / "shelf").iterdir())) == 1
 
 
-def test_whole_photos_and_things_do_not_replace_each_other(shelf: Path, tmp_path: Path) -> None:
-    things, whole = tmp_path / "things", tmp_path / "whole"
-    photo = shelf / "shelf.png"
-    run_batch(batch(photo, output=things, recipe=EACH))
-    assert run_batch(batch(photo, output=things)) == Counter({FAILED: 1})
-    assert load(things / "shelf" / "2").mask.any()
+def test_whole_photos_and_objects_do_not_replace_each_other(
+    shelf: Path, out: Path, tmp_path: Path
+) -> None:
+    photo, whole = shelf / "shelf.png", tmp_path / "whole"
+    assert run_batch(batch(photo, output=out)) == Counter({FAILED: 1})
+    assert load(out / "shelf" / "2").mask.any()
     run_batch(batch(photo, output=whole))
     assert run_batch(batch(photo, output=whole, recipe=EACH)) == Counter({FAILED: 1})
     assert "leave out --each" in str(rows(whole / "failures.jsonl")[0]["reason"])
@@ -113,10 +124,8 @@ def test_a_manifest_says_which_photos_have_several(shelf: Path, tmp_path: Path) 
     assert [row["name"] for row in rows(out / "summary.jsonl")] == ["shelf/1", "shelf/2", "both"]
 
 
-def test_what_a_killed_run_left_of_things_is_tidied(shelf: Path, tmp_path: Path) -> None:
-    out = tmp_path / "out"
+def test_what_a_killed_run_left_of_objects_is_tidied(shelf: Path, out: Path) -> None:
     given = batch(shelf / "shelf.png", output=out, recipe=EACH)
-    run_batch(given)
     (out / "shelf" / ".2.0123abcd.partial").mkdir()
     (out / "shelf" / "1").rename(out / "shelf" / ".1.0123abcd.old")
     assert run_batch(given) == Counter({SKIPPED: 2})
@@ -124,13 +133,13 @@ def test_what_a_killed_run_left_of_things_is_tidied(shelf: Path, tmp_path: Path)
 
 
 def lost_at_the_second(job: ImageJob) -> Outcomes:
-    """The work, after workers were lost at the second thing."""
+    """The work, after workers were lost at the second object."""
     record = job.plan.output / ".isc-batch" / "attempts" / "shelf 2"
     record.write_text(f"{job.plan.run}\n" * 3)
     return process(job)
 
 
-def test_the_thing_that_costs_workers_is_given_up_alone(shelf: Path, tmp_path: Path) -> None:
+def test_the_object_that_costs_workers_is_given_up_alone(shelf: Path, tmp_path: Path) -> None:
     given = batch(shelf / "shelf.png", output=tmp_path / "out", recipe=EACH)
     assert run_batch(given, task=lost_at_the_second) == Counter({DONE: 1, FAILED: 1})
     (failure,) = rows(tmp_path / "out" / "failures.jsonl")
