@@ -250,13 +250,13 @@ def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> R
     if loss_tolerance is not None:
         solver = replace(solver, lbfgs=replace(solver.lbfgs, loss_tolerance=loss_tolerance))
     return RecoverOptions(
-        options.solve_size,
-        options.margin,
-        settings.illumination != Illumination.PHOTO,
-        options.whole_frame,
-        options.drop_near_edge,
-        settings.shading_only,
-        solver,
+        solve_size=options.solve_size,
+        margin=options.margin,
+        to_own_size=settings.illumination != Illumination.PHOTO,
+        whole_frame=options.whole_frame,
+        drop_near_edge=options.drop_near_edge,
+        shading_only=settings.shading_only,
+        solver=solver,
     )
 
 

@@ -13,15 +13,18 @@ FEW_STEPS = LbfgsOptions(iterations=10, evaluations=25, loss_tolerance=1e-4)
 
 
 @contextlib.contextmanager
-def small_solves(side: int = 24, steps: LbfgsOptions | None = FEW_STEPS) -> Iterator[None]:
+def small_solves(
+    side: int = 24, steps: LbfgsOptions | None = FEW_STEPS, own_size: bool = False
+) -> Iterator[None]:
     """Solve SIRFS at `side` pixels instead of 256 while the block lasts, without `steps` to the
-    end.
+    end; only with `own_size`, go on to the photo's own size where the settings ask for it.
     """
 
-    def small(*values: Any) -> RecoverOptions:
-        given = RecoverOptions(*values)
+    def small(**values: Any) -> RecoverOptions:
+        given = RecoverOptions(**values)
         solver = given.solver if steps is None else replace(given.solver, lbfgs=steps)
-        return replace(given, solve_size=side, margin=4, to_own_size=False, solver=solver)
+        own = own_size and given.to_own_size
+        return replace(given, solve_size=side, margin=4, to_own_size=own, solver=solver)
 
     with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
         yield
