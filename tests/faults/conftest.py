@@ -8,7 +8,7 @@ from unittest import mock
 import numpy as np
 import pytest
 
-from isc_core.networks.mask_network import MaskPrediction, predict_mask
+from isc_core.networks.mask_network import MaskNetwork, MaskPrediction, predict_mask
 from tests.faults.commands import Command, Trial, digests, make_inputs, run
 
 Trials = Callable[[Command], Trial]
@@ -19,11 +19,13 @@ def _one_prediction() -> Iterator[None]:
     """The trials find the mask of one photo again and again: the network predicts it once."""
     known: dict[bytes, MaskPrediction] = {}
 
-    def predict(*values: np.ndarray) -> MaskPrediction:
-        *arrays, network = values
-        key = hashlib.sha256(b"".join(array.tobytes() for array in arrays)).digest()
+    def predict(
+        light: np.ndarray, frame: np.ndarray, hints: np.ndarray, network: MaskNetwork | None
+    ) -> MaskPrediction:
+        arrays = b"".join(array.tobytes() for array in (light, frame, hints))
+        key = hashlib.sha256(arrays).digest()
         if key not in known:
-            known[key] = predict_mask(*arrays, network)
+            known[key] = predict_mask(light, frame, hints, network)
             known[key].cover.setflags(write=False)
         return known[key]
 
