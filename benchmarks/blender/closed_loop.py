@@ -33,7 +33,6 @@ from PIL import Image
 from scipy import ndimage
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from isc_core.errors import InputError
 from isc_core.evaluation.metrics import psnr
 from isc_core.result_files.contact_sheet import MapPanel, edit_sheet
 from isc_core.shading.environment_map import shading_under
@@ -46,6 +45,7 @@ from .closed_loop_cases import (
     RelitTruth,
     add_case_arguments,
     loop_cases,
+    run_cases,
 )
 from .renders import RenderVariant, render
 
@@ -575,12 +575,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     add_case_arguments(parser, size=256, samples=64)
     parser.add_argument("--fresh", action="store_true", help="render again what exists")
-    try:
-        measure(parser.parse_args(arguments))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return run_cases(parser, measure, arguments)
 
 
 if __name__ == "__main__":

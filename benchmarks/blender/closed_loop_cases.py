@@ -12,7 +12,8 @@ right up to one gain at best.
 """
 
 import argparse
-from collections.abc import Iterable, Iterator
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -144,6 +145,34 @@ def add_case_arguments(parser: argparse.ArgumentParser, size: int, samples: int)
         default=samples,
         help="samples of Cycles per pixel (default: %(default)s)",
     )
+
+
+def run_cases(
+    parser: argparse.ArgumentParser,
+    measure: Callable[[argparse.Namespace], None],
+    arguments: Sequence[str] | None,
+) -> int:
+    """Run a program that measures cases.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    measure : callable
+        Of the parsed options.
+    arguments : sequence of str, optional
+        By default those of the process.
+
+    Returns
+    -------
+    int
+        0, or 2 after an error message.
+    """
+    try:
+        measure(parser.parse_args(arguments))
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 def loop_cases(options: CaseOptions, names: Iterable[str]) -> Iterator[LoopCase]:

@@ -36,7 +36,6 @@ from blender_addon.scene.material_edits import dichromatic_node
 from blender_addon.scene.preparation import BuildOptions
 from blender_addon.scene.sun import ensure_sun
 from blender_addon.scene.world import set_sun_mix
-from isc_core.errors import InputError
 from isc_core.evaluation.metrics import psnr
 from synth.light_rigs.placing import toward
 
@@ -48,6 +47,7 @@ from .closed_loop_cases import (
     LoopCase,
     add_case_arguments,
     loop_cases,
+    run_cases,
 )
 from .read_back import read_back, shown
 from .renders import render_scene
@@ -277,12 +277,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="Measure exported objects read back, and highlights of a new lamp.",
     )
     add_case_arguments(parser, size=128, samples=32)
-    try:
-        measure(parser.parse_args(arguments))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 2
-    return 0
+    return run_cases(parser, measure, arguments)
 
 
 if __name__ == "__main__":

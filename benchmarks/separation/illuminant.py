@@ -139,7 +139,7 @@ def measure(group: str, truth: SeparationTruth, tint: np.ndarray, colours_only: 
         angle(light.colour, true),
         angle(WHITE, true),
         light.determined,
-        light.too_strong,
+        light.outcome.too_strong,
         ratios,
     )
 

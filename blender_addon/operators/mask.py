@@ -23,7 +23,7 @@ from ..worker.commands import Box, WorkerEnvironment, overlay_of
 from .messages import busy_message
 from .modal import WorkerOperator
 from .photo_canvas import PhotoCanvas, PhotoOperator
-from .request import find_by_full_name
+from .request import find_by_full_name, require_photo
 from .run_steps import mask_steps
 from .worker_run import (
     ImportSteps,
@@ -82,8 +82,7 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
         """
         require_no_active_run()
         settings = context.scene.isc
-        if settings.image is None:
-            raise InputError("no photo is selected: open a file, or choose an image of this file")
+        require_photo(settings)
         left, top, width, height = (int(number) for number in settings.box)
         if min(width, height) < _MIN_SIDE:
             raise InputError(_small_box_message())

@@ -7,12 +7,10 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from isc_core.errors import InputError
-
 from .mask import can_cut, mask_run
 from .modal import WorkerOperator
 from .photo_canvas import ClickOnPhoto, add_point
-from .request import parse_points
+from .request import parse_points, require_photo
 from .run_steps import auto_mask_steps
 from .worker_run import WorkerRun, require_no_active_run
 
@@ -60,8 +58,7 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         """
         require_no_active_run()
         settings = context.scene.isc
-        if settings.image is None:
-            raise InputError("no photo is selected: open a file, or choose an image of this file")
+        require_photo(settings)
         points, others = parse_points(settings.points), parse_points(settings.other_points)
         return mask_run(
             context,

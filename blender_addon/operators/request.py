@@ -128,6 +128,23 @@ def request_from_json(text: str) -> DecomposeRequest:
         ) from error
 
 
+def require_photo(settings: Any) -> None:
+    """Raise if no photo is selected.
+
+    Parameters
+    ----------
+    settings : ISC_PG_settings
+        The panel's settings.
+
+    Raises
+    ------
+    InputError
+        With what to do.
+    """
+    if settings.image is None:
+        raise InputError("no photo is selected: open a file, or choose an image of this file")
+
+
 def request_from_settings(scene: Any) -> DecomposeRequest:
     """Return the request of a scene's panel.
 
@@ -147,8 +164,7 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
         If the photo is missing, or a mask image is chosen but missing.
     """
     settings = scene.isc
-    if settings.image is None:
-        raise InputError("no photo is selected: open a file, or choose an image of this file")
+    require_photo(settings)
     masked = settings.mask_source == "IMAGE"
     if masked and settings.mask is None:
         raise InputError(

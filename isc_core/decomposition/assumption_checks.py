@@ -128,7 +128,7 @@ def share_that_holds(diagnostics: Diagnostics) -> float:
     checked = (WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS)
     probable = [one.value or 0.0 for one in diagnostics.warnings if one.kind in checked]
     share = max(float(np.prod([1 - value for value in probable])), _LEAST)
-    strong = diagnostics.light_colour is not None and diagnostics.light_colour.too_strong
+    strong = diagnostics.light_colour is not None and diagnostics.light_colour.outcome.too_strong
     return share * (_COLOURED if strong else 1.0)
 
 

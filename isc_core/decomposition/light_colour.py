@@ -70,7 +70,7 @@ def under_light(
         colour = asked.result().colour if used else np.ones(3)
         estimate = _back(solver(_whitened(task, colour)), colour) if used else solver(task)
         light = asked.result()
-    split = scale_confidence(estimate.split) if light.too_strong else estimate.split
+    split = scale_confidence(estimate.split) if light.outcome.too_strong else estimate.split
     diagnostics = replace(
         estimate.diagnostics, light_colour=_diagnostics(light, settings.light_colour, used)
     )

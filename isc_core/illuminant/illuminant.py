@@ -95,14 +95,6 @@ class Illuminant:
         """Whether the photo determines the colour."""
         return self.outcome == IlluminantOutcome.DETERMINED
 
-    @property
-    def too_strong(self) -> bool:
-        """Whether the light may have a colour that no lamp has."""
-        return self.outcome in (
-            IlluminantOutcome.STRONG_OBJECT_COLOUR,
-            IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR,
-        )
-
 
 @dataclass(frozen=True)
 class _Changes:

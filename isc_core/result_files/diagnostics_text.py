@@ -206,7 +206,7 @@ def light_colour_advice(light: LightColourDiagnostics | None) -> str:
     """
     if light is None:
         return ""
-    if light.too_strong:
+    if light.outcome.too_strong:
         return STRONG_COLOUR
     return COLOURED if light.coloured and light.used != "estimate" else ""
 

@@ -124,6 +124,12 @@ class IlluminantOutcome(StrEnum):
     STRONG_OBJECT_COLOUR = "strong object colour"
     STRONG_HIGHLIGHT_COLOUR = "strong highlight colour"
 
+    @property
+    def too_strong(self) -> bool:
+        """Whether the light may have a colour that no lamp has."""
+        kind = IlluminantOutcome
+        return self in (kind.STRONG_OBJECT_COLOUR, kind.STRONG_HIGHLIGHT_COLOUR)
+
 
 class PhotoColours(StrEnum):
     """Whether a photo has colours of its own.
@@ -231,14 +237,6 @@ class LightColourDiagnostics:
     def determined(self) -> bool:
         """Whether the photo determines the colour."""
         return self.outcome == IlluminantOutcome.DETERMINED
-
-    @property
-    def too_strong(self) -> bool:
-        """Whether the light may have a colour that no lamp has."""
-        return self.outcome in (
-            IlluminantOutcome.STRONG_OBJECT_COLOUR,
-            IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR,
-        )
 
 
 @dataclass(frozen=True)

@@ -276,14 +276,8 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
         return workers[0]
 
     monkeypatch.setattr(run_steps, "start_decompose", started)
-    run = WorkerRun(
-        "Decompose cup",
-        decompose_steps(
-            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
-        ),
-        take,
-        folder,
-    )
+    steps = steps_of(photo_file(tmp_path), folder, environment)
+    run = WorkerRun("Decompose cup", steps, take, folder)
     until(lambda: run.step().stage == "solving")
     assert workers[0].poll().state == "running"
     run.cancel()
@@ -304,14 +298,8 @@ def test_a_starting_worker_is_ended_too(
         return workers[0]
 
     monkeypatch.setattr(run_steps, "start_decompose", slow_start)
-    run = WorkerRun(
-        "Decompose cup",
-        decompose_steps(
-            photo_file(tmp_path), None, None, MethodSettings(), ResultPlace(folder), 0, environment
-        ),
-        take,
-        folder,
-    )
+    steps = steps_of(photo_file(tmp_path), folder, environment)
+    run = WorkerRun("Decompose cup", steps, take, folder)
     until(lambda: run.step().stage == "starting the worker")
     run.cancel()
     assert not workers

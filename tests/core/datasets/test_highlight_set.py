@@ -18,19 +18,7 @@ from isc_core.evaluation.metrics import mse, psnr
 from isc_core.io.exr import write_channels
 from tests.core.ball_scene import ball
 from tests.core.command_line import write_image
-
-OBJECTS = (
-    "apple",
-    "box",
-    "cup1",
-    "dinosaur",
-    "frog1",
-    "panther",
-    "paper1",
-    "phone",
-    "squirrel",
-    "teabag2",
-)
+from tests.core.training_objects import TRAINING_OBJECTS
 
 
 def assert_fits(truth: SeparationTruth) -> None:
@@ -55,7 +43,7 @@ def test_shen_zheng_is_what_was_published(shared: Path) -> None:
         )
 
 
-@pytest.mark.parametrize("name", OBJECTS)
+@pytest.mark.parametrize("name", TRAINING_OBJECTS)
 def test_laboratory_layers_add_up(shared: Path, name: str) -> None:
     truth = load_laboratory(shared / "data" / "mit_berkeley_train", name)
     assert_fits(truth)

@@ -19,19 +19,7 @@ from isc_core.datasets.mit_berkeley import (
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.shading.spherical_harmonics import reference_basis
-
-TRAINING = (
-    "apple",
-    "box",
-    "cup1",
-    "dinosaur",
-    "frog1",
-    "panther",
-    "paper1",
-    "phone",
-    "squirrel",
-    "teabag2",
-)
+from tests.core.training_objects import TRAINING_OBJECTS
 
 
 @pytest.fixture
@@ -55,7 +43,7 @@ def copy(root: Path, tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("illumination", ILLUMINATIONS)
 def test_lists_the_training_objects(root: Path, illumination: str) -> None:
-    assert list_objects(root, illumination) == TRAINING
+    assert list_objects(root, illumination) == TRAINING_OBJECTS
 
 
 @pytest.mark.parametrize("illumination", ILLUMINATIONS)

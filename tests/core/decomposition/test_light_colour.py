@@ -100,7 +100,7 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
     photo = photo_of(ALBEDOS, np.array([1.3, 1.0, 0.7]))
     answer, usual = under_light(task_of(photo), seen_by), seen_by(task_of(photo))
-    assert estimate_illuminant(photo.image, photo.mask).too_strong
+    assert estimate_illuminant(photo.image, photo.mask).outcome.too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
     found = answer.diagnostics.light_colour
     assert found is not None and found.used == "balanced"

@@ -127,6 +127,14 @@ def coded(full: Decomposition, kind: type, transfer: str) -> tuple[np.ndarray, n
 
 
 @pytest.mark.slow
+def recoloured_png(half: Decomposition, photo: Photo, folder: Path) -> np.ndarray:
+    """The edited file of `photo.png` in a folder."""
+    original = Original(photo, read_raster(folder / "photo.png"))
+    edit = recolour(half, ColourEdit(hue=120))
+    save_edit(half, edit, folder / "out", Record("recolour"), Sheet("t"), original=original)
+    return cv2.imread(str(folder / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+
+
 @pytest.mark.parametrize(
     ("kind", "transfer"), [(np.uint8, "srgb"), (np.uint16, "srgb"), (np.uint16, "linear")]
 )
@@ -137,16 +145,7 @@ def test_png_keeps_depth_coding_alpha_and_all_other_pixels(
     cv2.imwrite(str(tmp_path / "photo.png"), np.dstack([values[..., ::-1], alpha]))
     photo = read_photo(tmp_path / "photo.png", transfer=transfer)
     half = half_size(full)
-    original = Original(photo, read_raster(tmp_path / "photo.png"))
-    save_edit(
-        half,
-        recolour(half, ColourEdit(hue=120)),
-        tmp_path / "out",
-        Record("recolour"),
-        Sheet("t"),
-        original=original,
-    )
-    written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+    written = recoloured_png(half, photo, tmp_path)
     assert written.dtype == kind
     assert np.array_equal(written[..., 3], alpha)
     assert np.array_equal(written[~full.mask][:, :3], values[~full.mask][:, ::-1])
@@ -167,16 +166,7 @@ def test_a_grey_photo_gets_colour_only_where_it_is_painted(
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255 * full.mask))
     photo = read_photo(tmp_path / "photo.png", tmp_path / "mask.png")
     half = half_size(full)
-    original = Original(photo, read_raster(tmp_path / "photo.png"))
-    save_edit(
-        half,
-        recolour(half, ColourEdit(hue=120)),
-        tmp_path / "out",
-        Record("recolour"),
-        Sheet("t"),
-        original=original,
-    )
-    written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+    written = recoloured_png(half, photo, tmp_path)
     assert np.array_equal(written[~full.mask], np.repeat(values[~full.mask][:, None], 3, 1))
 
 

@@ -24,12 +24,12 @@ def lines(start: np.ndarray, end: np.ndarray, number: int = 200) -> tuple[np.nda
 @pytest.mark.parametrize("albedos", [SOFT, SOFT[:1], SOFT[1:3], GREY])
 def test_strongly_coloured_light_is_told(albedos: np.ndarray, light: np.ndarray) -> None:
     found = estimate_illuminant(*ball(albedos, light, 0.5))
-    assert found.too_strong and not found.determined
+    assert found.outcome.too_strong and not found.determined
 
 
 @pytest.mark.parametrize("light", [0.5 + 0.5 * np.sqrt(light) for light in STRONG])
 def test_less_strong_light_is_told_on_grey(light: np.ndarray) -> None:
-    assert estimate_illuminant(*ball(GREY, light, 0.5)).too_strong
+    assert estimate_illuminant(*ball(GREY, light, 0.5)).outcome.too_strong
 
 
 @pytest.mark.parametrize("light", [np.ones(3), np.array([1.1, 1.0, 0.9])])
@@ -37,16 +37,16 @@ def test_less_strong_light_is_told_on_grey(light: np.ndarray) -> None:
 def test_a_lamp_s_light_is_not_where_highlights_show_it(
     albedos: np.ndarray, light: np.ndarray
 ) -> None:
-    assert not estimate_illuminant(*ball(albedos, light, 0.5)).too_strong
+    assert not estimate_illuminant(*ball(albedos, light, 0.5)).outcome.too_strong
 
 
 def test_many_paints_without_highlights_hold_white_and_one_does_not() -> None:
     white = np.ones(3)
-    assert not estimate_illuminant(*ball(ALBEDOS, white, 0.0)).too_strong
-    assert not estimate_illuminant(*ball(GREY, white, 0.0)).too_strong
+    assert not estimate_illuminant(*ball(ALBEDOS, white, 0.0)).outcome.too_strong
+    assert not estimate_illuminant(*ball(GREY, white, 0.0)).outcome.too_strong
     assert estimate_illuminant(
         *ball(ALBEDOS[:1], white, 0.0)
-    ).too_strong  # as grey albedo under red light
+    ).outcome.too_strong  # as grey albedo under red light
 
 
 def test_the_distance_is_that_of_the_hull() -> None:

@@ -19,6 +19,7 @@ from isc_core.scene.decomposition import Separation
 from isc_core.separation import BEST, METHODS, isc, separate
 from isc_core.separation.isc import VARIANTS, IscOptions
 from tests.core.separation.scenes import ALBEDOS, assert_layers_hold, error_ratio
+from tests.core.training_objects import TRAINING_OBJECTS
 
 
 @dataclass(frozen=True)
@@ -472,19 +473,6 @@ def test_options_do_what_they_say() -> None:
 
 # --- photos whose layers are known ----------------------------------------------------------------
 
-OBJECTS = (
-    "apple",
-    "box",
-    "cup1",
-    "dinosaur",
-    "frog1",
-    "panther",
-    "paper1",
-    "phone",
-    "squirrel",
-    "teabag2",
-)
-
 
 @dataclass(frozen=True)
 class Answer:
@@ -509,7 +497,9 @@ class Answer:
 def answers(shared: Path) -> dict[str, Answer]:
     """Of all photos, with the same settings."""
     truths = [load_shen_zheng(shared / "data/highlight", name) for name in ("animals", "cups")]
-    truths += [load_laboratory(shared / "data/mit_berkeley_train", name) for name in OBJECTS]
+    truths += [
+        load_laboratory(shared / "data/mit_berkeley_train", name) for name in TRAINING_OBJECTS
+    ]
     return {t.name: Answer(t, separate("isc", t.image, t.mask, t.clipped)) for t in truths}
 
 
@@ -533,7 +523,7 @@ def test_figures_on_photos_of_shen_and_zheng(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", OBJECTS)
+@pytest.mark.parametrize("name", TRAINING_OBJECTS)
 def test_no_worse_than_doing_nothing_in_the_laboratory(
     answers: dict[str, Answer], name: str
 ) -> None:
@@ -551,7 +541,7 @@ def test_the_least_confident_pixels_hold_the_error(answers: dict[str, Answer], n
     )
 
 
-@pytest.mark.parametrize("name", ["animals", "cups", *OBJECTS])
+@pytest.mark.parametrize("name", ["animals", "cups", *TRAINING_OBJECTS])
 def test_confidence_falls_with_the_error(answers: dict[str, Answer], name: str) -> None:
     answer = answers[name]
     assert rank_correlation(answer.errors()[0], answer.split.confidence[answer.truth.mask]) <= -0.4
@@ -563,7 +553,7 @@ KNOWN = {("natural", "teabag2"): 0.025}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("light", ["laboratory", "natural"])
-@pytest.mark.parametrize("name", OBJECTS)
+@pytest.mark.parametrize("name", TRAINING_OBJECTS)
 def test_photos_without_highlights_are_left_alone(shared: Path, light: str, name: str) -> None:
     folder = shared / "data/mit_berkeley_train" / light / name
     image, mask = (

@@ -236,7 +236,9 @@ def truth(case: Case, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         whole.uv[chosen],
         scene.material.at(whole.uv[chosen]),
     )
-    found = light_surface(some, scene.material, scene.lights, case.tracer, RenderOptions(samples=96))
+    found = light_surface(
+        some, scene.material, scene.lights, case.tracer, RenderOptions(samples=96)
+    )
     return found.shading, found.specular
 
 
