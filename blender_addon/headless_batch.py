@@ -15,7 +15,7 @@ import bpy
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
-from isc_core.result_files.things import things_in
+from isc_core.result_files.object_folders import object_folders
 
 from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
@@ -108,8 +108,8 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
                 folder, problem = _make_result(plan.source, results, options, part.part(0.0, 0.9))
                 if problem:
                     report.failures.append(f"{plan.source.path}: {problem}")
-                of_things = things_in(folder) if _each(plan.source, options) else [folder]
-                lines = [note for result in of_things for note in result_notes(result)]
+                results = object_folders(folder) if _each(plan.source, options) else [folder]
+                lines = [note for result in results for note in result_notes(result)]
                 if notes := join_notes(dict.fromkeys(lines)):
                     report.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
@@ -183,7 +183,7 @@ def _make_result(
     try:
         _wait(start_decompose(job, environment), monitor)
     except InputError as error:
-        if not job.each or not things_in(folder):
+        if not job.each or not object_folders(folder):
             raise
         return folder, str(error)
     return folder, ""
@@ -220,7 +220,7 @@ def _write_outputs(
     empty_scenes = open_empty_file() if new_file_needed else []
     request = _create_request(plan.source, options)
     build_as_undo_step(bpy.context, RunOutput(folder), request)
-    first = f"{name} {things_in(folder)[0].name}" if request.build.each else name
+    first = f"{name} {object_folders(folder)[0].name}" if request.build.each else name
     scene = find_tagged(bpy.data.objects, first, OBJECT).users_scene[0]
     for other in empty_scenes:
         bpy.data.scenes.remove(other)

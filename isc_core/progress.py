@@ -23,7 +23,7 @@ class ProgressEvent:
     detail : str
         What changes within the stage, such as the loss or the time left; may be empty.
     part : (int, int) or None
-        Which of several photos or things this is about, from 1 on, and of how many.
+        Which of several photos or objects this is about, from 1 on, and of how many.
     """
 
     stage: str

@@ -1,12 +1,12 @@
 """Fit the constants of the expected errors, and measure whether errors are as large as expected.
 
-  python -m benchmarks.decomposition.expected_error WORLD --panoramas DIR [--fit N] [--judge N]
+  python -m benchmarks.decomposition.expected_error WORLD --panoramas DIR [--fit N] [--test N]
   [--data ROOT] [--seed K] [--json FILE]
 
 WORLD is a folder of `isc world build`. Bodies and panoramas that no network has learned from are
 lit and photographed, each body from one side (`benchmarks.sirfs.prediction_weights`), and solved as
-a user's photo is. The constants are fitted to the first N photos. They are judged by the others and
-by the objects of a set like MIT-Berkeley's, ROOT, in laboratory light as photographed. The table
+a user's photo is. The constants are fitted to the first N photos. They are tested on the others and
+on the objects of a set like MIT-Berkeley's, ROOT, in laboratory light as photographed. The table
 has five groups of equally many pixels, from the smallest expected error to the largest, with the
 mean expected and the mean real error of each, and the area under the sparsification curve, mean
 over photos: sorted by the expected error, by the error itself, and without information.
@@ -244,13 +244,13 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--fit", type=int, default=60, help="photos to fit to (default: %(default)s)")
-    add("--judge", type=int, default=36, help="photos to judge by (default: %(default)s)")
-    add("--data", type=Path, metavar="ROOT", help="a set like MIT-Berkeley's, to judge by")
+    add("--test", type=int, default=36, help="photos to test them on (default: %(default)s)")
+    add("--data", type=Path, metavar="ROOT", help="a set like MIT-Berkeley's, to test them on, too")
     add("--seed", type=int, default=1, help="of the photos")
     add("--json", type=Path, help="file for the constants")
     given = parser.parse_args()
     try:
-        photos = lit(given.world, given.panoramas, given.fit + given.judge, given.seed)
+        photos = lit(given.world, given.panoramas, given.fit + given.test, given.seed)
         found = [solved(truth) for truth in photos]
         measured = [] if given.data is None else [solved(one) for one in laboratory(given.data)]
     except InputError as error:
@@ -263,7 +263,7 @@ def main() -> None:
 
 def report(
     learned: Sequence[Solved],
-    judged: Sequence[Solved],
+    tested: Sequence[Solved],
     measured: Sequence[Solved],
     constants: Calibration,
 ) -> str:
@@ -271,7 +271,7 @@ def report(
 
     Parameters
     ----------
-    learned, judged, measured : sequence of Solved
+    learned, tested, measured : sequence of Solved
         Photos of the fit, others, and measured objects; those that are empty are left out.
     constants : Calibration
 
@@ -287,7 +287,7 @@ def report(
         "| photos | number | " + " | ".join(numbers) + " | all | area | least area |",
         "|---|---" + "|---" * (_GROUPS + 3) + "|",
     ]
-    for name, photos in (("fitted", learned), ("others", judged), ("measured", measured)):
+    for name, photos in (("fitted", learned), ("others", tested), ("measured", measured)):
         if photos:
             lines += table(name, photos, constants)
     return "\n".join(lines) + "\n"

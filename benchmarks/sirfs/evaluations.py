@@ -1,13 +1,14 @@
 """What do fewer evaluations cost? Photos as they are solved now, against a long solve.
 
-  python -m benchmarks.sirfs.evaluations WORLD --panoramas DIR [--part even|odd] [--count N]
+  python -m benchmarks.sirfs.evaluations WORLD --panoramas DIR [--part validation|test] [--count N]
   [--photos DIR] [--seed K] [--side PIXELS] [--json FILE]
 
 WORLD is a folder of `isc world build`. Held-out bodies are lit and photographed as for
 `prediction_weights`, but larger, and solved with the object 256 pixels long, from the predicted
 normals, shading and light: as photos are now, and as they were before (`LONG`: with a tolerance of
-2e-4). Settings were chosen on even photos; report odd ones. The table has errors and evaluations,
-now over before, as geometric means over photos with the 95 % interval of resampled photos.
+2e-4). Even photos are the validation set, on which settings were chosen; odd ones are the test set.
+The table has errors and evaluations, now over before, as geometric means over photos with the 95 %
+interval of resampled photos.
 
 With `--photos`, a folder of masked photos, it says as well how far their normals move, as the
 median over pixels, when the logarithm of the image changes by up to 1e-7.
@@ -37,6 +38,7 @@ from isc_core.sirfs.settings import PHOTO_PREDICTIONS, PredictionWeights, Start
 from .prediction_weights import METRICS, Lit, estimated, lit_bodies, measured
 
 LONG = PredictionWeights(0.5, 0.5, True, 1.0, (Start(dome=1, light=1),))
+_PARTS = "validation", "test"  # in turn
 _SIZE = 256  # of the object, as it is solved
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 
@@ -138,7 +140,7 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--part", choices=("even", "odd"), default="odd", help="default: %(default)s")
+    add("--part", choices=_PARTS, default=_PARTS[1], help="default: %(default)s")
     add("--count", type=int, default=48, help="photos of both parts (default: %(default)s)")
     add("--seed", type=int, default=7, help="of the photos (default: %(default)s)")
     add("--side", type=int, default=288, help="pixels of a photo (default: %(default)s)")
@@ -149,7 +151,7 @@ def main() -> None:
         made = lit_bodies(given.world, given.panoramas, given.count, given.seed, side=given.side)
     except InputError as error:
         parser.error(str(error))
-    found = np.array([compared(lit) for lit in made[given.part == "odd" :: 2]])
+    found = np.array([compared(lit) for lit in made[_PARTS.index(given.part) :: 2]])
     if given.json:
         given.json.write_text(json.dumps(found.tolist()), encoding="utf-8")
     print(report(found))

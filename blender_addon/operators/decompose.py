@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
-from isc_core.result_files.things import things_in
+from isc_core.result_files.object_folders import object_folders
 
 from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS
@@ -71,7 +71,7 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
             message = f"{message}; {output.remark}"
         if output.path.is_relative_to(folder):
             # By far the largest files; the scene holds their content now.
-            for result in (output.path, *things_in(output.path)):
+            for result in (output.path, *object_folders(output.path)):
                 (result / ARRAYS).unlink(missing_ok=True)
         else:
             remove_folder(folder)

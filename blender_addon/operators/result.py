@@ -14,7 +14,7 @@ from isc_core.errors import InputError
 from ..datablocks.staging import completed
 from ..files.result_arrays import DESCRIPTION
 from ..scene.build import BuiltObject, StagedObject, find_built
-from ..scene.things import discard, place_things, stage_things
+from ..scene.objects import discard, place_objects, stage_objects
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .messages import error_line
 from .modal import WorkerOperator
@@ -68,7 +68,7 @@ def build_in_steps(
     prepared = output.prepared or read_and_prepare(
         output.path, request.build, with_photo=photo is None
     )
-    _staged[folder] = yield from stage_things(prepared, photo=photo)
+    _staged[folder] = yield from stage_objects(prepared, photo=photo)
     before = {obj.session_uid for obj in bpy.data.objects}
     try:
         # From Python, an operator pushes an undo step only if told to.
@@ -152,8 +152,8 @@ class ISC_OT_build_result(bpy.types.Operator):
                 prepared = read_and_prepare(
                     Path(self.directory), request.build, with_photo=photo is None
                 )
-                staged = completed(stage_things(prepared, photo=photo))
-            built = place_things(staged, scene=scene, photo=photo)
+                staged = completed(stage_objects(prepared, photo=photo))
+            built = place_objects(staged, scene=scene, photo=photo)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}

@@ -15,15 +15,15 @@ from typing import Any, TypeVar
 from isc_core.errors import InputError
 from isc_core.refinement.gloss_note import gloss_line
 from isc_core.result_files.diagnostics_text import status_lines
+from isc_core.result_files.object_folders import object_folders
 from isc_core.result_files.reading_notes_text import stored_note_lines
-from isc_core.result_files.things import things_in
 
 from ..files.image_export import export_image, export_mask
 from ..files.image_source import ImageSource
 from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_description, read_result
 from ..files.result_cache import ResultCache, content_key
+from ..scene.objects import prepare_objects
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
-from ..scene.things import prepare_things
 from ..worker.commands import (
     CERTAIN,
     Box,
@@ -136,7 +136,7 @@ def decompose_steps(
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     if job.each:
-        output = yield from _things(job, place, names, environment)
+        output = yield from _several_objects(job, place, names, environment)
     else:
         prepared = yield from _cached_result(job, place, names, environment)
         result = prepared.result.folder
@@ -148,7 +148,7 @@ def decompose_steps(
     return output
 
 
-def _things(
+def _several_objects(
     job: DecomposeJob,
     place: ResultPlace,
     names: Mapping[str, str],
@@ -167,7 +167,7 @@ def _things(
         try:
             yield from _in_time(worker, Pace(job.max_size, job.refine, several=True))
         except WorkerFailed as failure:
-            if not things_in(folder):
+            if not object_folders(folder):
                 raise
             failures, cache = (f"{NOTE}{failure}",), None
         if cache is not None and key:
@@ -187,9 +187,9 @@ def _things(
             yield from _in_thread(partial(_copy_result, folder, job.output), _READING)
             folder = job.output
             prepared = tuple(_moved(one, folder) for one in prepared)
-    things = things_in(folder)
-    notes = dict.fromkeys(note for thing in things for note in _notes(thing))
-    remarks = set(map(_remark, things))
+    results = object_folders(folder)
+    notes = dict.fromkeys(note for one in results for note in _notes(one))
+    remarks = set(map(_remark, results))
     return RunOutput(
         folder,
         (*failures, *notes),
@@ -390,8 +390,8 @@ def read_and_prepare(
     """
     if not build.each:
         return (prepare(read_result(folder), build, with_photo=with_photo),)
-    results = [read_result(thing) for thing in things_in(folder)]
-    return tuple(prepare_things(results, build, with_photo=with_photo))
+    results = [read_result(one) for one in object_folders(folder)]
+    return tuple(prepare_objects(results, build, with_photo=with_photo))
 
 
 def _notes(result: Path) -> tuple[str, ...]:

@@ -41,7 +41,7 @@ def fingerprint(job: ImageJob, photo_sha256: str, mask_sha256: str) -> str:
         plan.arrays,
         plan.priors_sha256,
         plan.version,
-        *((job.thing,) if job.thing else ()),
+        *((job.object_number,) if job.object_number else ()),
     ]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 

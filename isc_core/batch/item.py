@@ -146,7 +146,7 @@ class ImageJob:
         Absolute paths or URLs.
     recipe : ImageRecipe
     plan : RunPlan
-    thing : int
+    object_number : int
         Number of the object, from 1 on, where it is one of several; 0 for the whole photo.
     """
 
@@ -156,26 +156,26 @@ class ImageJob:
     mask: str
     recipe: ImageRecipe
     plan: RunPlan
-    thing: int = 0
+    object_number: int = 0
 
     @property
     def folder(self) -> Path:
         """The result's folder."""
         return self.plan.output / self.name
 
-    def of_thing(self, thing: int) -> "ImageJob":
+    def of_object(self, number: int) -> "ImageJob":
         """Return the part of the job that is one object of the photo.
 
         Parameters
         ----------
-        thing : int
+        number : int
             From 1 on.
 
         Returns
         -------
         ImageJob
         """
-        return replace(self, name=f"{self.name}/{thing}", thing=thing)
+        return replace(self, name=f"{self.name}/{number}", object_number=number)
 
 
 @dataclass(frozen=True)

@@ -86,7 +86,7 @@ class RunFolder:
         """
         return self.attempts / name.replace("/", " ")  # names have no spaces
 
-    def begin_things(self, name: str) -> None:
+    def begin_objects(self, name: str) -> None:
         """Make the folders of a photo with a result for each object.
 
         Parameters
@@ -198,15 +198,15 @@ class RunFolder:
         No other run writes here while the lock is held. Workers of a killed run may still process
         their last image; what they write is locked.
         """
-        for folder in (self.output, self.thumbnails, self.pages, *self._folders_of_things()):
+        for folder in (self.output, self.thumbnails, self.pages, *self._folders_of_objects()):
             remove_unfinished_in(folder)
         shutil.rmtree(self.fetched, ignore_errors=True)
         with contextlib.suppress(FileNotFoundError):
             for entry in os.scandir(self.attempts):
                 Path(entry.path).unlink(missing_ok=True)
 
-    def _folders_of_things(self) -> Iterator[Path]:
-        """Those that `begin_things` makes; found by the thumbnails, since results are many."""
+    def _folders_of_objects(self) -> Iterator[Path]:
+        """Those that `begin_objects` makes; found by the thumbnails, since results are many."""
         with contextlib.suppress(FileNotFoundError):
             for entry in os.scandir(self.thumbnails / _EACH):
                 yield Path(entry.path)

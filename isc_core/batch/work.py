@@ -94,24 +94,24 @@ def decompose_into(job: ImageJob, monitor: Monitor) -> str:
 
 def _process_each(job: ImageJob) -> Outcomes:
     with ExitStack() as stack:
-        things: list[tuple[_Files, Photo | None]] = []
-        outcome = outcome_of(job, lambda job, monitor: _find(job, monitor, stack, things))
+        objects: list[tuple[_Files, Photo | None]] = []
+        outcome = outcome_of(job, lambda job, monitor: _find(job, monitor, stack, objects))
         if outcome.status == FAILED:
             return {job.name: outcome}
-        RunFolder(job.plan.output).begin_things(job.name)
-        parts = [job.of_thing(number) for number in range(1, len(things) + 1)]
+        RunFolder(job.plan.output).begin_objects(job.name)
+        parts = [job.of_object(number) for number in range(1, len(objects) + 1)]
         outcomes = {
             part.name: outcome_of(
-                part, partial(_decompose_thing, files=files, photo=photo, things=len(things))
+                part, partial(_decompose_object, files=files, photo=photo, objects=len(objects))
             )
-            for part, (files, photo) in zip(parts, things, strict=True)
+            for part, (files, photo) in zip(parts, objects, strict=True)
         }
-    _remove_further(job, len(things))
+    _remove_further(job, len(objects))
     return outcomes
 
 
 def _find(
-    job: ImageJob, monitor: Monitor, stack: ExitStack, things: list[tuple[_Files, Photo | None]]
+    job: ImageJob, monitor: Monitor, stack: ExitStack, objects: list[tuple[_Files, Photo | None]]
 ) -> str:
     """Add the objects of a photo; they are not looked for where all results exist."""
     if recorded_input(job.folder):
@@ -119,46 +119,46 @@ def _find(
             f"{job.folder} is the result of the whole photo: move it away, or leave out --each"
         )
     files = stack.enter_context(_fetched(job))
-    if count := _finished_things(job, files):
-        things += [(files, None)] * count
+    if count := _finished_objects(job, files):
+        objects += [(files, None)] * count
         return SKIPPED
     monitor.report("reading", 0.0)
     with _locations_named(job, files):
         photos = read_each(files.photo, files.mask, job.recipe.transfer, job.plan.limits)
-    things += [(files, photo) for photo in photos]
+    objects += [(files, photo) for photo in photos]
     return DONE
 
 
-def _finished_things(job: ImageJob, files: _Files) -> int:
+def _finished_objects(job: ImageJob, files: _Files) -> int:
     """How many objects the photo has; 0 where the result of one is missing."""
-    count = recorded_input(job.of_thing(1).folder).get(_THINGS)
+    count = recorded_input(job.of_object(1).folder).get(_THINGS)
     if not isinstance(count, int):
         return 0
-    parts = [job.of_thing(number) for number in range(1, count + 1)]
+    parts = [job.of_object(number) for number in range(1, count + 1)]
     finished = (
         is_finished(part.folder, fingerprint(part, *files.sums), part.plan.arrays) for part in parts
     )
     return count if all(finished) else 0
 
 
-def _decompose_thing(
-    job: ImageJob, monitor: Monitor, files: _Files, photo: Photo | None, things: int
+def _decompose_object(
+    job: ImageJob, monitor: Monitor, files: _Files, photo: Photo | None, objects: int
 ) -> str:
     if photo is None or _is_done(job, files):
         _draw_thumbnail(job, redraw=False)
         return SKIPPED
     with _locations_named(job, files):
-        _decompose(job, photo, files, {"thing": job.thing, _THINGS: things}, monitor)
+        _decompose(job, photo, files, {"thing": job.object_number, _THINGS: objects}, monitor)
     return DONE
 
 
 def _remove_further(job: ImageJob, count: int) -> None:
     """Remove results of more objects, which an earlier run found."""
     number = count + 1
-    while recorded_input(folder := job.of_thing(number).folder).get(_THINGS):
+    while recorded_input(folder := job.of_object(number).folder).get(_THINGS):
         require_writable_result(folder)  # nothing but a result
         shutil.rmtree(folder)
-        RunFolder(job.plan.output).thumbnail(job.of_thing(number).name).unlink(missing_ok=True)
+        RunFolder(job.plan.output).thumbnail(job.of_object(number).name).unlink(missing_ok=True)
         number += 1
 
 

@@ -55,7 +55,7 @@ from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation import HIGHLIGHT_ODDS
 from ..separation.support.clipped_texture import continue_under_clipped
-from ..separation.support.highlight_evidence import judged_highlights
+from ..separation.support.highlight_evidence import classified_highlights
 from ..separation.support.light_tint import limit_tint
 from ..separation.support.ratio_bound import (
     RemovalOptions,
@@ -275,9 +275,9 @@ def supported_layers(
     residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale
-    judged = judged_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
-    hidden = _hidden(judged.kept, clipped, mask)
-    kept = judged.kept | hidden
+    classified = classified_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
+    hidden = _hidden(classified.kept, clipped, mask)
+    kept = classified.kept | hidden
     split = replace(
         split,
         diffuse=_given_back(split.diffuse, image, kept, mask),
@@ -293,9 +293,9 @@ def supported_layers(
         np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
         added = ResidualHighlights(diffuse, residual.unreliable & kept)
-        return SupportedLayers(split, added, judged.doubtful)
+        return SupportedLayers(split, added, classified.doubtful)
     split = _with_diffuse(split, diffuse) if hidden.any() else split
-    return SupportedLayers(split, None, judged.doubtful)
+    return SupportedLayers(split, None, classified.doubtful)
 
 
 def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> np.ndarray:

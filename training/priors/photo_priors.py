@@ -5,7 +5,7 @@
 
 WORLD is a folder of `isc world build`: its bodies of seeds are made again at the solver's size, as
 far as networks learn from them, and painted with its patterns (`photographed_bodies`). Panoramas
-that are not judged are photographed (`panorama_photos`). Nothing else goes into the file: no
+that are not held out are photographed (`panorama_photos`). Nothing else goes into the file: no
 measured object, no research-only data.
 
 The program prints what white balance leaves, and the median log likelihood of lights, brightness
@@ -76,7 +76,7 @@ def photos_of(
 
     Returns
     -------
-    learned, judged : list of PanoramaPhoto
+    training, held_out : list of PanoramaPhoto
 
     Raises
     ------
@@ -84,11 +84,11 @@ def photos_of(
         If the panoramas cannot be read.
     """
     rngs = np.random.default_rng(seed), np.random.default_rng([seed, 1])
-    learned, judged = list[PanoramaPhoto](), list[PanoramaPhoto]()
+    training, held_out = list[PanoramaPhoto](), list[PanoramaPhoto]()
     for panorama, radiance in read_pictures(panoramas, 0):
-        into, rng = (judged, rngs[1]) if panorama.judged else (learned, rngs[0])
+        into, rng = (held_out, rngs[1]) if panorama.judged else (training, rngs[0])
         into += [photograph(panorama, radiance, rng) for _ in range(each)]
-    return learned, judged
+    return training, held_out
 
 
 def describe_balance(title: str, photos: list[PanoramaPhoto]) -> str:
@@ -153,22 +153,23 @@ def main() -> None:
     add("-o", "--output", type=Path, required=True, metavar="FILE", help="the file to write")
     given = parser.parse_args()
     try:
-        learned, judged = photos_of(given.panoramas, given.photos, given.seed)
-        for title, photos in (("learned", learned), ("judged", judged)):
+        training, held_out = photos_of(given.panoramas, given.photos, given.seed)
+        for title, photos in (("training", training), ("held out", held_out)):
             print(describe_balance(title, photos), flush=True)
         statistics = body_statistics(given.world, given.bodies, given.seed)
-        found = fit_photo_priors(statistics, np.array([photo.light for photo in learned]), MADE)
+        found = fit_photo_priors(statistics, np.array([photo.light for photo in training]), MADE)
         save_prior_set(given.output, found)
     except InputError as error:
         parser.error(str(error))
     natural = shipped_prior_set("natural").lights.natural
     for name, prior in (("photo", found.lights.photo), ("natural", natural)):
         if prior is not None:
-            likely = [np.median(log_likelihoods(prior, photos)) for photos in (learned, judged)]
+            likely = [np.median(log_likelihoods(prior, photos)) for photos in (training, held_out)]
             print(
-                f"log likelihood, median, {name}: learned {likely[0]:.1f}, judged {likely[1]:.1f}"
+                f"log likelihood, median, {name}: training {likely[0]:.1f}, "
+                f"held out {likely[1]:.1f}"
             )
-    print(f"{given.output}: priors of {len(statistics)} bodies and {len(learned)} photos")
+    print(f"{given.output}: priors of {len(statistics)} bodies and {len(training)} photos")
 
 
 if __name__ == "__main__":

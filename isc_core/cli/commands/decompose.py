@@ -16,9 +16,9 @@ from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
 from ...result_files.mesh_options import MeshOptions
+from ...result_files.object_folders import object_folders
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
-from ...result_files.things import things_in
 from ...scene.decomposition import Decomposition
 from ...sirfs.priors.prior_file import load_prior_set
 from ...sirfs.priors.prior_set import PriorSet
@@ -298,10 +298,10 @@ def _decompose_each(
     monitor.report("finding the objects", 0.0)
     with photo_file(path, options) as file:
         photos = read_each(file, options.mask, options.transfer, limits_of(options))
-    _require_no_other_things(options.output, len(photos))
+    _require_no_other_objects(options.output, len(photos))
     works = {
         f"object {number} of {len(photos)}": partial(
-            _decompose_thing,
+            _decompose_object,
             photo,
             path,
             options.output / str(number),
@@ -314,17 +314,17 @@ def _decompose_each(
     return do_all("objects", works, monitor)
 
 
-def _require_no_other_things(output: Path, count: int) -> None:
+def _require_no_other_objects(output: Path, count: int) -> None:
     """Refuse a folder of more objects: programs that read it would take them for this photo's."""
-    for thing in things_in(output):
-        if int(thing.name) > count:
+    for result in object_folders(output):
+        if int(result.name) > count:
             raise InputError(
-                f"{thing} is the result of another run, and this photo has {count} "
+                f"{result} is the result of another run, and this photo has {count} "
                 f"{'object' if count == 1 else 'objects'}: remove it, or choose another folder"
             )
 
 
-def _decompose_thing(
+def _decompose_object(
     photo: Photo,
     path: Path,
     output: Path,

@@ -43,7 +43,7 @@ _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added to what a chroma is divided by
 _CORE, _FLANK = 0.5, 0.2  # of a region's peak
 _RING = 0.02  # distance of the ring, of the object's diagonal
-_LEAST, _FEWEST = 6, 3  # pixels: of a region that can be judged, of its flanks
+_LEAST, _FEWEST = 6, 3  # pixels: of a region that can be classified, of its flanks
 _MOST_RATIO = 6.0  # of mean y over mean b
 _SLOPES = (-1.0, 0.5)  # of C against m: above, shading does more than light
 WEIGHTS = (-2.14, 0.706, 2.099, 4.585)
@@ -58,7 +58,7 @@ class Evidence:
     labels : (H, W) ndarray of int
         Number of the region at each pixel, from 1 on; 0 outside of all regions.
     numbers : (K,) ndarray of int
-        Those of the regions that can be judged.
+        Those of the regions that can be classified.
     values : (K, 3) ndarray
         y over b, the saturation of D, and the slope of C times the saturation of the ring.
     """
@@ -182,7 +182,7 @@ class Judgement:
     doubtful: float
 
 
-def judged_highlights(
+def classified_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
@@ -205,7 +205,7 @@ def judged_highlights(
     ratio_scale : (H, W) ndarray
         b.
     odds : float
-        To be exceeded; larger ones keep less, 0 keeps every region that can be judged.
+        To be exceeded; larger ones keep less, 0 keeps every region that can be classified.
     marks : HighlightMarks, optional
         Decide without the odds; paint before highlights.
     clipped : (H, W) ndarray of bool, optional

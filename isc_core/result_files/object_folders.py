@@ -8,7 +8,7 @@ from pathlib import Path
 _RESULT = "decomposition.json"
 
 
-def things_in(folder: Path) -> list[Path]:
+def object_folders(folder: Path) -> list[Path]:
     """Return the results of the objects of a photo, from left to right.
 
     Parameters

@@ -1,4 +1,4 @@
-"""Each thing of a photo becomes an object: a photo of rendered things, and the scene it becomes."""
+"""Each object of a photo becomes one of Blender: a photo of rendered objects, and its scene."""
 
 import contextlib
 import json
@@ -22,10 +22,10 @@ from blender_addon.operators.modal import advance_run  # noqa: E402
 from blender_addon.operators.request import request_from_settings  # noqa: E402
 from blender_addon.operators.worker_run import begin_run  # noqa: E402
 from blender_addon.scene.build import find_built  # noqa: E402
+from blender_addon.scene.objects import place_objects, prepare_objects, stage_objects  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
-from blender_addon.scene.things import place_things, prepare_things, stage_things  # noqa: E402
+from isc_core.result_files.object_folders import object_folders  # noqa: E402
 from isc_core.result_files.result_folder import save  # noqa: E402
-from isc_core.result_files.things import things_in  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 from tests.addon.test_operators import census  # noqa: E402
@@ -104,9 +104,9 @@ def test_the_scene_looks_like_the_photo(addon: Any, shelf: Path, tmp_path: Path)
     shown = addon.context.window_manager.isc
     assert shown.message == "3 objects created in the scene shelf", shown.message
     scene = addon.context.scene
-    things = [addon.data.objects[f"shelf {number}"] for number in (1, 2, 3)]
-    assert all(thing.users_scene == (scene,) and thing.select_get() for thing in things)
-    assert addon.context.object == things[1], "the largest one, whose light shines"
+    made = [addon.data.objects[f"shelf {number}"] for number in (1, 2, 3)]
+    assert all(one.users_scene == (scene,) and one.select_get() for one in made)
+    assert addon.context.object == made[1], "the largest one, whose light shines"
     assert len([one for one in scene.objects if one.type == "CAMERA"]) == 1
     photo, mask = looks(shelf)
     assert scene.render.resolution_x == SIZE[0]
@@ -132,27 +132,27 @@ def test_all_come_in_one_undo_step_and_update_changes_them(
 
     def place(staged: list[Any], **given: Any) -> Any:
         placed.append(len(staged))
-        return place_things(staged, **given)
+        return place_objects(staged, **given)
 
-    monkeypatch.setattr(result, "place_things", place)
+    monkeypatch.setattr(result, "place_objects", place)
     assert "UNDO" in result.ISC_OT_build_result.bl_options
     assert addon.ops.isc.decompose() == {"FINISHED"}
     assert addon.context.window_manager.isc.message == "3 objects created at the 3D cursor"
-    thing = addon.data.objects["shelf 2"]
-    thing.location.x += 1
-    moved, vertices = thing.location.copy(), len(thing.data.vertices)
+    one = addon.data.objects["shelf 2"]
+    one.location.x += 1
+    moved, vertices = one.location.copy(), len(one.data.vertices)
     assert addon.ops.isc.redo(max_size=48) == {"FINISHED"}
     assert addon.context.window_manager.isc.message == "3 objects updated"
-    thing = addon.data.objects["shelf 2"]
-    assert thing.location == moved and len(thing.data.vertices) > vertices
-    stored = json.loads(thing["isc_request"])["build"]
+    one = addon.data.objects["shelf 2"]
+    assert one.location == moved and len(one.data.vertices) > vertices
+    stored = json.loads(one["isc_request"])["build"]
     assert stored["name"] == "shelf" and stored["each"]
     assert placed == [3, 3] and len([o for o in addon.data.objects if o.type == "MESH"]) == 3
 
 
 @pytest.mark.slow
 def test_cancel_leaves_nothing_half_made(addon: Any, shelf: Path) -> None:
-    """At any step of the import, when some things are made and others are not."""
+    """At any step of the import, when some objects are made and others are not."""
     use(addon, shelf, own_scene=False, max_size=32, model="naive")
     before = census(addon)
     request = request_from_settings(addon.context.scene)
@@ -176,7 +176,7 @@ def started(addon: Any, shelf: Path, size: int, model: str = "mdr") -> Any:
 
 
 @pytest.mark.slow
-def test_progress_and_time_left_are_those_of_all_things(addon: Any, shelf: Path) -> None:
+def test_progress_and_time_left_are_those_of_all_objects(addon: Any, shelf: Path) -> None:
     run, seen = started(addon, shelf, 26), []
     while run.step().state == "running":
         seen.append(run.status)
@@ -195,8 +195,8 @@ def test_progress_and_time_left_are_those_of_all_things(addon: Any, shelf: Path)
 @pytest.mark.slow
 @pytest.mark.parametrize("when", ["finding the objects", "object 1", "between", "object 3"])
 def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: str) -> None:
-    """In a thing, between two, and before the first: the worker ends, scene and disk are as before,
-    and a later run makes all of them.
+    """In an object, between two, and before the first: the worker ends, scene and disk are as
+    before, and a later run makes all of them.
     """
     use(addon, shelf)
     before, there = census(addon), workers()
@@ -220,7 +220,7 @@ def test_cancel_keeps_nothing_of_what_was_done(addon: Any, shelf: Path, when: st
 
 
 @pytest.mark.slow
-def test_a_thing_that_fails_leaves_the_others(addon: Any, shelf: Path) -> None:
+def test_an_object_that_fails_leaves_the_others(addon: Any, shelf: Path) -> None:
     run = started(addon, shelf, 25, model="naive")
     (run.folder / "result" / "2").mkdir(parents=True)
     (run.folder / "result" / "2" / "diary.txt").write_text("mine")
@@ -257,7 +257,7 @@ def test_highlights_that_are_marked_belong_to_one_object(addon: Any, shelf: Path
     assert "--" not in run.status.message
 
 
-def things(folder: Path) -> list[Any]:
+def several_results(folder: Path) -> list[Any]:
     """The bump, and a smaller one beside it in the same photo, under a light half as strong."""
     left, right = bump(64, 200, (27.0, 38.0)), bump(64, 200, (35.0, 150.0))
     right.reflectance[:] *= 2
@@ -265,13 +265,13 @@ def things(folder: Path) -> list[Any]:
     right.illumination[0] -= np.log(2) * 2 * np.sqrt(np.pi)
     write_result(folder / "1", left)
     write_result(folder / "2", right)
-    return [read_result(thing) for thing in things_in(folder)]
+    return [read_result(one) for one in object_folders(folder)]
 
 
-def test_things_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path) -> None:
-    results = things(tmp_path)
+def test_objects_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path) -> None:
+    results = several_results(tmp_path)
     options = BuildOptions(size_metres=0.5, name="pair", each=True, own_scene=False)
-    prepared = prepare_things(results, options)
+    prepared = prepare_objects(results, options)
     assert [one.options.name for one in prepared] == ["pair 1", "pair 2"]
     first, second = (one.result for one in prepared)
     inside = second.mask
@@ -282,7 +282,7 @@ def test_things_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path
     assert max(one.base_color.max() for one in (first, second)) <= max(
         one.base_color.max() for one in results
     )
-    left, right = (one.object for one in place_things(completed(stage_things(prepared))))
+    left, right = (one.object for one in place_objects(completed(stage_objects(prepared))))
     step = 0.5 / results[0].longest_side
     offset = right.location - left.location
     expected = (results[1].origin - results[0].origin)[:2] * step
@@ -291,16 +291,16 @@ def test_things_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Path
     assert cameras[0] is not None and cameras[1:] == [None], "one camera, of the photo"
 
 
-def test_one_pinhole_camera_sees_each_thing_where_the_photo_does(
+def test_one_pinhole_camera_sees_each_object_where_the_photo_does(
     blender: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for folder, centre in (("1", (34.0, 24.0)), ("2", (24.0, 58.0))):
         monkeypatch.setattr(perspective_scene, "CENTRE", centre)
         save(perspective_scene.bump_before_camera(), tmp_path / folder, arrays=True)
-    results = [read_result(thing) for thing in things_in(tmp_path)]
-    prepared = prepare_things(results, BuildOptions(name="pair", each=True))
-    built = place_things(completed(stage_things(prepared)))
+    results = [read_result(one) for one in object_folders(tmp_path)]
+    prepared = prepare_objects(results, BuildOptions(name="pair", each=True))
+    built = place_objects(completed(stage_objects(prepared)))
     assert abs(built[1].object.location.y) < 1e-3, "in one plane across the view"
-    for one, thing in zip(built, results, strict=True):
+    for one, seen in zip(built, results, strict=True):
         off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
-        assert np.abs(off - thing.vertex_pixel).max() < 0.01
+        assert np.abs(off - seen.vertex_pixel).max() < 0.01

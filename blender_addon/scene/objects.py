@@ -47,7 +47,7 @@ _SHARED = (
 )
 
 
-def prepare_things(
+def prepare_objects(
     results: Sequence[ResultArrays], options: BuildOptions, *, with_photo: bool = False
 ) -> list[PreparedObject]:
     """Make in advance what takes time of several objects of a photo.
@@ -110,7 +110,7 @@ def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[fl
     return float(other_x - x) * step, 0.0, float(y - other_y) * step
 
 
-def stage_things(
+def stage_objects(
     prepared: Sequence[PreparedObject], *, photo: bpy.types.Image | None = None
 ) -> Generator[None, None, list[StagedObject]]:
     """Make the images and the meshes of objects in short steps, see `build.stage_object`.
@@ -125,7 +125,7 @@ def stage_things(
     Returns
     -------
     list of StagedObject
-        For `place_things`, to be called at once.
+        For `place_objects`, to be called at once.
     """
     staged: list[StagedObject] = []
     complete = False
@@ -156,7 +156,7 @@ def discard(staged: list[StagedObject]) -> None:
         staged.pop().blocks.discard()
 
 
-def place_things(
+def place_objects(
     staged: Sequence[StagedObject],
     *,
     scene: bpy.types.Scene | None = None,
