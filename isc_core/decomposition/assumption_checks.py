@@ -35,12 +35,12 @@ _LEAST = 0.1  # of the confidence remains
 _COLOURED = 0.5  # of it remains in light of too strong a colour
 
 
-def check_scene(seen: ScenePrediction) -> tuple[AssumptionWarning, ...]:
+def check_scene(prediction: ScenePrediction) -> tuple[AssumptionWarning, ...]:
     """Check what the object is made of and the number of lamps.
 
     Parameters
     ----------
-    seen : ScenePrediction
+    prediction : ScenePrediction
         What the network says of the photo.
 
     Returns
@@ -48,7 +48,7 @@ def check_scene(seen: ScenePrediction) -> tuple[AssumptionWarning, ...]:
     tuple of AssumptionWarning
         Empty where the assumptions hold.
     """
-    clear, several, found = 1 - float(seen.kinds[0]), seen.lamps.several, []
+    clear, several, found = 1 - float(prediction.kinds[0]), prediction.lamps.several, []
     if clear > LIKELY_CLEAR:
         found.append(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, round(clear, 4)))
     if several > LIKELY_SEVERAL:
@@ -132,7 +132,9 @@ def share_that_holds(diagnostics: Diagnostics) -> float:
     return share * (_COLOURED if strong else 1.0)
 
 
-def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -> SceneEstimate:
+def with_warnings(
+    maps: Photo, estimate: SceneEstimate, prediction: ScenePrediction
+) -> SceneEstimate:
     """Add the assumption checks to an estimate, and lower its confidence where they fail.
 
     Parameters
@@ -141,7 +143,7 @@ def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -
         The photo of the estimate's maps.
     estimate : SceneEstimate
         What a model recovered.
-    seen : ScenePrediction
+    prediction : ScenePrediction
         What the network says of the photo.
 
     Returns
@@ -149,13 +151,14 @@ def with_warnings(maps: Photo, estimate: SceneEstimate, seen: ScenePrediction) -
     SceneEstimate
         With probabilities and warnings in its diagnostics.
     """
-    warnings, split, lamps = check_scene(seen), estimate.split, seen.lamps
+    warnings, split, lamps = check_scene(prediction), estimate.split, prediction.lamps
     if warnings:
         split = scale_confidence(split, share_that_holds(Diagnostics(warnings=warnings)))
     diagnostics = replace(
         estimate.diagnostics,
         scene_classes={
-            str(kind): round(float(share), 4) for kind, share in zip(Kind, seen.kinds, strict=True)
+            str(kind): round(float(share), 4)
+            for kind, share in zip(Kind, prediction.kinds, strict=True)
         },
         light_counts={
             "none": round(lamps.none, 4),

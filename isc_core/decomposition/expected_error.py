@@ -88,13 +88,13 @@ class Evidence:
 
     @classmethod
     def of(
-        cls, seen: ScenePrediction, normal: np.ndarray, shading: np.ndarray, mask: np.ndarray
+        cls, prediction: ScenePrediction, normal: np.ndarray, shading: np.ndarray, mask: np.ndarray
     ) -> "Evidence":
         """Compare a result with the network's prediction.
 
         Parameters
         ----------
-        seen : ScenePrediction
+        prediction : ScenePrediction
         normal, shading : (H, W, 3) ndarray
             Of the result, on the grid of the prediction.
         mask : (H, W) bool ndarray
@@ -104,14 +104,14 @@ class Evidence:
         Evidence
             Of the pixels inside the mask, row by row.
         """
-        mean, found = seen.normals.normal[mask].astype(float), normal[mask].astype(float)
+        mean, found = prediction.normals.normal[mask].astype(float), normal[mask].astype(float)
         length = np.linalg.norm(mean, axis=1)
         cosine = np.einsum("nc,nc->n", mean, found) / np.maximum(length, 1e-9)
-        off = np.log(np.maximum(shading[mask], _DARKEST)) - seen.shading.log_shading[mask]
+        off = np.log(np.maximum(shading[mask], _DARKEST)) - prediction.shading.log_shading[mask]
         return cls(
             np.degrees(np.arccos(np.clip(length, 0, 1))),
             np.degrees(np.arccos(np.clip(cosine, -1, 1))),
-            seen.shading.deviation[mask].astype(float),
+            prediction.shading.deviation[mask].astype(float),
             np.abs(off - np.median(off)).mean(axis=1),
         )
 
@@ -157,13 +157,15 @@ def confidence_of(normal_error: np.ndarray) -> np.ndarray:
     return np.asarray(np.exp2(-np.asarray(normal_error) / HALF))
 
 
-def with_expected_error(d: Decomposition, seen: ScenePrediction, working: Photo) -> Decomposition:
+def with_expected_error(
+    d: Decomposition, prediction: ScenePrediction, working: Photo
+) -> Decomposition:
     """Add the expected errors to a result, and the confidence that follows from them.
 
     Parameters
     ----------
     d : Decomposition
-    seen : ScenePrediction
+    prediction : ScenePrediction
         What the network says of the working photo.
     working : Photo
 
@@ -184,7 +186,7 @@ def with_expected_error(d: Decomposition, seen: ScenePrediction, working: Photo)
             for map_ in (normal, shading)
         )
     small = np.zeros((*mask.shape, 2))
-    small[mask] = np.stack(Evidence.of(seen, normal, shading, mask).errors(), axis=1)
+    small[mask] = np.stack(Evidence.of(prediction, normal, shading, mask).errors(), axis=1)
     if mask.shape != d.mask.shape:
         rows, columns = ndimage.distance_transform_edt(
             ~mask, return_distances=False, return_indices=True

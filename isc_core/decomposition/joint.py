@@ -243,7 +243,7 @@ def supported_layers(
     image: np.ndarray,
     split: Separation,
     mask: np.ndarray,
-    seen: ScenePrediction | LayerPrediction | None = None,
+    prediction: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
     clipped: np.ndarray | None = None,
     marks: HighlightMarks | None = None,
@@ -258,7 +258,7 @@ def supported_layers(
         By colour.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction or LayerPrediction, optional
+    prediction : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -271,10 +271,10 @@ def supported_layers(
     -------
     SupportedLayers
     """
-    options, seen = options or JointOptions(), seen or predict_scene(image, mask)
-    residual = detect_residual_highlights(image, split.diffuse, mask, seen, options)
+    options, prediction = options or JointOptions(), prediction or predict_scene(image, mask)
+    residual = detect_residual_highlights(image, split.diffuse, mask, prediction, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
-    form = seen.log_ratio, seen.ratio_scale
+    form = prediction.log_ratio, prediction.ratio_scale
     classified = classified_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
     hidden = _hidden(classified.kept, clipped, mask)
     kept = classified.kept | hidden
@@ -288,7 +288,7 @@ def supported_layers(
     if residual is not None:
         diffuse = _given_back(cleaner, image, kept, mask, out=cleaner)
     if hidden.any():
-        whole = continue_under_clipped(diffuse, image, hidden, mask, seen.log_shading)
+        whole = continue_under_clipped(diffuse, image, hidden, mask, prediction.log_shading)
         diffuse = diffuse if residual is not None else diffuse.copy()
         np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
@@ -348,7 +348,7 @@ def detect_residual_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
-    seen: ScenePrediction | LayerPrediction | None = None,
+    prediction: ScenePrediction | LayerPrediction | None = None,
     options: JointOptions | None = None,
 ) -> ResidualHighlights | None:
     """Find highlights that a separation by colour has left in the diffuse image.
@@ -361,7 +361,7 @@ def detect_residual_highlights(
         The separation's diffuse layer.
     mask : (H, W) ndarray of bool
         The object.
-    seen : ScenePrediction or LayerPrediction, optional
+    prediction : ScenePrediction or LayerPrediction, optional
         What the scene network says of the image; by default the shipped one is asked.
     options : JointOptions, optional
         Thresholds.
@@ -372,7 +372,7 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options = options or JointOptions()
-    expected = ratio_lower_bound(seen or predict_scene(image, mask), options.network.doubt)
+    expected = ratio_lower_bound(prediction or predict_scene(image, mask), options.network.doubt)
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows

@@ -82,33 +82,33 @@ def separate(
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
-    seen = predict_highlights(image, mask, options.doubt, network)
-    excess = expected_ratio(image, seen)
+    prediction = predict_highlights(image, mask, options.doubt, network)
+    excess = expected_ratio(image, prediction)
     if not highlights_stand_out(excess, mask, options.stands_out):
         excess = np.zeros_like(excess)
     inside = np.where(mask[..., None], image, 0)
     diffuse = limit_tint(inside, inside * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)
     unit = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
-    confidence = 1 / (1 + seen.deviation / unit)
+    confidence = 1 / (1 + prediction.deviation / unit)
     unclipped = mask if clipped is None else mask & ~clipped
     return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))
 
 
-def expected_ratio(image: np.ndarray, seen: HighlightPrediction) -> np.ndarray:
+def expected_ratio(image: np.ndarray, prediction: HighlightPrediction) -> np.ndarray:
     """Return the log ratio of a photo and of what is left of it without the expected highlights.
 
     Parameters
     ----------
     image : (H, W, 3) ndarray
-    seen : HighlightPrediction
+    prediction : HighlightPrediction
 
     Returns
     -------
     (H, W, 3) float32 ndarray
         Not negative, 0 where there are no highlights, or hardly likely ones.
     """
-    light = np.where(seen.share > _LEAST_LIKELY, seen.specular, 0)[..., None]
+    light = np.where(prediction.share > _LEAST_LIKELY, prediction.specular, 0)[..., None]
     inside, least = light > 0, np.float32(_MIN_SHARE) * image
     left = np.where(inside, np.maximum(image - light, least), 1)
     return np.log(np.where(inside, image, 1) / left).astype(np.float32)

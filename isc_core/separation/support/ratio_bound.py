@@ -47,12 +47,12 @@ class RemovalOptions:
     tint: float = 1.5
 
 
-def ratio_lower_bound(seen: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
+def ratio_lower_bound(prediction: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
     """Return a lower bound of the predicted log ratio of a photo and its diffuse image.
 
     Parameters
     ----------
-    seen : ScenePrediction or LayerPrediction
+    prediction : ScenePrediction or LayerPrediction
     doubt : float
 
     Returns
@@ -60,7 +60,7 @@ def ratio_lower_bound(seen: ScenePrediction | LayerPrediction, doubt: float) -> 
     (H, W, 3) float32 ndarray
         Not negative, 0 outside the mask.
     """
-    return np.maximum(seen.log_ratio - doubt * seen.ratio_scale[..., None], 0)
+    return np.maximum(prediction.log_ratio - doubt * prediction.ratio_scale[..., None], 0)
 
 
 def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, stands_out: float) -> bool:
