@@ -3,8 +3,8 @@
 Problem: SIRFS is solved with the object 256 pixels long. Finer relief stays in the reflectance.
 
 Equation: the levels are the photo, then half its size, and so on until the object is at most
-`_SOLVED` pixels long. With S the log shading of SIRFS' light on the smooth slopes s and I the log
-of the photo's mean channel, the fine changes on a level are
+`_SOLVED` pixels long. With I the log of the photo's mean channel, log R/G and log B/G, and S the
+same of the shading by SIRFS' light on the smooth slopes s, the fine changes on a level are
 
     d = I - S(s) - U L,
 
@@ -105,9 +105,10 @@ class _Smooth:
 
     Attributes
     ----------
-    maps : (h, w, 4) float32 ndarray
-        Slopes dz/dx and dz/dy of the smooth surface, low frequencies of log light less log shading,
-        and how far there is one paint: of the level, or of the next coarser one.
+    maps : (h, w, 6) float32 ndarray
+        Slopes dz/dx and dz/dy of the smooth surface, low frequencies of the three features of log
+        light less log shading, and how far there is one paint: of the level, or of the next coarser
+        one.
     coarser : bool
     """
 
@@ -115,10 +116,13 @@ class _Smooth:
     coarser: bool
 
     def at(self, place: Place) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
-        """Return slopes, low frequencies and uniformity (n, m) at rows and columns of even ends."""
+        """Return slopes (n, m), low frequencies (3, n, m) and uniformity (n, m).
+
+        Rows and columns have even ends.
+        """
         part = doubled_at(self.maps, place) if self.coarser else self.maps[place]
-        right, down, low, uniform = (np.ascontiguousarray(part[..., k]) for k in range(4))
-        return (right, down), low, uniform
+        right, down, *low, uniform = np.ascontiguousarray(part.transpose(2, 0, 1))
+        return (right, down), np.stack(low), uniform
 
     def finer(self, shape: tuple[int, ...]) -> "_Smooth":
         """Return the same for the next finer level; `shape` is that of this one."""
@@ -230,8 +234,8 @@ class Pyramid:
         The finest first.
     slope : tuple of (h, w) float32 ndarray
         Slopes of the smooth surface at the coarsest level.
-    light : (9,) ndarray
-        Log-shading SH coefficients of the mean channel, reference convention.
+    light : (9, 3) ndarray
+        SH coefficients of the features of log shading, reference convention.
     """
 
     mask: np.ndarray
@@ -263,14 +267,16 @@ class Pyramid:
         for _ in range(frame.halvings):
             levels.append(levels[-1].halved())
         slope = slopes(frame.coarsest(height).astype(np.float32))
-        return cls(mask, frame, levels, slope, light.mean(axis=1))
+        red, green, blue = light.T
+        features = np.stack([light.mean(axis=1), red - green, blue - green], axis=1)
+        return cls(mask, frame, levels, slope, features)
 
     def evidence(self) -> Evidence | None:
         """Return what the whole object says of relief; None where it is too small."""
         telling, found = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest()), []
         for level, _, smooth in telling:
             slope, _, _ = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
-            gain = shading_gain(slope, self.light)
+            gain = shading_gain(slope, self.light[:, 0])
             found.append(evidence_of(level.image / level.mean, level.mask, gain))
         return mean_evidence(found)
 
@@ -322,13 +328,13 @@ class Pyramid:
     @cached_property
     def _coarsest(self) -> _Smooth:
         level = self.levels[-1]
-        left = _log_light(level.image, level.mask, level.mean) - log_shading(self.slope, self.light)
-        guide = paint_guide(level.image / level.mean, level.mask, left)
+        left = _changes(level.image, level.mask, level.mean, self.slope, self.light)
+        guide = paint_guide(level.image / level.mean, level.mask, left[0])
         sigma = _SIGMA * _PERIOD * self.frame.length / 2**self.frame.halvings
         smoother = CrossBilateral.of(guide, level.mask, sigma, ONE_PAINT)
-        low = _continued(smoother.low_pass(left), level.mask)
+        low = [_continued(smoother.low_pass(one), level.mask) for one in left]
         uniform = uniformity(guide, level.mask)
-        return _Smooth(np.stack([*self.slope, low, uniform], axis=2), False)
+        return _Smooth(np.stack([*self.slope, *low, uniform], axis=2), False)
 
 
 @dataclass(frozen=True)
@@ -363,10 +369,19 @@ class _Frame:
         return coarse
 
 
-def _log_light(image: np.ndarray, mask: np.ndarray, mean: np.float32) -> np.ndarray:
-    """Log of the mean channel (H, W) over the object's mean light; 0 outside of the mask."""
-    light = (image[..., 0] + image[..., 1] + image[..., 2]) / (3 * mean) + np.float32(_DARK)
-    return np.where(mask, np.log(light), np.float32(0))
+def _changes(
+    image: np.ndarray,
+    mask: np.ndarray,
+    mean: np.float32,
+    slope: tuple[np.ndarray, np.ndarray],
+    light: np.ndarray,
+) -> np.ndarray:
+    """Features (3, H, W) of log light less those of log shading, I - S; 0 outside of the mask."""
+    over = image / mean + np.float32(_DARK)
+    red, green, blue = np.log(over).transpose(2, 0, 1)
+    features = np.stack([np.log(over.mean(axis=2)), red - green, blue - green])
+    shading = np.stack([log_shading(slope, one) for one in light.T])
+    return np.where(mask, features - shading, np.float32(0))
 
 
 def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:
@@ -408,8 +423,7 @@ def _refined(
         monitor.report("fine relief", k / len(tiles))
         mask = level.mask[tile.outer]
         slope, low, uniform = smooth.at(tile.outer)
-        change = _log_light(level.image[tile.outer], mask, level.mean) - low
-        change -= log_shading(slope, light)
+        change = _changes(level.image[tile.outer], mask, level.mean, slope, light) - low
         refined = relief_from_shading(change, mask * uniform, slope, light, relief[tile.outer])
         found[tile.inner] = np.where(mask, refined, 0)[tile.own]  # tiles end with the object
     return found

@@ -1,13 +1,15 @@
 """Relief on a smooth surface from fine changes of shading, by linear shape from shading.
 
 Problem: under known light, fine changes of brightness say how fine relief tilts a surface, though
-only along the direction in which shading changes; across it, and where shading hardly changes with
-the slope, the photo says nothing.
+only along the direction in which shading changes. Where lights of several colours come from several
+directions, fine changes of colour say more, as in photometric stereo. Across all these directions,
+and where shading hardly changes with the slope, the photo says nothing.
 
-Equation: with s_0 the slopes of the smooth surface, S log shading as a function of the slope, and d
-the fine changes of log light, the height r of the relief has the least
+Equation: of C features (log brightness, and logarithms of ratios of channels), let S_c be that of
+the shading as a function of the slope, and d_c the fine changes of that of the light. With s_0 the
+slopes of the smooth surface, the height r of the relief has the least
 
-    sum over the object of v^2 (d - (S(s_0 + grad r) - S(s_0)))^2
+    sum over the object and the features of v^2 (d_c - (S_c(s_0 + grad r) - S_c(s_0)))^2
     + rho^2 sum of |grad r|^2 / (1 + |s_0|^2)
 
 with the weight v of each pixel. That is, its slopes are expected to be Gaussian, of equal strength
@@ -18,8 +20,10 @@ its matrix' rows, find what that estimate lacks: coarser relief is known, and th
 at once. Every value depends on pixels up to `REACH` away, by the same operations wherever they lie.
 
 Citation: linear shape from shading: A. Pentland, "Linear shape from shading", IJCV 4, 1990,
-doi:10.1007/BF00054993; iteration: G. H. Golub, R. S. Varga, "Chebyshev semi-iterative methods",
-Numerische Mathematik 3, 1961, doi:10.1007/BF01386013.
+doi:10.1007/BF00054993; lights of several colours: L. L. Kontsevich, A. P. Petrov,
+I. S. Vergelskaya, "Reconstruction of shape from shading in color images", JOSA A 11, 1994,
+doi:10.1364/JOSAA.11.001047; iteration: G. H. Golub, R. S. Varga, "Chebyshev semi-iterative
+methods", Numerische Mathematik 3, 1961, doi:10.1007/BF01386013.
 
 Limits: one paint; cast shadows and light between parts of the relief are taken for slopes.
 """
@@ -136,14 +140,14 @@ def relief_from_shading(
 
     Parameters
     ----------
-    change : (H, W) float32 ndarray
-        Fine changes of log light, d.
+    change : (C, H, W) float32 ndarray
+        Fine changes of the features of log light, d.
     weight : (H, W) ndarray
         How much they count, v, in [0, 1].
     slope : tuple of (H, W) float32 ndarray
         Of the smooth surface, dz/dx and dz/dy, x right and y down.
-    light : (9,) ndarray
-        Log-shading SH coefficients, reference convention.
+    light : (9, C) ndarray
+        SH coefficients of the features of log shading, reference convention.
     relief : (H, W) float32 ndarray
         An estimate from an image of half the size, pixels toward the viewer.
 
@@ -155,21 +159,27 @@ def relief_from_shading(
     """
     tilt = slopes(relief)
     whole = (slope[0] + tilt[0], slope[1] + tilt[1])
-    g1, g2 = shading_gain(whole, light)
-    left = change - (log_shading(whole, light) - log_shading(slope, light))
-    left += g1 * tilt[0] + g2 * tilt[1]
-    left *= weight
-    g1, g2 = g1 * weight, g2 * weight
     steepness = np.minimum(1 + slope[0] * slope[0] + slope[1] * slope[1], np.float32(_STEEPEST))
-    prior = np.float32(RHO**2) / steepness
-    across, down, both = g1 * g1 + prior, g2 * g2 + prior, g1 * g2
+    across = np.float32(RHO**2) / steepness
+    down, both, right_pull, down_pull = across.copy(), *np.zeros((3, *relief.shape), np.float32)
+    for feature, one in zip(change, light.T, strict=True):
+        g1, g2 = shading_gain(whole, one)
+        left = feature - (log_shading(whole, one) - log_shading(slope, one))
+        left += g1 * tilt[0] + g2 * tilt[1]
+        left *= weight
+        g1, g2 = g1 * weight, g2 * weight
+        across += g1 * g1
+        down += g2 * g2
+        both += g1 * g2
+        right_pull += g1 * left
+        down_pull += g2 * left
 
     def product(height: np.ndarray) -> np.ndarray:
         p, q = slopes(height)
         return slopes_adjoint(across * p + both * q, both * p + down * q)
 
     sums = _row_sums(across, down, np.abs(both)) + np.float32(_RIDGE)
-    return _chebyshev(product, slopes_adjoint(g1 * left, g2 * left), 1 / sums, relief)
+    return _chebyshev(product, slopes_adjoint(right_pull, down_pull), 1 / sums, relief)
 
 
 def _row_sums(across: np.ndarray, down: np.ndarray, both: np.ndarray) -> np.ndarray:

@@ -61,7 +61,9 @@ def test_many_iterations_reach_the_minimum(monkeypatch: pytest.MonkeyPatch) -> N
     change = 0.01 * RNG.normal(size=(side, side)).astype(np.float32)
     inside = np.ones((side, side), bool)
     start = np.zeros((side, side), np.float32)
-    found = relief_from_shading(change, inside, flat(inside.shape), FROM_THE_RIGHT, start)
+    found = relief_from_shading(
+        change[None], inside, flat(inside.shape), FROM_THE_RIGHT[:, None], start
+    )
     unit = np.eye(side * side).reshape(-1, side, side)
     p, q = (np.array([slopes(one)[k].ravel() for one in unit]).T for k in range(2))
     gain = shading_gain(flat((1, 1)), FROM_THE_RIGHT)[0].item()
@@ -80,29 +82,49 @@ def test_ripples_toward_the_light_are_found_and_those_across_are_not(period: int
         ripples = 0.1 * np.sin(2 * np.pi * along / period).astype(np.float32)
         change = log_shading(slopes(ripples), FROM_THE_RIGHT).astype(np.float32)
         found = relief_from_shading(
-            change, inside, flat(inside.shape), FROM_THE_RIGHT, np.zeros_like(ripples)
+            change[None],
+            inside,
+            flat(inside.shape),
+            FROM_THE_RIGHT[:, None],
+            np.zeros_like(ripples),
         )
         inner = (slice(24, -24), slice(24, -24))
         true, got = (np.stack(slopes(one))[(slice(None), *inner)] for one in (ripples, found))
         assert least <= float((true * got).sum() / (true * true).sum()) <= most
 
 
+def test_a_light_of_another_colour_from_below_shows_ripples_across_the_first() -> None:
+    y = np.mgrid[:96, :96][0].astype(np.float32)
+    inside, ripples = np.ones((96, 96), bool), 0.1 * np.sin(np.pi * y / 3).astype(np.float32)
+    from_below = np.eye(9)[3]  # of the reference's functions, n_1
+    light = np.stack([FROM_THE_RIGHT, from_below], axis=1)
+    change = np.stack([log_shading(slopes(ripples), one) for one in light.T]).astype(np.float32)
+    found = [
+        relief_from_shading(change[:k], inside, flat((96, 96)), light[:, :k], 0 * ripples)
+        for k in (1, 2)
+    ]
+    true, none, got = (slopes(one)[1][24:-24, 24:-24] for one in (ripples, *found))
+    explained = [float((true * one).sum() / (true * true).sum()) for one in (none, got)]
+    assert abs(explained[0]) < 0.01 and 0.85 < explained[1] <= 1
+
+
 def test_light_that_tells_nothing_gives_no_relief() -> None:
     inside, change = np.ones((40, 40), bool), RNG.normal(size=(40, 40)).astype(np.float32)
     found = relief_from_shading(
-        change, inside, flat(inside.shape), np.eye(9)[0], np.zeros_like(change)
+        change[None], inside, flat(inside.shape), np.eye(9)[:, :1], np.zeros_like(change)
     )
     assert np.abs(found).max() < 1e-6
 
 
 def test_values_depend_on_near_pixels_alone() -> None:
-    change, start = 0.1 * RNG.normal(size=(2, 90, 110)).astype(np.float32)
+    start, *change = 0.1 * RNG.normal(size=(4, 90, 110)).astype(np.float32)
+    features, light = np.stack(change), RNG.normal(0, 0.2, (9, 3))
     slope = tuple(RNG.normal(size=(2, 90, 110)).astype(np.float32))
     inside = RNG.random((90, 110)) > 0.1
-    whole = relief_from_shading(change, inside, (slope[0], slope[1]), LIGHT, start)
+    whole = relief_from_shading(features, inside, (slope[0], slope[1]), light, start)
     part = (slice(20, 80), slice(30, 100))
     cut = relief_from_shading(
-        change[part], inside[part], (slope[0][part], slope[1][part]), LIGHT, start[part]
+        features[:, *part], inside[part], (slope[0][part], slope[1][part]), light, start[part]
     )
     inner = (slice(REACH, -REACH), slice(REACH, -REACH))
     assert np.array_equal(whole[part][inner], cut[inner])
