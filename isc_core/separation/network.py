@@ -39,7 +39,7 @@ _MIN_SHARE = 1e-3  # of a channel that stays
 _LEAST_LIKELY = 0.2  # share of a detail that is specular: less stays
 
 
-VARIANTS = {"improved": RemovalOptions(doubt=0.0)}
+VARIANTS = {"improved": RemovalOptions()}
 
 
 def separate(

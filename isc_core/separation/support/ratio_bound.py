@@ -42,7 +42,7 @@ class RemovalOptions:
         How coloured the removed light may be, see `light_tint`; at least 1.
     """
 
-    doubt: float
+    doubt: float = 0.0
     stands_out: float = 0.6
     tint: float = 1.5
 
