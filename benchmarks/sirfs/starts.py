@@ -310,10 +310,12 @@ def _row(found: StartResult) -> tuple[object, ...]:
 
 
 def _ways(text: str) -> list[Starts]:
-    return [
-        tuple(Start(*(float(part) for part in pair.split(":"))) for pair in way.split("+"))
-        for way in text.split(",")
-    ]
+    return [tuple(_start(pair) for pair in way.split("+")) for way in text.split(",")]
+
+
+def _start(text: str) -> Start:
+    dome, light = (float(part) for part in text.split(":"))
+    return Start(dome, light)
 
 
 def _start_text(starts: Starts) -> str:
