@@ -43,7 +43,7 @@ from ..imaging.bounding_box import mask_slices
 from ..imaging.cross_bilateral import CrossBilateral
 from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
-from ..imaging.smoothing import masked_gaussian, masked_low_pass
+from ..imaging.smoothing import low_pass, masked_gaussian, masked_low_pass
 from ..imaging.tiles import Place, tiles_of
 from ..progress import Monitor
 from ..shading.paint_edges import ONE_PAINT, paint_guide, uniformity
@@ -101,28 +101,22 @@ class Level:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """What is known of a level before its relief, interpolated where it is asked for.
+    """Smooth maps of a level, interpolated where they are asked for.
 
     Attributes
     ----------
-    maps : (h, w, 6) float32 ndarray
-        Slopes dz/dx and dz/dy of the smooth surface, low frequencies of the three features of log
-        light less log shading, and how far there is one paint: of the level, or of the next coarser
-        one.
+    maps : (h, w, C) float32 ndarray
+        Of the level, or of the next coarser one.
     coarser : bool
     """
 
     maps: np.ndarray
     coarser: bool
 
-    def at(self, place: Place) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray, np.ndarray]:
-        """Return slopes (n, m), low frequencies (3, n, m) and uniformity (n, m).
-
-        Rows and columns have even ends.
-        """
+    def at(self, place: Place) -> np.ndarray:
+        """Return maps (C, n, m) at rows and columns of even numbers."""
         part = doubled_at(self.maps, place) if self.coarser else self.maps[place]
-        right, down, *low, uniform = np.ascontiguousarray(part.transpose(2, 0, 1))
-        return (right, down), np.stack(low), uniform
+        return np.ascontiguousarray(part.transpose(2, 0, 1))
 
     def finer(self, shape: tuple[int, ...]) -> "_Smooth":
         """Return the same for the next finer level; `shape` is that of this one."""
@@ -273,10 +267,11 @@ class Pyramid:
 
     def evidence(self) -> Evidence | None:
         """Return what the whole object says of relief; None where it is too small."""
-        telling, found = takewhile(lambda one: one[1] <= _TELLING, self._from_coarsest()), []
-        for level, _, smooth in telling:
-            slope, _, _ = smooth.at((slice(0, level.mask.shape[0]), slice(0, level.mask.shape[1])))
-            gain = shading_gain(slope, self.light[:, 0])
+        levels, found = self._from_coarsest(np.stack(self.slope, axis=2)), []
+        for level, _, smooth in takewhile(lambda one: one[1] <= _TELLING, levels):
+            rows, columns = (slice(0, n) for n in level.mask.shape)
+            right, down = smooth.at((rows, columns))
+            gain = shading_gain((right, down), self.light[:, 0])
             found.append(evidence_of(level.image / level.mean, level.mask, gain))
         return mean_evidence(found)
 
@@ -303,7 +298,7 @@ class Pyramid:
         monitor = monitor or Monitor()
         coarsest, done = self.levels[-1], 0.0
         relief: np.ndarray = np.zeros(tuple(n // 2 for n in coarsest.mask.shape), np.float32)
-        for level, length, smooth in self._from_coarsest():
+        for level, length, smooth in self._from_coarsest(self._smooth_maps()):
             relief = _enlarged(relief)
             share = 0.75 * level.mask.size / self.levels[0].mask.size
             if length <= finest:
@@ -316,25 +311,29 @@ class Pyramid:
         whole[~self.mask] = 0
         return whole
 
-    def _from_coarsest(self) -> Iterator[tuple[Level, float, _Smooth]]:
-        """Each level with the object's length and the smooth surface, the coarsest first."""
-        smooth = self._coarsest
+    def _from_coarsest(self, maps: np.ndarray) -> Iterator[tuple[Level, float, _Smooth]]:
+        """Each level with the object's length and maps of the coarsest, which comes first."""
+        smooth = _Smooth(maps, False)
         for k in range(len(self.levels) - 1, -1, -1):
             level = self.levels[k]
             yield level, self.frame.length / 2**k, smooth
             if k:
                 smooth = smooth.finer(level.mask.shape)
 
-    @cached_property
-    def _coarsest(self) -> _Smooth:
+    def _smooth_maps(self) -> np.ndarray:
+        """What relief needs (h, w, 6) of the coarsest level.
+
+        Slopes dz/dx and dz/dy, low frequencies of the features of log light less log shading, and
+        how far there is one paint.
+        """
         level = self.levels[-1]
-        left = _changes(level.image, level.mask, level.mean, self.slope, self.light)
+        shading = np.stack([log_shading(self.slope, one) for one in self.light.T])
+        left = (_features(level.image, level.mean) - shading) * level.mask
         guide = paint_guide(level.image / level.mean, level.mask, left[0])
         sigma = _SIGMA * _PERIOD * self.frame.length / 2**self.frame.halvings
         smoother = CrossBilateral.of(guide, level.mask, sigma, ONE_PAINT)
-        low = [_continued(smoother.low_pass(one), level.mask) for one in left]
-        uniform = uniformity(guide, level.mask)
-        return _Smooth(np.stack([*self.slope, *low, uniform], axis=2), False)
+        low = [_continued(low_pass(one, smoother), level.mask) for one in left]
+        return np.stack([*self.slope, *low, uniformity(guide, level.mask)], axis=2)
 
 
 @dataclass(frozen=True)
@@ -369,19 +368,11 @@ class _Frame:
         return coarse
 
 
-def _changes(
-    image: np.ndarray,
-    mask: np.ndarray,
-    mean: np.float32,
-    slope: tuple[np.ndarray, np.ndarray],
-    light: np.ndarray,
-) -> np.ndarray:
-    """Features (3, H, W) of log light less those of log shading, I - S; 0 outside of the mask."""
+def _features(image: np.ndarray, mean: np.float32) -> np.ndarray:
+    """Features (3, H, W) of log light over the object's mean, I of the module."""
     over = image / mean + np.float32(_DARK)
     red, green, blue = np.log(over).transpose(2, 0, 1)
-    features = np.stack([np.log(over.mean(axis=2)), red - green, blue - green])
-    shading = np.stack([log_shading(slope, one) for one in light.T])
-    return np.where(mask, features - shading, np.float32(0))
+    return np.stack([np.log(over.mean(axis=2)), red - green, blue - green])
 
 
 def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:
@@ -422,8 +413,10 @@ def _refined(
     for k, tile in enumerate(tiles):
         monitor.report("fine relief", k / len(tiles))
         mask = level.mask[tile.outer]
-        slope, low, uniform = smooth.at(tile.outer)
-        change = _changes(level.image[tile.outer], mask, level.mean, slope, light) - low
-        refined = relief_from_shading(change, mask * uniform, slope, light, relief[tile.outer])
+        right, down, *low, uniform = smooth.at(tile.outer)
+        shading = _features(level.image[tile.outer], level.mean) - np.stack(low)
+        refined = relief_from_shading(
+            shading, mask * uniform, (right, down), light, relief[tile.outer]
+        )
         found[tile.inner] = np.where(mask, refined, 0)[tile.own]  # tiles end with the object
     return found

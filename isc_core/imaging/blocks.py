@@ -47,3 +47,28 @@ def means_inside(values: np.ndarray, mask: np.ndarray, side: int) -> tuple[np.nd
     sums = block_means(np.where(mask[..., None], planes, 0), side)
     means = sums / np.maximum(share, _LEAST)[..., None]
     return means.reshape(*share.shape, *values.shape[2:]), share
+
+
+def padded_means_inside(
+    values: np.ndarray, mask: np.ndarray, side: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `means_inside` of maps of any size: nothing is inside beyond their border.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+        Floats.
+    mask : (H, W) ndarray of bool
+    side : int
+        Pixels of a block's side, b.
+
+    Returns
+    -------
+    means : (ceil(H / b), ceil(W / b)) or (ceil(H / b), ceil(W / b), C) ndarray
+        0 where nothing is inside.
+    share : (ceil(H / b), ceil(W / b)) ndarray
+        Share of the block that is inside.
+    """
+    more = [(0, -n % side) for n in mask.shape]
+    rest = [(0, 0)] * (values.ndim - 2)
+    return means_inside(np.pad(values, [*more, *rest]), np.pad(mask, more), side)

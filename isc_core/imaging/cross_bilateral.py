@@ -27,14 +27,13 @@ _TINY = 1e-6
 
 @dataclass(frozen=True)
 class _Pass:
-    """Averaging along one axis: how far, and the weights of each offset."""
+    """Averaging along one axis."""
 
     axis: int
-    reach: int
     weights: np.ndarray  # (2 reach + 1, H, W), of sum 1 over the offsets
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        shifted = _shifted(values, self.axis, self.reach)
+        shifted = _shifted(values, self.axis, len(self.weights) // 2)
         total = np.zeros_like(values)
         for weight, value in zip(self.weights, shifted, strict=True):
             total += weight * value
@@ -72,12 +71,8 @@ class CrossBilateral:
         -------
         CrossBilateral
         """
-        reach = int(np.ceil(_REACH * sigma))
         return cls(
-            tuple(
-                _Pass(axis, reach, _weights(guide, mask, axis, reach, (sigma, tolerance)))
-                for axis in (1, 0)
-            )
+            tuple(_Pass(axis, _weights(guide, mask, axis, sigma, tolerance)) for axis in (1, 0))
         )
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
@@ -96,28 +91,12 @@ class CrossBilateral:
             values = one(values)
         return values
 
-    def low_pass(self, values: np.ndarray) -> np.ndarray:
-        """Return the low frequencies 1 - (1 - B)^3 of a map, as `smoothing.masked_low_pass` does.
-
-        Parameters
-        ----------
-        values : (H, W) float32 ndarray
-
-        Returns
-        -------
-        (H, W) float32 ndarray
-        """
-        rest = values
-        for _ in range(3):
-            rest = rest - self(rest)
-        return np.asarray(values - rest)
-
 
 def _weights(
-    guide: np.ndarray, mask: np.ndarray, axis: int, reach: int, widths: tuple[float, float]
+    guide: np.ndarray, mask: np.ndarray, axis: int, sigma: float, tolerance: float
 ) -> np.ndarray:
     """The weights (2 reach + 1, H, W) of the pixels along an axis, of sum 1."""
-    sigma, tolerance = widths
+    reach = int(np.ceil(_REACH * sigma))
     offsets = np.arange(-reach, reach + 1, dtype=np.float32)
     inside = _shifted(mask.astype(np.float32), axis, reach)
     weights = np.empty((len(offsets), *mask.shape), np.float32)

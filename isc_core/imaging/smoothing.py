@@ -6,6 +6,9 @@ Citation: H. Knutsson and C.-F. Westin, "Normalized and differential convolution
 doi:10.1109/CVPR.1993.341081.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from scipy import ndimage
 
@@ -33,7 +36,7 @@ def masked_gaussian(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.nda
 
 
 def masked_low_pass(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
-    """Return the low frequencies of a layer, 1 - (1 - G)^3 of it, G being `masked_gaussian`.
+    """Return the low frequencies of a layer, `low_pass` by `masked_gaussian`.
 
     Parameters
     ----------
@@ -47,9 +50,26 @@ def masked_low_pass(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.nda
     ndarray
         Of the layer's shape.
     """
+    return low_pass(layer, partial(masked_gaussian, mask=mask, sigma=sigma))
+
+
+def low_pass(layer: np.ndarray, average: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return the low frequencies of a layer, 1 - (1 - G)^3 of it.
+
+    Parameters
+    ----------
+    layer : ndarray
+    average : callable
+        G, from a layer to its local averages.
+
+    Returns
+    -------
+    ndarray
+        Of the layer's shape.
+    """
     rest = layer
     for _ in range(3):
-        rest = rest - masked_gaussian(rest, mask, sigma)
+        rest = rest - average(rest)
     return np.asarray(layer - rest)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..imaging.blocks import means_inside
+from ..imaging.blocks import padded_means_inside
 from ..imaging.bounding_box import mask_slices
 from ..scene.decomposition import Decomposition
 from ..shading.perspective import far_view_normals
@@ -65,7 +65,7 @@ class WorkingScale:
         -------
         (h, w, ...) ndarray
         """
-        return _means(layer[self.box].astype(float), mask[self.box], self.step)[0]
+        return padded_means_inside(layer[self.box].astype(float), mask[self.box], self.step)[0]
 
 
 def slopes_of_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -116,24 +116,17 @@ def working_scale(d: Decomposition) -> WorkingScale:
     step = -(-max(mask.shape) // LONGEST)
     image = d.image[box].max(axis=2)
     clipped = mask & (image >= _CLIPPED * image.max())
-    normal, share = _means(mirroring_normals(d)[box], mask, step)
+    normal, share = padded_means_inside(mirroring_normals(d)[box], mask, step)
     inside = share > 0.5
     length = np.linalg.norm(normal, axis=-1, keepdims=True)
     normal = np.where(
         inside[..., None] & (length > 0), normal / np.maximum(length, 1e-9), (0, 0, 1)
     )
     specular, diffuse, shading = (
-        np.where(inside[..., None], _means(layer[box].astype(float), mask, step)[0], 0)
+        np.where(inside[..., None], padded_means_inside(layer[box].astype(float), mask, step)[0], 0)
         for layer in (d.specular, d.diffuse, d.shading)
     )
-    any_clipped = inside & (_means(clipped.astype(float), mask, step)[0] > 0)
+    any_clipped = inside & (padded_means_inside(clipped.astype(float), mask, step)[0] > 0)
     return WorkingScale(
         box, step, inside, any_clipped, specular.mean(axis=2), normal, diffuse, shading
     )
-
-
-def _means(values: np.ndarray, mask: np.ndarray, step: int) -> tuple[np.ndarray, np.ndarray]:
-    """`means_inside` of maps of any size."""
-    more = [(0, -n % step) for n in mask.shape]
-    rest = [(0, 0)] * (values.ndim - 2)
-    return means_inside(np.pad(values, [*more, *rest]), np.pad(mask, more), step)

@@ -6,15 +6,15 @@ directions, fine changes of colour say more, as in photometric stereo. Across al
 and where shading hardly changes with the slope, the photo says nothing.
 
 Equation: of C features (log brightness, and logarithms of ratios of channels), let S_c be that of
-the shading as a function of the slope, and d_c the fine changes of that of the light. With s_0 the
+the shading as a function of the slope, and e_c that of the light without the paint. With s_0 the
 slopes of the smooth surface, the height r of the relief has the least
 
-    sum over the object and the features of v^2 (d_c - (S_c(s_0 + grad r) - S_c(s_0)))^2
+    sum over the object and the features of v^2 (e_c - S_c(s_0 + grad r))^2
     + rho^2 sum of |grad r|^2 / (1 + |s_0|^2)
 
 with the weight v of each pixel. That is, its slopes are expected to be Gaussian, of equal strength
 in all directions and in every octave, larger where the surface is seen from the side; rho is the
-noise of d over their standard deviation. S is made linear at an estimate from an image of half the
+noise of e over their standard deviation. S is made linear at an estimate from an image of half the
 size. The sum then is quadratic in r, and a few Chebyshev iterations, preconditioned by the sums of
 its matrix' rows, find what that estimate lacks: coarser relief is known, and the finest converges
 at once. Every value depends on pixels up to `REACH` away, by the same operations wherever they lie.
@@ -134,14 +134,14 @@ def shading_gain(slope: Slopes, light: np.ndarray) -> Slopes:
 
 
 def relief_from_shading(
-    change: np.ndarray, weight: np.ndarray, slope: Slopes, light: np.ndarray, relief: np.ndarray
+    shading: np.ndarray, weight: np.ndarray, slope: Slopes, light: np.ndarray, relief: np.ndarray
 ) -> np.ndarray:
     """Refine an estimate of the relief by what an image of this size shows beyond half of it.
 
     Parameters
     ----------
-    change : (C, H, W) float32 ndarray
-        Fine changes of the features of log light, d.
+    shading : (C, H, W) float32 ndarray
+        Features of log light without the paint, e.
     weight : (H, W) ndarray
         How much they count, v, in [0, 1].
     slope : tuple of (H, W) float32 ndarray
@@ -162,9 +162,9 @@ def relief_from_shading(
     steepness = np.minimum(1 + slope[0] * slope[0] + slope[1] * slope[1], np.float32(_STEEPEST))
     across = np.float32(RHO**2) / steepness
     down, both, right_pull, down_pull = across.copy(), *np.zeros((3, *relief.shape), np.float32)
-    for feature, one in zip(change, light.T, strict=True):
+    for feature, one in zip(shading, light.T, strict=True):
         g1, g2 = shading_gain(whole, one)
-        left = feature - (log_shading(whole, one) - log_shading(slope, one))
+        left = feature - log_shading(whole, one)
         left += g1 * tilt[0] + g2 * tilt[1]
         left *= weight
         g1, g2 = g1 * weight, g2 * weight

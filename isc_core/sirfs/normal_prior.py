@@ -24,7 +24,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..baselines.poisson import integrate
-from ..imaging.blocks import block_means
+from ..imaging.blocks import padded_means_inside
 from ..imaging.framing import continued_height
 from ..scene.normal_estimate import NormalEstimate
 from .silhouette import ExpectedNormals
@@ -80,12 +80,10 @@ def predicted_height(predicted: ExpectedNormals, mask: np.ndarray, block: int) -
     (ceil(H / block), ceil(W / block)) ndarray
         Toward the viewer, in blocks, of mean 0 on each part of the object; continued beyond it.
     """
-    padding = [(0, -n % block) for n in mask.shape]
-    maps = np.stack([mask, predicted.down * mask, predicted.right * mask], axis=2)
-    maps = block_means(np.pad(maps, (*padding, (0, 0))), block)
-    cover = maps[..., 0]
+    normal = np.stack([predicted.down, predicted.right], axis=2)
+    means, cover = padded_means_inside(normal, mask, block)
     inside = cover >= min(0.5, float(cover.max()))
-    down, right = (maps[..., k] / np.maximum(cover, 1e-6) for k in (1, 2))
+    down, right = means[..., 0], means[..., 1]
     shrink = np.minimum(1, _STEEPEST / np.maximum(np.hypot(down, right), 1e-6))
     toward = np.sqrt(1 - shrink**2 * (down**2 + right**2))
     slope_down, slope_right = -shrink * down / toward, -shrink * right / toward

@@ -21,8 +21,8 @@ class Start:
     light : float
         Factor on the log light that the priors expect.
     predicted : bool
-        In place of the dome, the shape that the predicted normals add up to, if there are any and
-        no depth was observed.
+        In place of the dome, the shape that the predicted normals add up to, if the problem has any
+        and no depth was observed.
     """
 
     dome: float = 0.0
@@ -196,7 +196,7 @@ class PredictionWeights:
 # has both. They belong to the network. This start and tolerance take a quarter of the evaluations
 # of the usual ones, see "Fewer evaluations" in the research log.
 PHOTO_PREDICTIONS = PredictionWeights(
-    2.0, 4.0, True, 1.0, (Start(dome=1, light=1, predicted=True),), loss_tolerance=2e-3
+    2.0, 4.0, True, 1.0, (Start(light=1, predicted=True),), loss_tolerance=2e-3
 )
 # Of the data set's objects the priors know shapes and lights; little is left to predict.
 DATASET_PREDICTIONS = PredictionWeights(0.2, 0.2, False, 4.0, ISC_NATURAL.starts)
