@@ -113,21 +113,6 @@ class CompositeDraw(TensorBatch):
     thing_variation: ThingVariation | None = None
     ground_variation: GroundVariation | None = None
 
-    def to(self, device: str | torch.device) -> "CompositeDraw":
-        """Return the draw on a device.
-
-        Parameters
-        ----------
-        device : str or torch.device
-
-        Returns
-        -------
-        CompositeDraw
-        """
-        given = {name: part for name, part in vars(self).items() if part is not None}
-        parts = {name: part.to(device) for name, part in given.items()}
-        return CompositeDraw(**parts)
-
 
 @dataclass(frozen=True)
 class CompositeDraws:

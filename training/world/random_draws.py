@@ -17,7 +17,7 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
     float
         In [low, high].
     """
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    return float(log_uniforms(rng, low, high, ()))
 
 
 def log_uniforms(

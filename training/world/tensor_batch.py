@@ -15,7 +15,7 @@ import torch
 
 @dataclass(frozen=True)
 class TensorBatch:
-    """Base of dataclasses whose attributes are tensors, or batches themselves."""
+    """Base of dataclasses whose attributes are tensors, batches themselves, or None."""
 
     def __reduce__(self) -> tuple[Callable[..., Any], tuple[Any, ...]]:
         # between processes, many small tensors travel slowly: each is a file of shared memory
@@ -38,9 +38,9 @@ class TensorBatch:
         TensorBatch
             Of the same class.
         """
-        return replace(
-            self, **{one.name: getattr(self, one.name).to(device) for one in fields(self)}
-        )
+        parts = {one.name: getattr(self, one.name) for one in fields(self)}
+        moved = {name: part.to(device) for name, part in parts.items() if part is not None}
+        return replace(self, **moved)
 
     def chosen(self, which: torch.Tensor) -> Self:
         """Return some rows of the batch.
