@@ -38,13 +38,10 @@ from isc_core.result_files.contact_sheet import MapPanel, edit_sheet
 from isc_core.shading.environment_map import shading_under
 
 from .closed_loop_cases import (
-    PHOTOS,
-    RENDERED,
-    CaseOptions,
     LoopCase,
     RelitTruth,
     add_case_arguments,
-    loop_cases,
+    chosen_cases,
     run_cases,
 )
 from .renders import RenderVariant, render
@@ -496,11 +493,10 @@ def measure(given: argparse.Namespace) -> None:
     InputError
         For an unknown name, a missing photo, or a failed run.
     """
-    options = CaseOptions(given.output, given.photos, given.size, max(16, 4 * given.samples))
     loops: list[LoopRow] = []
     relits: list[RelitRow] = []
     panels: dict[str, list[MapPanel]] = {"rendered": [], "photos": [], "relit": []}
-    for case in loop_cases(options, given.names or (RENDERED + (PHOTOS if given.photos else ()))):
+    for case in chosen_cases(given, max(16, 4 * given.samples)):
         renders = _renders(given, case.name, case.result)
         loops.append(loop_row(case.name, renders))
         panels["photos" if case.truth is None else "rendered"] += loop_panels(case.name, renders)

@@ -13,7 +13,7 @@ right up to one gain at best.
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -175,27 +175,28 @@ def run_cases(
     return 0
 
 
-def loop_cases(options: CaseOptions, names: Iterable[str]) -> Iterator[LoopCase]:
-    """Make the objects of these names.
+def chosen_cases(given: argparse.Namespace, samples: int) -> Iterator[LoopCase]:
+    """Make the objects that a command line names: by default those of `RENDERED`, and `PHOTOS`
+    where there are any.
 
     Parameters
     ----------
-    options : CaseOptions
-        Folders and sizes.
-    names : iterable of str
-        Of `PHOTOS` and `RENDERED`.
+    given : argparse.Namespace
+        With the options of `add_case_arguments`.
+    samples : int
+        Mitsuba's samples per pixel.
 
     Yields
     ------
     LoopCase
-        In the order of the names.
 
     Raises
     ------
     InputError
         For an unknown name, a missing photo, or a failed run.
     """
-    for name in names:
+    options = CaseOptions(given.output, given.photos, given.size, samples)
+    for name in given.names or RENDERED + (PHOTOS if given.photos else ()):
         if name in RENDERED:
             yield _rendered(options, name)
         elif options.photos is not None and (path := options.photos / f"{name}.png").is_file():

@@ -88,15 +88,15 @@ def seen_bodies(numbers: range, folder: Path, panoramas: Path) -> Iterator[SeenB
     SeenBody
         Without those that cannot be traced or decomposed.
     """
-    judged = [one.radiance for one in read_panoramas(panoramas, 0) if one.judged]
+    held_out = [one.radiance for one in read_panoramas(panoramas, 0) if one.held_out]
     atlas = make_atlas(_SEED, _PATTERNS)
-    bank = bank_of(judged, atlas)
+    bank = bank_of(held_out, atlas)
     for number in numbers:
         for kind in KINDS:
             path = folder / f"{kind}_{number}.npz"
             if not path.is_file():
                 try:
-                    arrays = _seen(kind, number, atlas, bank, len(judged))
+                    arrays = _seen(kind, number, atlas, bank, len(held_out))
                 except InputError as error:
                     print(f"{kind} {number}: {error}", flush=True)
                     continue

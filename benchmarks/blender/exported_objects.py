@@ -41,12 +41,9 @@ from synth.light_rigs.placing import toward
 
 from .closed_loop import white
 from .closed_loop_cases import (
-    PHOTOS,
-    RENDERED,
-    CaseOptions,
     LoopCase,
     add_case_arguments,
-    loop_cases,
+    chosen_cases,
     run_cases,
 )
 from .read_back import read_back, shown
@@ -240,11 +237,9 @@ def measure(given: argparse.Namespace) -> None:
     InputError
         For an unknown name, a missing photo, or a failed run.
     """
-    options = CaseOptions(given.output, given.photos, given.size, 64)
     exports: list[ExportRow] = []
     highlights: list[HighlightRow] = []
-    names = given.names or (RENDERED + (PHOTOS if given.photos else ()))
-    for case in loop_cases(options, names):
+    for case in chosen_cases(given, 64):
         _measure_case(case, given.samples, exports, highlights)
         _write(given.output, exports, highlights)
         print(exports[-1], flush=True)

@@ -99,9 +99,9 @@ def lit(world: Path, panoramas: Path, batches: int) -> Iterator[CheckedPhoto]:
     from training.world.files import Split
     from training.world.recipes import Shares
 
-    found = read_world([world], panoramas, (Split.BODY,), 0)
-    bodies, judged = found.views[Split.BODY], found.judged
-    draws = SceneDraws(bodies, found.atlas, judged, _SIZE, Shares(), photos=1)
+    found = read_world([world], panoramas, (Split.UNSEEN_BODY,), 0)
+    bodies, held_out = found.views[Split.UNSEEN_BODY], found.held_out_environments
+    draws = SceneDraws(bodies, found.atlas, held_out, _SIZE, Shares(), photos=1)
     draw, rng = SceneBatches(draws, found.bank), np.random.default_rng(0)
     for _ in range(batches):
         sample = draw(rng)

@@ -1,17 +1,17 @@
-"""How good are masks that are found automatically? Measured on composites of held-out things.
+"""How good are masks that are found automatically? Measured on composites of held-out objects.
 
   python -m benchmarks.decomposition.automatic_mask WORLD --panoramas DIR [--photos DIR]
   [--weights NPZ] [--count N] [--sheet JPG] [--json FILE]
 
 WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
-one thing show bodies that no fit has seen, the other half the masked photos of real things in
+one object show bodies that no fit has seen, the other half the masked photos of real objects in
 --photos; both stand before crops of panoramas that no fit has seen. As many photos again show
-nothing, or several things. Refusals are wrong where one thing is shown, and more so where its mask
-would have been right, with an overlap of .5; acceptances where none or several are shown. Intervals
-are those of resampled photos.
+nothing, or several objects. Refusals are wrong where one object is shown, and more so where its
+mask would have been right, with an overlap of .5; acceptances where none or several are shown.
+Intervals are those of resampled photos.
 
-Limits: bodies and panoramas are soft at this size, and the light on a thing is not that of its
-background. Several photos show the same of the real things.
+Limits: bodies and panoramas are soft at this size, and the light on an object is not that of its
+background. Several photos show the same of the real objects.
 """
 
 import argparse
@@ -39,7 +39,7 @@ _RIGHT = 0.5  # overlap of a mask that is right
 
 
 @dataclass(frozen=True)
-class Judged:
+class MaskScore:
     """A composite and what was found in it.
 
     Attributes
@@ -62,7 +62,7 @@ class Judged:
         return not why_refused(self.found)
 
 
-def judged(photo: HeldOut, network: MaskNetwork | None) -> Judged:
+def score_mask(photo: HeldOut, network: MaskNetwork | None) -> MaskScore:
     """Find the mask of a composite, and compare it with the truth.
 
     Parameters
@@ -72,23 +72,23 @@ def judged(photo: HeldOut, network: MaskNetwork | None) -> Judged:
 
     Returns
     -------
-    Judged
+    MaskScore
     """
     start = time.perf_counter()
     found = find_mask(photo.light, network=network)
     seconds = time.perf_counter() - start
     truth = photo.cover >= 0.5
     union = int((found.mask | truth).sum())
-    return Judged(photo, found, float((found.mask & truth).sum()) / max(union, 1), seconds)
+    return MaskScore(photo, found, float((found.mask & truth).sum()) / max(union, 1), seconds)
 
 
-def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
+def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     """Format the figures.
 
     Parameters
     ----------
-    groups : dict of str to list of Judged
-        "bodies" and "photos" show one thing each, the others none or several.
+    groups : dict of str to list of MaskScore
+        "bodies" and "photos" show one object each, the others none or several.
 
     Returns
     -------
@@ -97,9 +97,9 @@ def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
     figures : dict
     """
     single = [name for name in groups if name in ("bodies", "photos")]
-    rows, figures = list[tuple[str, list[Judged]]](), dict[str, object]()
+    rows, figures = list[tuple[str, list[MaskScore]]](), dict[str, object]()
     rows += [(name, groups[name]) for name in single]
-    rows.append(("all of one thing", [one for name in single for one in groups[name]]))
+    rows.append(("all of one object", [one for name in single for one in groups[name]]))
     lines = [
         "| shown | photos | IoU, median | 10th percentile | of those accepted "
         "| refused | refused of right ones |",
@@ -121,7 +121,7 @@ def report(groups: dict[str, list[Judged]]) -> tuple[str, dict[str, object]]:
     lines += ["", "| shown | photos | accepted |", "|---|---|---|"]
     others = [name for name in groups if name not in single]
     whole = [*((name, groups[name]) for name in others)]
-    whole.append(("no single thing", [one for name in others for one in groups[name]]))
+    whole.append(("no single object", [one for name in others for one in groups[name]]))
     for name, found in whole:
         lines.append(f"| {name} | {len(found)} | {_share([one.accepted for one in found])} |")
         figures[name] = {"confidence": [round(one.found.confidence, 4) for one in found]}
@@ -145,12 +145,12 @@ def _share(chosen: np.ndarray | list[bool]) -> str:
     return f"{values.mean():.1%} ({low:.0%}-{high:.0%})"
 
 
-def sheet(found: list[Judged]) -> Image.Image:
+def sheet(found: list[MaskScore]) -> Image.Image:
     """Draw photos, true outlines and found covers side by side, two photos a row.
 
     Parameters
     ----------
-    found : list of Judged
+    found : list of MaskScore
 
     Returns
     -------
@@ -161,7 +161,7 @@ def sheet(found: list[Judged]) -> Image.Image:
     return Image.fromarray(np.concatenate(rows))
 
 
-def _strip(one: Judged) -> np.ndarray:
+def _strip(one: MaskScore) -> np.ndarray:
     """Photo with the true outline in green, photo with the found one in red, the found cover; a
     refused one under a red bar.
     """
@@ -194,38 +194,42 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--photos", type=Path, metavar="DIR", help="masked photos of real things")
+    add("--photos", type=Path, metavar="DIR", help="masked photos of real objects")
     add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
-    add("--count", type=int, default=200, help="photos of one thing (default: %(default)s)")
+    add("--count", type=int, default=200, help="photos of one object (default: %(default)s)")
     add("--sheet", type=Path, metavar="JPG", help="where to draw 20 of them")
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
     try:
         network = None if given.weights is None else MaskNetwork.read(given.weights)
         bodies = held_out_ingredients(given.world, given.panoramas, "B")
-        things = {"bodies": bodies}
+        objects = {"bodies": bodies}
         if given.photos is not None:
-            things["photos"] = held_out_ingredients(given.world, given.panoramas, "B", given.photos)
+            objects["photos"] = held_out_ingredients(
+                given.world, given.panoramas, "B", given.photos
+            )
     except InputError as error:
         parser.error(str(error))
     groups = {
         name: [
-            judged(photo, network)
-            for photo in held_out_composites(part, Count.ONE, given.count // len(things), _SEED + k)
+            score_mask(photo, network)
+            for photo in held_out_composites(
+                part, Count.ONE, given.count // len(objects), _SEED + k
+            )
         ]
-        for k, (name, part) in enumerate(things.items())
+        for k, (name, part) in enumerate(objects.items())
     }
     for name, count in (("nothing", Count.NONE), ("several", Count.SEVERAL)):
         photos = held_out_composites(bodies, count, given.count // 2, _SEED)
-        groups[name] = [judged(photo, network) for photo in photos]
+        groups[name] = [score_mask(photo, network) for photo in photos]
     text, figures = report(groups)
     print(text)
     if given.json:
         given.json.write_text(json.dumps(figures), encoding="utf-8")
     if given.sheet:
         # the first ones of each kind, whatever was found
-        shown = _SHOWN // len(things)
-        drawn = [one for name in things for one in groups[name][:shown]]
+        shown = _SHOWN // len(objects)
+        drawn = [one for name in objects for one in groups[name][:shown]]
         sheet(drawn).save(given.sheet, quality=45)
 
 

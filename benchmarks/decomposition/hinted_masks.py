@@ -2,12 +2,12 @@
 
   python -m benchmarks.decomposition.hinted_masks PHOTOS --panoramas DIR [--count N] [--json FILE]
 
-Composites of masked photos of real things before crops of panoramas that no fit has seen, half of
-them with other things beside. One thing is meant. A box around it leaves up to 15 % on each side;
-points are one to three pixels of it, and with `not` one or two of the background besides. A mask is
-right with an overlap of .5. The weights of the confidence are those fitted without hints; nothing
-here was chosen on these composites. What is refused counts as an empty mask that is not sure.
-Intervals are those of resampled masks.
+Composites of masked photos of real objects before crops of panoramas that no fit has seen, half of
+them with other objects beside. One object is the target. A box around it leaves up to 15 % on each
+side; points are one to three pixels of it, and with `not` one or two of the background besides. A
+mask is right with an overlap of .5. The weights of the confidence are those fitted without hints;
+nothing here was chosen on these composites. What is refused counts as an empty mask with confidence
+0. Intervals are those of resampled masks.
 
 Limits: those of `benchmarks.decomposition.automatic_mask`. Pixels are drawn evenly; people point at
 the middle.
@@ -34,14 +34,14 @@ from training.masks.packs import Ingredients
 
 KINDS = ("box", "points", "points and not")
 _BATCH, _SEED = 8, 5
-_MOST_MARGIN = 0.15  # of a box, of the thing's width or height
-_LEAST = 200  # pixels of a thing
+_MOST_MARGIN = 0.15  # of a box, of the object's width or height
+_LEAST = 200  # pixels of an object
 _RIGHT = 0.5  # overlap
 _BINS = (0.0, 0.5, 0.8, 0.95, 1.01)  # of confidence
 
 
 @dataclass(frozen=True)
-class Judged:
+class MaskScore:
     """A mask that hints made.
 
     Attributes
@@ -72,14 +72,14 @@ def composites(
     ------
     light : (H, W, 3) float32 ndarray
     truth : (H, W) bool ndarray
-        The thing that is meant.
+        Mask of the target.
     """
     rng = np.random.default_rng(_SEED)
     torch.manual_seed(_SEED)
     pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
-    judged, patterns = panoramas_in(panoramas, 0, judged=True), np.zeros((1, 8, 8), np.uint8)
+    rooms, patterns = panoramas_in(panoramas, 0, held_out=True), np.zeros((1, 8, 8), np.uint8)
     draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0.5, 0.5), grounds=(0, 0))
-    compose = Composites(Ingredients(np.stack(pictures), judged, patterns), draw, SIDE)
+    compose = Composites(Ingredients(np.stack(pictures), rooms, patterns), draw, SIDE)
     made = 0
     while made < count:
         batch = compose(rng)
@@ -129,7 +129,7 @@ def _some(where: np.ndarray, rng: np.random.Generator, count: int) -> tuple[Poin
     return tuple((int(columns[k]), int(rows[k])) for k in rng.integers(len(rows), size=count))
 
 
-def judged_masks(photos: Path, panoramas: Path, count: int) -> list[Judged]:
+def score_masks(photos: Path, panoramas: Path, count: int) -> list[MaskScore]:
     """Make masks from hints of each kind on composites.
 
     Parameters
@@ -140,17 +140,17 @@ def judged_masks(photos: Path, panoramas: Path, count: int) -> list[Judged]:
 
     Returns
     -------
-    list of Judged
+    list of MaskScore
     """
     rng = np.random.default_rng([_SEED, 1])
     return [
-        Judged(kind, *_judge(light, truth, drawn_hints(truth, kind, rng)))
+        MaskScore(kind, *_score(light, truth, drawn_hints(truth, kind, rng)))
         for light, truth in composites(photos, panoramas, count)
         for kind in KINDS
     ]
 
 
-def _judge(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, float]:
+def _score(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, float]:
     try:
         found = find_mask(light, hints)
     except InputError:
@@ -158,12 +158,12 @@ def _judge(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, f
     return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.confidence
 
 
-def report(found: list[Judged]) -> str:
+def report(found: list[MaskScore]) -> str:
     """Format the figures.
 
     Parameters
     ----------
-    found : list of Judged
+    found : list of MaskScore
 
     Returns
     -------
@@ -215,7 +215,7 @@ def main() -> None:
     add("--json", type=Path, metavar="FILE", help="write every mask's figures")
     given = parser.parse_args()
     try:
-        found = judged_masks(given.photos, given.panoramas, given.count)
+        found = score_masks(given.photos, given.panoramas, given.count)
     except InputError as error:
         parser.error(str(error))
     print(report(found))

@@ -107,7 +107,7 @@ def balanced_scenes(
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
-    found = read_world([world], panoramas, (Split.BODY,), 0)
+    found = read_world([world], panoramas, (Split.UNSEEN_BODY,), 0)
     pictures = read_pictures(panoramas, 0)
     paints = {Paint.ONE: 0.2, Paint.FEW: 0.4, Paint.STRONG_WITH_WHITE: 0.3, Paint.NATURAL: 0.1}
     shares = Shares(
@@ -116,11 +116,13 @@ def balanced_scenes(
         lights=tuple(float(kind == LightKind.AROUND) for kind in LightKind),
         matte=0,
     )
-    rng, made, bodies = np.random.default_rng(seed), list[Scene](), found.views[Split.BODY]
+    rng, made, bodies = np.random.default_rng(seed), list[Scene](), found.views[Split.UNSEEN_BODY]
     store = ViewStore(bodies)
 
     def balanced(view: int) -> "Sample":
-        draw = draw_batch(bodies, np.array([view]), 1, found.atlas, found.judged, rng, shares)
+        draw = draw_batch(
+            bodies, np.array([view]), 1, found.atlas, found.held_out_environments, rng, shares
+        )
         turn = draw.recipes["turn"][0].double().numpy()
         colour = _balance(*pictures[int(draw.recipes["environment"][0])], turn, balance, rng)
         ambient = torch.from_numpy(1 / colour[None]).float()

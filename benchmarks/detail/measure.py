@@ -15,15 +15,15 @@ tangential fields
     d = (R n)_xy,   d_16 = L_11.3 d - L_22.6 d,   d_8 = L_5.66 d - L_11.3 d,   d_4 = d - L_5.66 d
 
 With m and R of the estimate for the estimate, of the truth for the truth, and means over the pixels
-judged,
+that count,
 
     error = mean |d_est - d_true|^2,   energy = mean |d_true|^2,   explained = 1 - error / energy
 
 On a smooth body, d_true is that of the body, and the error what the estimate invents. Base: the
 median angle between the normals after smoothing and sampling at an object length of 256 pixels.
 
-Pixels judged: those farther than 16 from the mask's outline, from what is not estimated, and from
-folds and steps of the smooth body.
+Pixels that count: those farther than 16 from the mask's outline, from what is not estimated, and
+from folds and steps of the smooth body.
 
 Limits: an estimate of another size has to be resampled to the photo's first (`at_size`).
 """
@@ -46,8 +46,8 @@ _FOLD = np.radians(3)  # of the smooth body's own fine normals
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """An estimate against the truth.
+class ReliefScore:
+    """Errors of estimated normals, in each octave.
 
     Attributes
     ----------
@@ -65,10 +65,10 @@ class Judgement:
     base: float
 
 
-def judge(
+def score_relief(
     estimated: np.ndarray, truth: np.ndarray, mask: np.ndarray, smooth: np.ndarray | None = None
-) -> Judgement:
-    """Judge estimated normals.
+) -> ReliefScore:
+    """Compare estimated normals with the truth, octave by octave.
 
     Parameters
     ----------
@@ -81,17 +81,17 @@ def judge(
 
     Returns
     -------
-    Judgement
+    ReliefScore
     """
     known = mask & np.isfinite(estimated).all(2) & (np.abs(estimated).sum(2) > 0)
     estimated = _unit(np.where(known[..., None], estimated, 0))
-    judged = judged_pixels(mask, known, smooth)
+    scored = scored_pixels(mask, known, smooth)
     found, wanted = fine_normals(estimated, known), fine_normals(truth, mask)
-    energy = [_mean_square(one, judged) for one in wanted]
-    error = [_mean_square(a - b, judged) for a, b in zip(found, wanted, strict=True)]
+    energy = [_mean_square(one, scored) for one in wanted]
+    error = [_mean_square(a - b, scored) for a, b in zip(found, wanted, strict=True)]
     explained = [1 - e / max(t, 1e-12) for e, t in zip(error, energy, strict=True)]
     base = base_angle(estimated, truth, known & mask)
-    return Judgement(tuple(explained), tuple(energy), tuple(error), base)
+    return ReliefScore(tuple(explained), tuple(energy), tuple(error), base)
 
 
 def fine_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -116,10 +116,10 @@ def fine_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.stack([smoother[1] - smoother[0], smoother[2] - smoother[1], fine - smoother[2]])
 
 
-def judged_pixels(
+def scored_pixels(
     mask: np.ndarray, known: np.ndarray, smooth: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the pixels that are judged.
+    """Return the pixels that count.
 
     Parameters
     ----------

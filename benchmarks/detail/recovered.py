@@ -5,8 +5,8 @@
   python -m benchmarks.detail.recovered SET --rows FILE --normals DIR
 
 SET is a folder of `benchmarks.detail.sets`, the measure that of `benchmarks.detail.measure`. By
-default the pipeline that users run is judged, with its settings (`--set detail=512`);
-`--solve-size` solves SIRFS alone at another size than the shipped one. `--normals` judges the files
+default the pipeline that users run is measured, with its settings (`--set detail=512`);
+`--solve-size` solves SIRFS alone at another size than the shipped one. `--normals` scores the files
 `NAME.npy` (H, W, 3) of a folder instead. A row is stored for each body, so that an interrupted run
 continues.
 
@@ -34,7 +34,7 @@ from isc_core.errors import InputError
 from isc_core.photo import read_photo
 
 from .body_rows import body_rows
-from .measure import OCTAVES, at_size, judge
+from .measure import OCTAVES, at_size, score_relief
 from .rendering import SetKind
 from .sets import PHOTO, Truth, read_truth
 from .settings import settings_of
@@ -114,8 +114,8 @@ def stored_normals(folder: Path) -> Estimator:
     return estimate
 
 
-def judged(body: Path, estimator: Estimator) -> dict[str, Any]:
-    """Judge one body.
+def score_body(body: Path, estimator: Estimator) -> dict[str, Any]:
+    """Compare the normals that are recovered of one body with the truth.
 
     Parameters
     ----------
@@ -127,12 +127,12 @@ def judged(body: Path, estimator: Estimator) -> dict[str, Any]:
     Returns
     -------
     dict of str to Any
-        Seconds, and the figures of `measure.Judgement`.
+        Seconds, and the figures of `measure.ReliefScore`.
     """
     truth, start = read_truth(body), time.perf_counter()
     estimated = estimator(body, truth)
     seconds = time.perf_counter() - start
-    found = judge(estimated, truth.normal, truth.mask, truth.smooth)
+    found = score_relief(estimated, truth.normal, truth.mask, truth.smooth)
     figures = {name: np.asarray(one).tolist() for name, one in asdict(found).items()}
     return {"seconds": seconds, **figures}
 
@@ -143,7 +143,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     Parameters
     ----------
     rows : sequence of mapping
-        Of `body_rows`, measured by `judged`.
+        Of `body_rows`, measured by `score_body`.
 
     Returns
     -------
@@ -192,7 +192,7 @@ def main() -> None:
     add("--rows", type=Path, required=True, metavar="FILE", help="JSON lines to append to")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a setting")
     add("--solve-size", type=int, metavar="N", help="solve SIRFS alone at this size")
-    add("--normals", type=Path, metavar="DIR", help="judge stored normals")
+    add("--normals", type=Path, metavar="DIR", help="score stored normals")
     add("--kind", type=SetKind, choices=list(SetKind), help="one kind of bodies alone")
     add("--count", type=int, help="bodies of each kind")
     given = parser.parse_args()
@@ -207,7 +207,7 @@ def main() -> None:
         else:
             estimator, key = pipeline_normals(settings), str(settings)
         rows = []
-        measure = partial(judged, estimator=estimator)
+        measure = partial(score_body, estimator=estimator)
         for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
             shown = "explained" if row["body"].startswith(SetKind.RELIEF) else "error"
             print(row["body"], shown, *(f"{value:.3g}" for value in row[shown]), flush=True)

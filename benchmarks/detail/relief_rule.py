@@ -3,7 +3,7 @@
   python -m benchmarks.detail.relief_rule SET --rows FILE [--count N] [--kind KIND]
 
 SET is the validation set of `benchmarks.detail.sets`. Each body is decomposed without fine relief.
-What the whole object says, and the relief that its shading explains, judged at several shares, are
+What the whole object says, and the relief that its shading explains, scored at several shares, are
 stored in a row for each body, so that an interrupted run continues; with `--kind`, rows alone are
 made.
 
@@ -14,7 +14,7 @@ relief's energy, means over bodies in every octave.
 
 Citation: see `isc_core.shading.relief_evidence`.
 
-Limits: sixty bodies decide three numbers; others have to judge them.
+Limits: sixty bodies decide three numbers; they have to be tested on others.
 """
 
 import argparse
@@ -36,7 +36,7 @@ from isc_core.photo import read_photo
 from isc_core.shading.relief_evidence import ReliefRule, added_share
 
 from .body_rows import body_rows
-from .measure import judge
+from .measure import score_relief
 from .rendering import SetKind
 from .sets import PHOTO, read_truth
 
@@ -45,8 +45,8 @@ _RIDGE = 1.0
 _STEPS = 50
 
 
-def judged_body(body: Path) -> dict[str, Any]:
-    """Return what a whole body says of its relief, and judge what is found of it.
+def evidence_and_scores(body: Path) -> dict[str, Any]:
+    """Return the evidence for relief of a whole body, and scores of the relief that is added.
 
     Parameters
     ----------
@@ -60,12 +60,12 @@ def judged_body(body: Path) -> dict[str, Any]:
     """
     found, pyramid = _solved(body)
     evidence, relief = pyramid.evidence(), pyramid.relief(MOST_DETAIL)
-    truth, judged = read_truth(body), []
+    truth, scores = read_truth(body), []
     for share in SHARES:
         normal = shaded(found.height + share * relief, found.light, pyramid.mask)[0]
-        judged.append(judge(normal, truth.normal, truth.mask, truth.smooth))
+        scores.append(score_relief(normal, truth.normal, truth.mask, truth.smooth))
     figures = {
-        name: [np.asarray(getattr(one, name)).tolist() for one in judged]
+        name: [np.asarray(getattr(one, name)).tolist() for one in scores]
         for name in ("explained", "error", "energy")
     }
     return {"evidence": None if evidence is None else list(asdict(evidence).values()), **figures}
@@ -133,7 +133,7 @@ def figures(
     Parameters
     ----------
     rows : sequence of mapping
-        Of `judged_body`.
+        Of `evidence_and_scores`.
     probability : (n,) ndarray
         Of relief.
     is_relief : (n,) ndarray of bool
@@ -176,7 +176,9 @@ def main() -> None:
     kinds = list(SetKind) if given.kind is None else [given.kind]
     rows = []
     try:
-        for row in body_rows(given.folder, given.rows, kinds, given.count, "rule", judged_body):
+        for row in body_rows(
+            given.folder, given.rows, kinds, given.count, "rule", evidence_and_scores
+        ):
             print(row["body"], np.round(row["explained"], 2).tolist(), flush=True)
             rows.append(row)
     except InputError as error:

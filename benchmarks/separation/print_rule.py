@@ -55,7 +55,7 @@ class Regions:
 
 
 def regions_of(scene: PrintScene) -> Regions:
-    """Take light off a photo and judge the regions.
+    """Separate a photo, and describe each region that would lose light.
 
     Parameters
     ----------

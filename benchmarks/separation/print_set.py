@@ -134,7 +134,7 @@ def print_scenes(
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng([seed, glossy, *map(ord, _SEED_WORDS[part])] + [1] * (not painted))
-    found = [one for one in read_panoramas(panoramas, 0) if one.judged != (part == Part.TRAINING)]
+    found = [one for one in read_panoramas(panoramas, 0) if one.held_out != (part == Part.TRAINING)]
     rooms = [_balanced(one.radiance) for one in found]
     if part != Part.TRAINING:
         rooms = rooms[part == Part.TEST :: 2]
@@ -159,7 +159,7 @@ def _balanced(radiance: np.ndarray) -> np.ndarray:
 
 def _bodies(world: Path, part: Part) -> list[PreparedView]:
     """One view of each body of a set."""
-    split = Split.TRAIN if part == Part.TRAINING else Split.BODY
+    split = Split.TRAIN if part == Part.TRAINING else Split.UNSEEN_BODY
     found = dict[str, View]()
     for view in views_in(world, split):
         half = Part.TEST if crc32(view.name.encode()) // 8 % 2 else Part.VALIDATION

@@ -110,16 +110,18 @@ def lit_bodies(
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
-    found = read_world([world], panoramas, (Split.BODY,), 0)
+    found = read_world([world], panoramas, (Split.UNSEEN_BODY,), 0)
     shares = Shares(kinds=(1, 0, 0))
     if light is not None:
         shares = replace(shares, lights=tuple(float(kind.name == light) for kind in LightKind))
-    bodies = [one for one in found.views[Split.BODY] if half in (None, half_of(one.name))]
+    bodies = [one for one in found.views[Split.UNSEEN_BODY] if half in (None, half_of(one.name))]
     rng, made, store = np.random.default_rng(seed), list[Lit](), ViewStore(bodies)
     for k in rng.permutation(len(bodies)):
         if len(made) == count:
             break
-        draw = draw_batch(bodies, np.array([k]), 1, found.atlas, found.judged, rng, shares)
+        draw = draw_batch(
+            bodies, np.array([k]), 1, found.atlas, found.held_out_environments, rng, shares
+        )
         sample = Darkroom(found.bank, 1, side or OUTPUT)(draw, store)
         mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
         photo, ratio, normal, shading = (

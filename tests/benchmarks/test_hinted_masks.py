@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("torch", reason="needs the extra `training`")
 
-from benchmarks.decomposition.hinted_masks import KINDS, Judged, drawn_hints, report
+from benchmarks.decomposition.hinted_masks import KINDS, MaskScore, drawn_hints, report
 
 
 def test_hints_lie_on_the_thing_and_beside_it() -> None:
@@ -27,7 +27,7 @@ def test_hints_lie_on_the_thing_and_beside_it() -> None:
 
 def test_the_table_sorts_by_kind_and_by_confidence() -> None:
     found = [("box", 0.9, 0.99), ("points", 0.2, 0.3), ("points and not", 0.8, 0.6)]
-    text = report([Judged(*one) for one in found])
+    text = report([MaskScore(*one) for one in found])
     assert "| box | 1 | 0.900 | 0.900 | 100.0% (100-100) | 99.0% |" in text
     assert "| 0% to 50% | 1 | 30.0% | 0.0% (0-0) |" in text
     assert "| 50% to 80% | 1 | 60.0% | 100.0% (100-100) |" in text

@@ -1,6 +1,6 @@
 """Backgrounds of composites: crops of panoramas, tables before them, plain backdrops.
 
-Problem: what stands behind a thing in a photo is a room, a street or a wood, a table with a pattern
+Problem: behind an object in a photo is a room, a street or a wood, a table with a pattern
 before one of them, or a wall and a cloth of one colour. None is to be seen twice.
 
 Equation: a crop is the perspective picture of a camera in the panorama's middle: pixel (x, y) sees

@@ -1,13 +1,13 @@
-"""Photos of things before backgrounds, with the mask of what is meant.
+"""Photos of objects before backgrounds, with the mask of the target object.
 
-Problem: a photo shows one thing, none or several; some are in its background or cut by its frame.
-Without a hint the thing meant is the one in front; with points or a box it is what they mark.
+Problem: a photo shows one object, none or several; some are in its background or cut by its frame.
+Without a hint the target is the object in front; with points or a box it is what they mark.
 
 Equation: see `training.masks.pasting`. Then exposure, white balance, and the camera of
 `training.world.camera`.
 
-Random numbers are drawn in NumPy; all else happens in batches on one device, which nobody waits
-for: what decides about shapes is known before the numbers go there.
+Random numbers are drawn in NumPy; all else happens in batches on one device without
+synchronisation: array shapes are decided before the numbers go there.
 
 Limits: those of `training.masks.pasting` and `training.masks.backgrounds`.
 """
@@ -28,14 +28,14 @@ from .hints import HintDraws, draw_hints, hint_maps, hinted
 from .ingredients import LENGTH, SIDE
 from .packs import Ingredients
 from .pasting import CutOuts, shadows
-from .scenes import MOST, SHARES, Scenes, Things, draw_scenes
+from .scenes import MOST, SHARES, PastedObjects, Scenes, draw_scenes
 from .variation import (
     GroundVariation,
-    ThingVariation,
+    ObjectVariation,
     ground_variation,
     match,
     varied_light,
-    varied_things,
+    varied_objects,
 )
 
 _GREY = 0.04  # share of photos without colours
@@ -54,7 +54,7 @@ class Composite(TensorBatch):
     hints : (B, 3, SIDE, SIDE) tensor
         Points on the object, points on the background, the box.
     mask : (B, 1, SIDE, SIDE) tensor
-        Cover of what is meant.
+        Cover of the targets.
     count : (B,) int64 tensor
         Of `isc_core.networks.mask_network.Count`.
     """
@@ -97,20 +97,20 @@ class CompositeDraw(TensorBatch):
     Attributes
     ----------
     scenes : Scenes
-    things : Things
+    objects : PastedObjects
     grounds : Grounds
     hints : HintDraws
     cameras : Cameras
-    thing_variation, ground_variation : ThingVariation, GroundVariation or None
+    object_variation, ground_variation : ObjectVariation, GroundVariation or None
         None: as they are.
     """
 
     scenes: Scenes
-    things: Things
+    objects: PastedObjects
     grounds: Grounds
     hints: HintDraws
     cameras: Cameras
-    thing_variation: ThingVariation | None = None
+    object_variation: ObjectVariation | None = None
     ground_variation: GroundVariation | None = None
 
 
@@ -125,7 +125,7 @@ class CompositeDraws:
     hinted : float
         Share of photos with hints.
     shares : tuple of float
-        Of scenes without a thing, with one, with several.
+        Of scenes without an object, with one, with several.
     grounds : tuple of float
         Shares of plain backgrounds, and of those with a table.
     varied : bool
@@ -150,18 +150,18 @@ class CompositeDraws:
         CompositeDraw
             On the CPU.
         """
-        drawn, things = draw_scenes(rng, self.size, self.shares)
-        thing_variation, ground_varied = None, None
+        drawn, objects = draw_scenes(rng, self.size, self.shares)
+        object_variation, ground_varied = None, None
         if self.varied:
-            things, thing_variation = varied_things(things, rng)
+            objects, object_variation = varied_objects(objects, rng)
             ground_varied = ground_variation(rng, self.size)
         return CompositeDraw(
             drawn,
-            things,
+            objects,
             draw_grounds(rng, self.size, self.grounds),
             draw_hints(rng, self.size, self.hinted, MOST),
             _draw_cameras(rng, self.size),
-            thing_variation,
+            object_variation,
             ground_varied,
         )
 
@@ -227,19 +227,19 @@ class Composites:
         Composite
             On the device.
         """
-        levels = self._grouped(self._bodies.levels(drawn.things.length * self._factor))
-        layers = self._grouped(drawn.things.layer)
+        levels = self._grouped(self._bodies.levels(drawn.objects.length * self._factor))
+        layers = self._grouped(drawn.objects.layer)
         drawn = drawn.to(self._device)
         frame, light = frames(drawn.scenes.shape, self._side), self._behind(drawn)
         covers = light.new_zeros(len(light), max(len(layers), 1), *light.shape[2:])
         if layers:
-            body, cover = self._bodies.placed(drawn.things, levels, self._side)
+            body, cover = self._bodies.placed(drawn.objects, levels, self._side)
             _paste(light, covers, body, cover, drawn, layers)
-        mask, hints, count = _meant(covers * frame, frame, drawn)
+        mask, hints, count = _ground_truth(covers * frame, frame, drawn)
         return Composite(_taken(light, frame, drawn.cameras), frame, hints, mask, count)
 
     def _grouped(self, numbers: torch.Tensor) -> dict[int, torch.Tensor]:
-        """The rows of each number that occurs; which ones do, the device does not have to tell."""
+        """The rows of each number that occurs, found before the numbers go to the device."""
         found = {int(k): torch.nonzero(numbers == k)[:, 0] for k in numbers.unique()}
         return {k: rows.to(self._device) for k, rows in found.items()}
 
@@ -278,10 +278,10 @@ def _paste(
     drawn: CompositeDraw,
     layers: dict[int, torch.Tensor],
 ) -> None:
-    """Put things before backgrounds: changes the light, and what is seen of each thing (B, T)."""
-    shade, varied = shadows(cover, drawn.things), drawn.thing_variation
+    """Put objects before backgrounds: changes the light, and what is seen of each object (B, T)."""
+    shade, varied = shadows(cover, drawn.objects), drawn.object_variation
     for k, rows in layers.items():
-        photos, over, front = drawn.things.photo[rows], cover[rows], body[rows]
+        photos, over, front = drawn.objects.photo[rows], cover[rows], body[rows]
         behind = light[photos]
         if varied is not None:
             front = match(front, over, behind, varied.chosen(rows))
@@ -290,13 +290,13 @@ def _paste(
         covers[photos, k] = over[:, 0]
 
 
-def _meant(
+def _ground_truth(
     covers: torch.Tensor, frame: torch.Tensor, drawn: CompositeDraw
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Masks, hints and counts."""
-    things, given = drawn.things, drawn.hints.given
+    """Masks, hints and counts that the network is trained with."""
+    objects, given = drawn.objects, drawn.hints.given
     alone = torch.zeros(covers.shape[:2], dtype=torch.bool, device=covers.device)
-    alone[things.photo, things.layer] = things.meant
+    alone[objects.photo, objects.layer] = objects.target
     marked = hinted(covers, alone, drawn.hints)
     some = torch.where(given[:, None], marked, alone)
     mask = (covers * some[..., None, None]).sum(1, keepdim=True).clamp(max=1)

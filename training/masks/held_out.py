@@ -1,7 +1,7 @@
-"""Composites of what no network has learned from, larger than the network sees them.
+"""Composites of held-out bodies and panoramas, larger than the network sees them.
 
 Bodies and panoramas are those that every fit leaves out. They are halved: part A chooses
-thresholds, part B judges. Masked photos of real things may stand in place of the bodies.
+thresholds, part B is the test set. Masked photos of real objects can replace the bodies.
 
 Limits: bodies are traced at 160 pixels and panoramas have 512 columns: both are soft.
 """
@@ -37,7 +37,7 @@ class HeldOut:
     light : (H, W, 3) float32 ndarray
         Linear, 1 is white.
     cover : (H, W) float32 ndarray
-        Of the thing that is meant; of all, if there are several.
+        Of the target; of all objects, if there are several.
     count : Count
     """
 
@@ -70,13 +70,15 @@ def held_out_ingredients(
     """
     half, rng = PARTS.index(part), np.random.default_rng([seed, 11, PARTS.index(part)])
     torch.manual_seed(seed)
-    found = read_world([world], panoramas, (Split.BODY,), seed)
+    found = read_world([world], panoramas, (Split.UNSEEN_BODY,), seed)
     if photos is not None:
         pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
     else:
-        found.views[Split.BODY][:] = found.views[Split.BODY][half::2]
-        pictures = list(lit_bodies(found, Split.BODY, found.judged, rng, _PICTURE))
-    kept = panoramas_in(panoramas, seed, judged=True)[half::2]
+        found.views[Split.UNSEEN_BODY][:] = found.views[Split.UNSEEN_BODY][half::2]
+        pictures = list(
+            lit_bodies(found, Split.UNSEEN_BODY, found.held_out_environments, rng, _PICTURE)
+        )
+    kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
     return Ingredients(np.stack(pictures), kept, found.atlas.maps)
 
 
@@ -106,7 +108,7 @@ def held_out_composites(
     ----------
     ingredients : Ingredients
     count : Count
-        How many things each shows.
+        How many objects each shows.
     number : int
         Of photos.
     seed : int

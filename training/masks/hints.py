@@ -16,8 +16,8 @@ from isc_core.networks.mask_network import POINT
 from ..world.tensor_batch import TensorBatch
 
 _POINTS = 3  # most of one kind
-_NOTHING, _SAME = 0.06, 0.6  # shares: hints at the background; at what is meant without hints
-_VISIBLE = 40  # pixels of a thing that a hint may mean
+_NOTHING, _SAME = 0.06, 0.6  # shares: hints at the background; at the target without hints
+_VISIBLE = 40  # visible pixels that an object needs to be hinted at
 
 
 @dataclass(frozen=True)
@@ -29,9 +29,9 @@ class HintDraws(TensorBatch):
     given : (B,) bool tensor
         The photo has hints.
     nothing, same : (B,) bool tensor
-        They lie on the background; on what is meant without hints.
+        They lie on the background; on the target without hints.
     preferred : (B, MOST) tensor
-        Else on the visible thing with the largest number.
+        Else on the visible object with the largest number.
     points : (B, 2, _POINTS) tensor
         Shares of the pixels: on the object, on the background; above 1: no point.
     box : (B,) bool tensor
@@ -60,7 +60,7 @@ def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -
     share : float
         Of photos with hints.
     most : int
-        Things of a photo.
+        Objects of a photo.
 
     Returns
     -------
@@ -85,15 +85,15 @@ def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -
     )
 
 
-def hinted(covers: torch.Tensor, meant: torch.Tensor, draws: HintDraws) -> torch.Tensor:
-    """Choose the things that hints mean.
+def hinted(covers: torch.Tensor, target: torch.Tensor, draws: HintDraws) -> torch.Tensor:
+    """Choose the objects that hints select.
 
     Parameters
     ----------
     covers : (B, T, H, W) tensor
-        What is seen of each thing.
-    meant : (B, T) bool tensor
-        What is meant without hints.
+        Visible part of each object.
+    target : (B, T) bool tensor
+        Targets without hints.
     draws : HintDraws
 
     Returns
@@ -102,7 +102,7 @@ def hinted(covers: torch.Tensor, meant: torch.Tensor, draws: HintDraws) -> torch
         At most one of each photo; none: the background.
     """
     seen = (covers > 0.5).sum((2, 3)) > _VISIBLE
-    alone = meant & (meant.sum(1, keepdim=True) == 1)
+    alone = target & (target.sum(1, keepdim=True) == 1)
     preferred = draws.preferred[:, : covers.shape[1]] + 2 * (alone & draws.same[:, None])
     preferred = torch.where(seen, preferred, -1)
     best = preferred == preferred.amax(1, keepdim=True)
@@ -115,7 +115,7 @@ def hint_maps(truth: torch.Tensor, inside: torch.Tensor, draws: HintDraws) -> to
     Parameters
     ----------
     truth : (B, H, W) bool tensor
-        What is meant; empty: points lie on the background.
+        The target; empty: points lie on the background.
     inside : (B, H, W) bool tensor
         The frame.
     draws : HintDraws

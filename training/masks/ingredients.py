@@ -2,7 +2,7 @@
 
   python -m training.masks.ingredients WORLD --panoramas DIR -o FOLDER
 
-Problem: the mask network sees millions of photos of things before other things. Lighting a body
+Problem: the mask network sees millions of photos of objects before other objects. Lighting a body
 takes as long as a step of the network, pasting it a hundredth of that: bodies are lit once and
 pasted many times, each time elsewhere, in another size, before another background.
 
@@ -39,7 +39,7 @@ LENGTH = 120  # longer side of a body in it
 _LIT = 8  # views lit together
 _WHITE = 0.99  # share of a body's pixels that are darker than white
 _LEAST_COVER = 0.02  # of a picture: smaller bodies are left out
-SETS = ("learned", "judged")
+SETS = ("learned", "judged")  # for training, and held out
 ROWS = 256  # of panoramas
 _BRIGHTEST = 6e4  # that half floats hold
 _FILES = (".exr", ".hdr")
@@ -117,16 +117,16 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Itera
         yield (255 * coded).round().clamp(0, 255).byte().numpy()
 
 
-def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
+def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
     """Read panoramas at one size, with the split of `read_panoramas`.
 
     Parameters
     ----------
     folder : Path
     seed : int
-        Chooses which are judged.
-    judged : bool
-        Read those, or else the others.
+        Chooses which are held out.
+    held_out : bool
+        Whether to read those, or the others.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
     InputError
         If there is none of the set, or one cannot be used.
     """
-    wanted = {one.name for one in read_panoramas(folder, seed) if one.judged == judged}
+    wanted = {one.name for one in read_panoramas(folder, seed) if one.held_out == held_out}
     size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() in _FILES and path.stem in wanted:
@@ -146,7 +146,7 @@ def panoramas_in(folder: Path, seed: int, judged: bool) -> np.ndarray:
             light = functional.interpolate(light, size, mode="bilinear", antialias=True)[0]
             found.append(light.clamp(max=_BRIGHTEST).permute(1, 2, 0).numpy().astype(np.float16))
     if not found:
-        raise InputError(f"{folder} has too few panoramas to keep one for judging: six are enough")
+        raise InputError(f"{folder} has too few panoramas to hold one out: six are enough")
     return np.stack(found)
 
 
@@ -164,17 +164,20 @@ def main() -> None:
     add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="where to write")
     given = parser.parse_args()
     try:
-        world = read_world([given.world], given.panoramas, (Split.TRAIN, Split.BODY), given.seed)
+        world = read_world(
+            [given.world], given.panoramas, (Split.TRAIN, Split.UNSEEN_BODY), given.seed
+        )
         panoramas = [panoramas_in(given.panoramas, given.seed, k == 1) for k in range(2)]
     except InputError as error:
         parser.error(str(error))
     given.output.mkdir(parents=True, exist_ok=True)
     torch.manual_seed(given.seed)
-    splits = zip(SETS, (Split.TRAIN, Split.BODY), (world.learned, world.judged), strict=True)
-    for k, (name, split, environments) in enumerate(splits):
+    environments = (world.training_environments, world.held_out_environments)
+    splits = zip(SETS, (Split.TRAIN, Split.UNSEEN_BODY), environments, strict=True)
+    for k, (name, split, usable) in enumerate(splits):
         rounds = range(given.first, given.first + given.rounds)
         bodies = [
-            lit_bodies(world, split, environments, np.random.default_rng([given.seed, k, n]))
+            lit_bodies(world, split, usable, np.random.default_rng([given.seed, k, n]))
             for n in rounds
         ]
         made = Ingredients(np.concatenate(bodies), panoramas[k], world.atlas.maps[:_PATTERNS])

@@ -1,15 +1,15 @@
-"""Fit how sure a mask network may be, on composites that it has not seen.
+"""Calibrate the confidence of a mask network on held-out composites.
 
   python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
-Equation: logistic regression of "the photo shows one thing, and the mask overlaps it by .5 or
+Equation: logistic regression of "the photo shows one object, and the mask overlaps it by .5 or
 more" on `isc_core.masking.evidence`, with a small ridge. Photos are those of part A of
-`training.masks.held_out`; part B judges. A table of thresholds follows.
+`training.masks.held_out`; part B is the test set. A table of thresholds follows.
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
 regularized likelihood methods", 1999.
 
-Limits: as many photos of one thing as of none and several together.
+Limits: as many photos of one object as of none and several together.
 """
 
 import argparse
@@ -67,7 +67,7 @@ def observed(
     evidence : (N, EVIDENCE) ndarray
     right : (N,) bool ndarray
     whole : (N,) bool ndarray
-        False where the mask shows nothing or several things: it is refused, however sure.
+        False where the mask shows nothing or several objects: it is refused at any confidence.
     """
     rows, right, whole = [], [], []
     for photo in photos:
@@ -108,13 +108,14 @@ def main() -> None:
     evidence, right, whole = observed(photos, network)
     weights = logistic_weights(evidence, right)
     print("weights", np.round(weights, 3), "right", right.mean())
-    sure, one = 1 / (1 + np.exp(-evidence @ weights)), np.array([p.count for p in photos]) == 1
+    confidence = 1 / (1 + np.exp(-evidence @ weights))
+    one = np.array([photo.count for photo in photos]) == Count.ONE
     for limit in _THRESHOLDS:
-        used = whole & (sure >= limit)
+        used = whole & (confidence >= limit)
         print(
-            f"{limit:.2f}: refuses {(~used)[one].mean():.1%} of single things, "
+            f"{limit:.2f}: refuses {(~used)[one].mean():.1%} of single objects, "
             f"{(~used)[right].mean():.1%} of right masks; accepts {used[~one].mean():.1%} without "
-            "a single thing"
+            "a single object"
         )
     with new_file(given.output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **{**arrays, "sureness": weights.astype(np.float32)})

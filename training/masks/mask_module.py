@@ -3,8 +3,8 @@
 Equation: with the log odds o of a pixel, p = 1 / (1 + exp(-o)) and the true cover a,
 
     mean of -a log p - (1 - a) log(1 - p), counted more near the outline
-    + 1 - sum (2 a p) / sum (a + p)                                   (where there is a thing)
-    + .3 (cross entropy of the number of things)
+    + 1 - sum (2 a p) / sum (a + p)                                   (where there is an object)
+    + .3 (cross entropy of the number of objects)
 
 Citation: overlap as a loss: F. Milletari, N. Navab, S.-A. Ahmadi, "V-Net", 3DV 2016,
 doi:10.1109/3DV.2016.79.
@@ -49,7 +49,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Predict the mask and the number of things.
+        """Predict the mask and the number of objects.
 
         Parameters
         ----------
@@ -78,7 +78,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         -------
         loss : () tensor
         terms : dict of str to tensor
-            Not weighted; "iou" is the mean of things' overlap, "right" the share of right counts.
+            Not weighted; "iou" is the mean of objects' overlap, "right" the share of right counts.
         """
         odds, counts = self(network_channels(batch))
         truth, frame = batch.mask, batch.frame
@@ -87,11 +87,11 @@ class MaskNetworkModule(EncoderDecoderModule):
         entropy = functional.binary_cross_entropy_with_logits(odds, truth, reduction="none")
         entropy = ((entropy * weight).sum((1, 2, 3)) / weight.sum((1, 2, 3))).mean()
         cover = torch.sigmoid(odds) * frame
-        thing = (truth.sum((1, 2, 3)) > 0).float()
+        shown = (truth.sum((1, 2, 3)) > 0).float()
         both = (2 * cover * truth).sum((1, 2, 3))
         overlap = both / (cover + truth).sum((1, 2, 3)).clamp(min=1)
         count = functional.cross_entropy(counts, batch.count)
-        total = entropy + _OVERLAP * ((1 - overlap) * thing).mean() + _COUNT * count
+        total = entropy + _OVERLAP * ((1 - overlap) * shown).mean() + _COUNT * count
         with torch.no_grad():
             found, true = (cover > 0.5).float(), (truth > 0.5).float()
             iou = (found * true).sum((1, 2, 3)) / (found + true).clamp(max=1).sum((1, 2, 3)).clamp(
@@ -100,7 +100,7 @@ class MaskNetworkModule(EncoderDecoderModule):
             right = (counts.argmax(1) == batch.count).float().mean()
         terms = {
             "entropy": entropy,
-            "iou": (iou * thing).sum() / thing.sum().clamp(min=1),
+            "iou": (iou * shown).sum() / shown.sum().clamp(min=1),
             "count": count,
             "right": right,
         }

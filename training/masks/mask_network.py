@@ -2,18 +2,18 @@
 
   python -m training.masks.mask_network FOLDER ... [--weights NPZ] [--minutes N] -o MASK.npz
 
-FOLDER holds the ingredients that `python -m training.masks.ingredients` writes; bodies are those of
-all folders. Photos are composed
-while the network learns (`training.masks.composites`), and none is used twice. `--weights` starts
-from an archive that an earlier run wrote, `--resume` continues an interrupted one; without either,
-the levels down start as the shipped scene network's. `--side 64` sees photos smaller, which is half
-of the work. Held-out bodies before held-out panoramas are measured every thousand steps.
+FOLDER has the ingredients that `python -m training.masks.ingredients` writes; bodies are those of
+all folders. Photos are composed during training (`training.masks.composites`), and none is used
+twice. `--weights` starts from an archive that an earlier run wrote, `--resume` continues an
+interrupted one; without either, the encoder starts with the weights of the shipped scene network.
+`--side 64` makes photos smaller, which is half of the work. The loss on held-out bodies and
+panoramas is measured every thousand steps.
 
 Equation: see `training.masks.mask_module`.
 
 Citation: see `training.loop`.
 
-Limits: sureness is calibrated afterwards, by `training.masks.mask_calibration`.
+Limits: the confidence is calibrated afterwards, by `training.masks.mask_calibration`.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def main() -> None:
     torch.manual_seed(options.seed)
     network = MaskNetworkModule()
     try:
-        learned, judged = (
+        training, held_out = (
             Ingredients.read([folder / f"{name}{SUFFIX}" for folder in arguments.folders])
             for name in SETS
         )
@@ -61,10 +61,10 @@ def main() -> None:
     except InputError as error:
         parser.error(str(error))
     draw = CompositeDraws(options.batch, arguments.hinted, varied=True)
-    compose = Composites(learned, draw, arguments.side, options.device)
-    held_out = Composites(judged, CompositeDraws(options.batch), arguments.side, options.device)
+    compose = Composites(training, draw, arguments.side, options.device)
+    measured = Composites(held_out, CompositeDraws(options.batch), arguments.side, options.device)
     schedule = replace(SCHEDULE, rate=arguments.rate)
-    fit(network, draw, schedule, options, held_out, compose.finished)
+    fit(network, draw, schedule, options, measured, compose.finished)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from torch.nn import functional
 
 from ..world.camera import decoded_srgb
 from ..world.tensor_batch import chosen
-from .scenes import Things
+from .scenes import PastedObjects
 
 _HALVED = (0.62, 0.31)  # bodies smaller than that are taken from pictures of half the size
 _COARSE = 2  # pixels of a pixel of shadow
@@ -39,12 +39,12 @@ class CutOuts:
 
     @staticmethod
     def levels(lengths: torch.Tensor) -> torch.Tensor:
-        """Choose the sizes of the pictures that things are taken from.
+        """Choose the sizes of the pictures that objects are taken from.
 
         Parameters
         ----------
         lengths : (N,) tensor
-            Of the things relative to those in the largest pictures.
+            Of the objects relative to those in the largest pictures.
 
         Returns
         -------
@@ -54,15 +54,15 @@ class CutOuts:
         return (lengths[:, None] < torch.tensor(_HALVED)).sum(1)
 
     def placed(
-        self, things: Things, levels: dict[int, torch.Tensor], side: int
+        self, objects: PastedObjects, levels: dict[int, torch.Tensor], side: int
     ) -> tuple[torch.Tensor, torch.Tensor]:
-        """Show things where they stand.
+        """Show objects where they stand.
 
         Parameters
         ----------
-        things : Things
+        objects : PastedObjects
         levels : dict of int to (n,) int64 tensor
-            The things of each level, see `levels`; all on the device.
+            The objects of each level, see `levels`; all on the device.
         side : int
             Of the frame, pixels.
 
@@ -72,20 +72,20 @@ class CutOuts:
             Light times cover.
         cover : (N, 1, side, side) tensor
         """
-        theta, index = things.to_body, chosen(things.body, len(self._sizes[0]))
-        found = theta.new_empty(len(things), 4, side, side)
+        theta, index = objects.to_body, chosen(objects.body, len(self._sizes[0]))
+        found = theta.new_empty(len(objects), 4, side, side)
         for level, rows in levels.items():
             coded = self._sizes[level][index[rows]]
             cover = coded[:, 3:].float() / 255
             shown = torch.arange(len(rows), device=rows.device)[:, None]
-            colours = coded[shown, things.channels[rows]]
+            colours = coded[shown, objects.channels[rows]]
             layers = torch.cat([self._linear[colours.long()] * cover, cover], dim=1)
             size = [len(rows), 4, side, side]
             grid = functional.affine_grid(theta[rows], size, align_corners=False)
             found[rows] = functional.grid_sample(layers, grid, align_corners=False)
         cover = found[:, 3:]
         mean = found[:, :3].mean((1, 2, 3)) / cover.mean((1, 2, 3)).clamp(min=1e-4)
-        gain = things.gain / mean.clamp(min=0.02)[:, None]
+        gain = objects.gain / mean.clamp(min=0.02)[:, None]
         return found[:, :3] * gain[..., None, None], cover
 
 
@@ -97,13 +97,13 @@ def _halved(bodies: torch.Tensor) -> torch.Tensor:
     return torch.cat([colours / cover.clamp(min=1), cover], dim=1).round().byte()
 
 
-def shadows(cover: torch.Tensor, things: Things) -> torch.Tensor:
-    """Cast the shadows of things.
+def shadows(cover: torch.Tensor, objects: PastedObjects) -> torch.Tensor:
+    """Cast the shadows of objects.
 
     Parameters
     ----------
     cover : (N, 1, side, side) tensor
-    things : Things
+    objects : PastedObjects
 
     Returns
     -------
@@ -111,24 +111,24 @@ def shadows(cover: torch.Tensor, things: Things) -> torch.Tensor:
         Share of the light that is lost.
     """
     full, cover = cover.shape[-1], functional.avg_pool2d(cover, _COARSE)
-    side, number = full // _COARSE, len(things)
+    side, number = full // _COARSE, len(objects)
     across = (torch.arange(side, device=cover.device) + 0.5) * (2 / side) - 1
     low = torch.where(cover.amax(3)[:, 0] > 0.5, across, -1.0).amax(1)
     grid = functional.affine_grid(
-        _to_casting(things, low), [2 * number, 1, side, side], align_corners=False
+        _to_casting(objects, low), [2 * number, 1, side, side], align_corners=False
     )
     maps = functional.grid_sample(cover.repeat(2, 1, 1, 1), grid, align_corners=False)
-    maps = _blurred(maps, things.blur.repeat(2)[:, None, None, None])
-    maps = maps.view(2, number, 1, side, side) * things.strength.T[..., None, None, None]
+    maps = _blurred(maps, objects.blur.repeat(2)[:, None, None, None])
+    maps = maps.view(2, number, 1, side, side) * objects.strength.T[..., None, None, None]
     return functional.interpolate(maps.amax(0), (full, full), mode="bilinear", align_corners=False)
 
 
-def _to_casting(things: Things, low: torch.Tensor) -> torch.Tensor:
+def _to_casting(objects: PastedObjects, low: torch.Tensor) -> torch.Tensor:
     """The affine maps (2 N, 2, 3) from shadows, cast and touching, to what casts them."""
-    (lean, fall), one, none = things.shear.T, torch.ones_like(low), torch.zeros_like(low)
+    (lean, fall), one, none = objects.shear.T, torch.ones_like(low), torch.zeros_like(low)
     # height over the lowest row: h = (y - low) / fall
     cast = [one, -lean / fall, lean / fall * low, none, -1 / fall, low * (1 + 1 / fall)]
-    touching = [one, none, -things.touch[:, 0], none, one, -things.touch[:, 1]]
+    touching = [one, none, -objects.touch[:, 0], none, one, -objects.touch[:, 1]]
     return torch.cat([torch.stack(part, 1).view(-1, 2, 3) for part in (cast, touching)])
 
 

@@ -1,6 +1,6 @@
-"""What stands where in composites, drawn for a whole batch at once.
+"""The layout of composites, drawn for a whole batch at once.
 
-Limits: a scene of one thing has others only in its background or cut by its frame; they are at
+Limits: a scene of one object has others only in its background or cut by its frame; they are at
 most half as long.
 """
 
@@ -15,13 +15,13 @@ from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
 from .ingredients import LENGTH, SIDE
 
-SHARES = (0.17, 0.58, 0.25)  # of scenes without a thing, with one, with several
-MOST = 8  # things of a scene
-_TINY = 0.2  # of the frame: things half as long may stand where there is none to be found
-_HEAPS = 0.35  # of scenes with several
-_AROUND = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes of 0 to 4 things besides
+SHARES = (0.17, 0.58, 0.25)  # of scenes without an object, with one, with several
+MOST = 8  # objects of a scene
+_TINY = 0.2  # of the frame: objects of scenes without a target are at most half as long
+_PILES = 0.35  # of scenes with several
+_AROUND = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes of 0 to 4 objects besides
 _SHAPES = np.array([(1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625)])
-_ROWS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns and rows of things in order
+_ROWS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns and rows of objects in order
 
 
 @dataclass(frozen=True)
@@ -44,15 +44,15 @@ class Scenes(TensorBatch):
 
 
 @dataclass(frozen=True)
-class Things(TensorBatch):
-    """The bodies of a batch: photo by photo, from the back to the front.
+class PastedObjects(TensorBatch):
+    """The pasted objects of a batch: photo by photo, from the back to the front.
 
     Attributes
     ----------
     photo, layer : (N,) int64 tensor
-        In which photo a thing stands, and how many things stand behind it.
-    meant : (N,) bool tensor
-        A mask without hints covers it.
+        Number of the photo, and number of objects behind this one in it.
+    target : (N,) bool tensor
+        Whether the mask without hints covers it.
     body : (N,) tensor
         Which it is, as a share of all bodies, in [0, 1).
     length : (N,) tensor
@@ -81,7 +81,7 @@ class Things(TensorBatch):
 
     photo: torch.Tensor
     layer: torch.Tensor
-    meant: torch.Tensor
+    target: torch.Tensor
     body: torch.Tensor
     length: torch.Tensor
     angle: torch.Tensor
@@ -107,17 +107,17 @@ class Things(TensorBatch):
 
 @dataclass(frozen=True)
 class _Places:
-    """Up to MOST things of each photo: (B, MOST) arrays; `place` has an axis more."""
+    """Up to MOST objects of each photo: (B, MOST) arrays; `place` has an axis more."""
 
     size: np.ndarray
     place: np.ndarray
     present: np.ndarray
-    meant: np.ndarray
+    target: np.ndarray
 
 
 def draw_scenes(
     rng: np.random.Generator, number: int, shares: tuple[float, ...] = SHARES
-) -> tuple[Scenes, Things]:
+) -> tuple[Scenes, PastedObjects]:
     """Draw scenes.
 
     Parameters
@@ -126,12 +126,12 @@ def draw_scenes(
     number : int
         Of photos.
     shares : tuple of float
-        Of scenes without a thing, with one, with several.
+        Of scenes without an object, with one, with several.
 
     Returns
     -------
     scenes : Scenes
-    things : Things
+    objects : PastedObjects
         On the CPU.
     """
     shape = _SHAPES[rng.integers(len(_SHAPES), size=number)]
@@ -146,17 +146,17 @@ def draw_scenes(
         which = crowded[photo, 0].reshape(-1, *[1] * (one.ndim - 1))
         return np.where(which, other, one)
 
-    things = _things(rng, chosen("size"), level[photo])
-    things |= {"photo": photo, "layer": layer}
-    things |= {"meant": chosen("meant"), "place": chosen("place")}
+    objects = _objects(rng, chosen("size"), level[photo])
+    objects |= {"photo": photo, "layer": layer}
+    objects |= {"target": chosen("target"), "place": chosen("place")}
     scenes = {"shape": shape, "level": level, "count": count}
-    return Scenes.of(scenes), Things.of(things)
+    return Scenes.of(scenes), PastedObjects.of(objects)
 
 
-def _things(
+def _objects(
     rng: np.random.Generator, length: np.ndarray, level: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """All that does not depend on where things stand."""
+    """All that does not depend on where objects stand."""
     number = len(length)
     upright = rng.random(number) < 0.7
     brightness = level * np.exp(rng.normal(0.1, 0.6, number))
@@ -179,7 +179,7 @@ def _things(
 
 
 def _around(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> _Places:
-    """Things of the background, and such as the frame cuts; before them one, where it is single."""
+    """Objects in the background or cut by the frame; in front of them the target, if it is one."""
     number, short = len(shape), SIDE * shape.min(axis=1)
     length = np.minimum(SIDE * log_uniforms(rng, 0.27, 0.95, number), 1.1 * short)
     shown = np.where(single, length, _TINY * SIDE)[:, None]
@@ -201,12 +201,12 @@ def _around(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> 
     size[rows, others[rows]] = length[rows]
     place[rows, others[rows]] = _middle(rng, shape, length)[rows]
     slots = np.arange(MOST)
-    meant = single[:, None] & (slots == others[:, None])
-    return _Places(size, place, meant | (slots < others[:, None]), meant)
+    target = single[:, None] & (slots == others[:, None])
+    return _Places(size, place, target | (slots < others[:, None]), target)
 
 
 def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Places of the things that are meant: somewhere near the middle, seldom cut by the frame."""
+    """Places of the targets: somewhere near the middle, seldom cut by the frame."""
     part = (length / SIDE)[:, None]
     place = np.maximum(shape - part, 0) * rng.normal(0, 0.4, shape.shape).clip(-1, 1)
     cut = rng.random((len(shape), 1)) < 0.15
@@ -214,16 +214,16 @@ def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> 
 
 
 def _several(rng: np.random.Generator, shape: np.ndarray) -> _Places:
-    """Things of similar size side by side, or a heap of them."""
+    """Objects of similar size side by side, or in a pile."""
     number, slots = len(shape), np.arange(MOST)
-    heap = rng.random(number) < _HEAPS
+    pile = rng.random(number) < _PILES
     spread = rng.uniform(0.4, 1, (number, 1, 1))
-    heaped = shape[:, None] * spread * rng.uniform(-1, 1, (number, MOST, 2))
+    piled = shape[:, None] * spread * rng.uniform(-1, 1, (number, MOST, 2))
     grid = _ROWS[rng.integers(len(_ROWS), size=number)]
     grid = np.where(shape[:, :1] < shape[:, 1:], grid[:, ::-1], grid)
     cell = 2 * shape / grid
     length = np.where(
-        heap,
+        pile,
         SIDE * shape.min(axis=1) * log_uniforms(rng, 0.3, 0.7, number),
         SIDE / 2 * cell.min(axis=1) * rng.uniform(0.5, 0.95, number),
     )
@@ -231,7 +231,7 @@ def _several(rng: np.random.Generator, shape: np.ndarray) -> _Places:
     column, row = slots % grid[:, :1], slots // grid[:, :1]
     ordered = (np.stack([column, row], axis=-1) + 0.5) * cell[:, None] - shape[:, None]
     ordered = ordered + free * rng.uniform(-1, 1, (number, MOST, 2))
-    count = np.where(heap, rng.integers(5, MOST + 1, number), grid.prod(axis=1))
+    count = np.where(pile, rng.integers(5, MOST + 1, number), grid.prod(axis=1))
     present = slots < count[:, None]
     size = length[:, None] * rng.uniform(0.7, 1.05, (number, MOST))
-    return _Places(size, np.where(heap[:, None, None], heaped, ordered), present, present)
+    return _Places(size, np.where(pile[:, None, None], piled, ordered), present, present)

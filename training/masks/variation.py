@@ -1,13 +1,13 @@
-"""More things and backgrounds than there are bodies and panoramas, and harder ones.
+"""More objects and backgrounds than there are bodies and panoramas, and harder ones.
 
 Problem: a fit sees each of some thousand bodies a hundred times, and learns them by heart. Bodies
 of the colour of what is behind them, thin bodies, and edges of the background that touch a body are
 what masks fail at, and are rare where everything is drawn evenly.
 
 Equation: a body is stretched along its own axes by factors s and 1 / s, log s ~ N(0, .15); three
-things and backgrounds in ten have their colour channels exchanged. The light I of half of the
+objects and backgrounds in ten have their colour channels exchanged. The light I of half of the
 backgrounds becomes m (I / m)^g for their mean m, log g ~ N(0, .25). A body is the one at share
-u^1.5 of all bodies in the order of their cover, u uniform. A quarter of the things get the mean
+u^1.5 of all bodies in the order of their cover, u uniform. A quarter of the objects get the mean
 colour of what they cover, times exp(n), n ~ N(0, .2). One background in three is another one beyond
 one or two lines.
 
@@ -21,7 +21,7 @@ import torch
 
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
-from .scenes import Things
+from .scenes import PastedObjects
 
 _STRETCH, _POWER, _THIN = 0.15, 0.25, 1.5
 _EXCHANGED, _CONTRASTED, _MATCHED, _PARTED, _CORNERS = 0.3, 0.5, 0.25, 0.35, 0.5
@@ -30,8 +30,8 @@ _LEAST = 1e-4
 
 
 @dataclass(frozen=True)
-class ThingVariation(TensorBatch):
-    """How things get the colour of what they cover.
+class ObjectVariation(TensorBatch):
+    """How objects get the colour of what they cover.
 
     Attributes
     ----------
@@ -72,31 +72,33 @@ class GroundVariation(TensorBatch):
     gain: torch.Tensor
 
 
-def varied_things(things: Things, rng: np.random.Generator) -> tuple[Things, ThingVariation]:
-    """Draw how things are varied.
+def varied_objects(
+    objects: PastedObjects, rng: np.random.Generator
+) -> tuple[PastedObjects, ObjectVariation]:
+    """Draw how objects are varied.
 
     Parameters
     ----------
-    things : Things
+    objects : PastedObjects
     rng : numpy.random.Generator
 
     Returns
     -------
-    things : Things
+    objects : PastedObjects
         Other bodies, stretched, in other colours.
-    variation : ThingVariation
+    variation : ObjectVariation
     """
-    number = len(things)
+    number = len(objects)
     stretch = np.exp(rng.normal(0, _STRETCH, number))
     noise = rng.normal(0, _MATCH, (number, 1)) + rng.normal(0, _MATCH / 3, (number, 3))
     matched = rng.random(number) < _MATCHED
-    things = replace(
-        things,
-        body=things.body**_THIN,
+    objects = replace(
+        objects,
+        body=objects.body**_THIN,
         stretch=torch.from_numpy(stretch).float(),
         channels=torch.from_numpy(_channels(rng, number)),
     )
-    return things, ThingVariation.of({"matched": matched, "noise": noise})
+    return objects, ObjectVariation.of({"matched": matched, "noise": noise})
 
 
 def ground_variation(rng: np.random.Generator, number: int) -> GroundVariation:
@@ -166,9 +168,9 @@ def _parted(light: torch.Tensor, drawn: GroundVariation) -> torch.Tensor:
 
 
 def match(
-    body: torch.Tensor, cover: torch.Tensor, light: torch.Tensor, drawn: ThingVariation
+    body: torch.Tensor, cover: torch.Tensor, light: torch.Tensor, drawn: ObjectVariation
 ) -> torch.Tensor:
-    """Give some things the mean colour of what they cover.
+    """Give some objects the mean colour of what they cover.
 
     Parameters
     ----------
@@ -177,7 +179,7 @@ def match(
     cover : (N, 1, H, W) tensor
     light : (N, 3, H, W) tensor
         What is behind.
-    drawn : ThingVariation
+    drawn : ObjectVariation
 
     Returns
     -------

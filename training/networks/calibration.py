@@ -124,12 +124,18 @@ def main() -> None:
     given = parser.parse_args()
     try:
         arrays = dict(read_arrays(given.weights))
-        world = read_world(given.worlds, given.panoramas, (Split.BODY,), given.seed)
+        world = read_world(given.worlds, given.panoramas, (Split.UNSEEN_BODY,), given.seed)
     except InputError as error:
         parser.error(str(error))
     network = SceneNetworkModule.of(arrays)
     draw = SceneBatches(
-        SceneDraws(world.views[Split.BODY], world.atlas, world.judged, _SIZE, Shares()),
+        SceneDraws(
+            world.views[Split.UNSEEN_BODY],
+            world.atlas,
+            world.held_out_environments,
+            _SIZE,
+            Shares(),
+        ),
         world.bank,
     )
     rng = np.random.default_rng([given.seed, 5])

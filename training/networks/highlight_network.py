@@ -96,14 +96,16 @@ def main() -> None:
     draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,
-        world.learned,
+        world.training_environments,
         options.batch,
         SHARES,
         photos=_PHOTOS,
     )
-    judged = replace(draw, views=world.views[Split.BODY], environments=world.judged)
+    held_out = replace(
+        draw, views=world.views[Split.UNSEEN_BODY], environments=world.held_out_environments
+    )
     schedule = replace(SCHEDULE, rate=arguments.rate)
-    fit_to_photos(network, draw, judged, world.bank, arguments.side, schedule, options, varied)
+    fit_to_photos(network, draw, held_out, world.bank, arguments.side, schedule, options, varied)
 
 
 if __name__ == "__main__":

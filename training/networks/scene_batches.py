@@ -163,15 +163,15 @@ class World:
         Ordered by size.
     atlas : Atlas
     bank : Bank
-    learned, judged : (N,) ndarray of int
-        Surroundings to learn from, and panoramas that are kept for judging.
+    training_environments, held_out_environments : (N,) ndarray of int
+        Of the bank; those of training in the frequency in which they are drawn.
     """
 
     views: dict[Split, list[PreparedView]]
     atlas: Atlas
     bank: Bank
-    learned: np.ndarray
-    judged: np.ndarray
+    training_environments: np.ndarray
+    held_out_environments: np.ndarray
 
 
 def read_world(
@@ -212,10 +212,10 @@ def read_world(
     ]
     atlas = packs[0].atlas if packs else read_patterns(folders[0])
     bank = bank_of([*(one.radiance for one in found), *invented], atlas)
-    judged = np.array([one.judged for one in found] + [False] * len(invented))
-    photographed = np.flatnonzero(~judged[: len(found)])
-    learned = np.concatenate([np.flatnonzero(~judged), np.repeat(photographed, _OFTEN)])
-    return World(views, atlas, bank, learned, np.flatnonzero(judged))
+    held_out = np.array([one.held_out for one in found] + [False] * len(invented))
+    photographed = np.flatnonzero(~held_out[: len(found)])
+    training = np.concatenate([np.flatnonzero(~held_out), np.repeat(photographed, _OFTEN)])
+    return World(views, atlas, bank, training, np.flatnonzero(held_out))
 
 
 def _prepared_views(
@@ -272,14 +272,14 @@ def read_given(
     """
     given: Path | None = arguments.weights
     weights = None if given is None else dict(read_arrays(given))
-    splits = (Split.TRAIN, Split.BODY)
+    splits = (Split.TRAIN, Split.UNSEEN_BODY)
     return read_world(arguments.worlds, arguments.panoramas, splits, seed), weights
 
 
 def fit_to_photos(
     network: Net,
     draw: SceneDraws,
-    judged: SceneDraws,
+    held_out: SceneDraws,
     bank: Bank,
     side: int,
     schedule: Schedule,
@@ -292,8 +292,8 @@ def fit_to_photos(
     ----------
     network : nn.Module
         A `training.loop.Trainable`, changed in place.
-    draw, judged : SceneDraws
-        What is learned from, and what is measured.
+    draw, held_out : SceneDraws
+        Of the photos of training, and of those on which the loss is measured.
     bank : Bank
         On the CPU.
     side : int
@@ -306,5 +306,5 @@ def fit_to_photos(
     if options.device != "cpu":
         draw = replace(draw, every=_GPU_EVERY)
     made = SceneBatches(draw, bank, side, alter, options.device)
-    held_out = SceneBatches(judged, bank, side, alter, options.device)
-    fit(network, draw, schedule, options, held_out, made.finished)
+    measured = SceneBatches(held_out, bank, side, alter, options.device)
+    fit(network, draw, schedule, options, measured, made.finished)

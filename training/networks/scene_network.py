@@ -68,13 +68,15 @@ def main() -> None:
     draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,
-        world.learned,
+        world.training_environments,
         options.batch,
         shares,
         "camera" in arguments.without,
     )
-    judged = replace(draw, views=world.views[Split.BODY], environments=world.judged)
-    fit_to_photos(network, draw, judged, world.bank, arguments.side, schedule, options)
+    held_out = replace(
+        draw, views=world.views[Split.UNSEEN_BODY], environments=world.held_out_environments
+    )
+    fit_to_photos(network, draw, held_out, world.bank, arguments.side, schedule, options)
 
 
 if __name__ == "__main__":

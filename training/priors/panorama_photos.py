@@ -68,7 +68,7 @@ def read_pictures(folder: Path, seed: int) -> list[tuple[Panorama, np.ndarray]]:
     ----------
     folder : Path
     seed : int
-        Of `read_panoramas`, which says what is judged.
+        Of `read_panoramas`, which says which are held out.
 
     Returns
     -------

@@ -38,7 +38,7 @@ from isc_core.shading.environment_map import (
 
 ROWS = 32
 FILES = (".exr", ".hdr")
-JUDGED_OF = 6  # one panorama of so many is kept from learning
+HELD_OUT_OF = 6  # one panorama of so many is held out
 _SAMPLES = 4  # a pixel's side, for rotation and lobes
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _LEAST_SHADING = 1e-3  # of the brightest: where no light comes from, the logarithm has no value
@@ -54,27 +54,27 @@ class Panorama:
         Of its file, without the suffix.
     radiance : (ROWS, 2 ROWS, 3) ndarray
         Linear, float32, >= 0, as bright as the file says.
-    judged : bool
-        Kept for judging: nothing learns from it.
+    held_out : bool
+        Whether it is left out of every fit.
     """
 
     name: str
     radiance: np.ndarray
-    judged: bool
+    held_out: bool
 
 
 def read_panoramas(folder: Path, seed: int) -> list[Panorama]:
     """Read all latitude-longitude images of a folder and split them.
 
-    One of six in the order of names is judged. If possible, it is one without others of the same
-    place (the same name but for a number): light that a network has seen judges nothing.
+    One of six in the order of names is held out. If possible, it is one without others of the same
+    place (the same name but for a number), whose light a network would have seen in training.
 
     Parameters
     ----------
     folder : Path
         With .exr or .hdr files, twice as wide as high.
     seed : int
-        Chooses which are judged.
+        Chooses which are held out.
 
     Returns
     -------
@@ -95,8 +95,8 @@ def read_panoramas(folder: Path, seed: int) -> list[Panorama]:
         raise InputError(
             f"{folder} has no {' or '.join(FILES)} file: give a folder of latitude-longitude images"
         )
-    judged = _judged([path.stem for path in files], np.random.default_rng(seed))
-    return [Panorama(path.stem, _read(path), path.stem in judged) for path in files]
+    held_out = _held_out([path.stem for path in files], np.random.default_rng(seed))
+    return [Panorama(path.stem, _read(path), path.stem in held_out) for path in files]
 
 
 def smoothed_levels(environment: np.ndarray, widths: tuple[float, ...]) -> np.ndarray:
@@ -173,16 +173,16 @@ def _lobe(cosine: np.ndarray, width: float) -> np.ndarray:
     return np.clip(cosine, 0, None) / (half * (width * width - 1) + 1) ** 2
 
 
-def _judged(names: list[str], rng: np.random.Generator) -> set[str]:
+def _held_out(names: list[str], rng: np.random.Generator) -> set[str]:
     """One name of each six in order, rather one whose place occurs once."""
     places = [re.sub(r"[\d_-]+$", "", name) for name in names]
-    judged = set()
-    for _, group in groupby(range(len(names)), key=lambda k: k // JUDGED_OF):
+    held_out = set()
+    for _, group in groupby(range(len(names)), key=lambda k: k // HELD_OUT_OF):
         six = list(group)
-        if len(six) == JUDGED_OF:
+        if len(six) == HELD_OUT_OF:
             alone = [k for k in six if places.count(places[k]) == 1]
-            judged.add(names[int(rng.choice(alone or six))])
-    return judged
+            held_out.add(names[int(rng.choice(alone or six))])
+    return held_out
 
 
 def _read(path: Path) -> np.ndarray:

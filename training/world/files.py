@@ -5,8 +5,8 @@
     DIR/patterns.npz          the patterns that bodies are painted with
     DIR/CREDITS.txt           authors and licences of all bodies with views
 
-Splits: all that one reference gives lies in one set. `SOURCE` holds sources that nothing learns
-from, `BODY` one in eight references of the others, chosen by a hash of the name.
+Splits: all views of a reference lie in one split. `UNSEEN_SOURCE` has sources that are not used for
+training, `UNSEEN_BODY` one in eight references of the others, chosen by a hash of the name.
 
 Limits: views of another format are refused, not converted.
 """
@@ -41,8 +41,8 @@ class Split(StrEnum):
     """What a view may be used for."""
 
     TRAIN = "train"
-    BODY = "body"
-    SOURCE = "source"
+    UNSEEN_BODY = "body"
+    UNSEEN_SOURCE = "source"
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ def split_of(name: str) -> Split:
     Split
     """
     if name.startswith(HELD_OUT_SOURCES):
-        return Split.SOURCE
-    return Split.BODY if crc32(name.encode()) % HELD_OUT_OF == 0 else Split.TRAIN
+        return Split.UNSEEN_SOURCE
+    return Split.UNSEEN_BODY if crc32(name.encode()) % HELD_OUT_OF == 0 else Split.TRAIN
 
 
 def claim_folder(folder: Path, settings: WorldSettings) -> None:

@@ -35,7 +35,7 @@ from .views import DIRECTIONS, SIDE, View
 FORMAT = 1
 SUFFIX = ".isw"
 _DEPTH, _THICKNESS = 1024.0, 100.0  # steps per unit
-_SHARES = {Split.TRAIN: 0.9, Split.BODY: 0.08, Split.SOURCE: 0.02}
+_SHARES = {Split.TRAIN: 0.9, Split.UNSEEN_BODY: 0.08, Split.UNSEEN_SOURCE: 0.02}
 _PATTERNS, _FIRST_GUESS, _GUESSES, _NEARLY, _MOST_GROWTH = 600, 200, 8, 0.9, 20.0
 _STREAMS = ("normal", "depth", "thickness", "visible")
 
@@ -80,7 +80,7 @@ def write_pack(path: Path, world: PackedWorld) -> int:
         "directions": np.stack([view.directions for view in views]),
         "distances": np.array([view.distance for view in views]),
         "panorama_names": np.array([one.name for one in world.panoramas]),
-        "judged": np.array([one.judged for one in world.panoramas]),
+        "judged": np.array([one.held_out for one in world.panoramas]),
         "radiance": np.stack([one.radiance for one in world.panoramas]).astype(np.float16),
         "patterns": _stream(
             [np.diff(one, axis=1, prepend=np.uint8(0)) for one in world.atlas.maps]
@@ -169,7 +169,7 @@ def pack_worlds(
     most : int
         Bytes that it may have.
     seed : int
-        Chooses views, and which panoramas are judged.
+        Chooses views, and which panoramas are held out.
     packed : sequence of View
         Left out; their bodies come last.
 
@@ -295,8 +295,8 @@ def _unpacked(data: dict[str, np.ndarray]) -> PackedWorld:
     steps = _bytes(data["patterns"]).reshape(-1, side, side)
     atlas = Atlas(np.cumsum(steps, axis=2, dtype=np.uint8), data["kinds"], data["tileable"])
     panoramas = [
-        Panorama(str(name), radiance.astype(np.float32), bool(judged))
-        for name, radiance, judged in zip(
+        Panorama(str(name), radiance.astype(np.float32), bool(held_out))
+        for name, radiance, held_out in zip(
             data["panorama_names"], data["radiance"], data["judged"], strict=True
         )
     ]

@@ -1,4 +1,4 @@
-"""The program that judges: stored normals, rows that are kept, its table."""
+"""The program that scores normals: stored normals, rows that are kept, its table."""
 
 from functools import partial
 from pathlib import Path
@@ -34,7 +34,7 @@ def bodies(tmp_path: Path) -> Path:
 
 def run(folder: Path, estimator: recovered.Estimator, key: str) -> list[dict[str, object]]:
     rows = folder / "rows.jsonl"
-    measure = partial(recovered.judged, estimator=estimator)
+    measure = partial(recovered.score_body, estimator=estimator)
     return [dict(row) for row in body_rows(folder, rows, list(SetKind), 9, key, measure)]
 
 
@@ -60,7 +60,7 @@ def test_rows_are_kept_and_those_of_another_key_are_not_used(bodies: Path) -> No
         run(bodies, fails, "b")
 
 
-def test_stored_normals_are_judged_and_missing_ones_named(bodies: Path, tmp_path: Path) -> None:
+def test_stored_normals_are_scored_and_missing_ones_named(bodies: Path, tmp_path: Path) -> None:
     folder = tmp_path / "normals"
     folder.mkdir()
     np.save(folder / "relief_00.npy", read_truth(bodies / "relief_00").normal)

@@ -136,10 +136,10 @@ def test_draws_of_a_seed_are_the_same_after_a_way_between_processes() -> None:
 def test_no_pixel_shows_two_things() -> None:
     compose, draw = drawn(Count.SEVERAL, size=40), CompositeDraws(40, 0, (0, 0, 1))
     batch = draw(np.random.default_rng(2))
-    assert int(batch.things.layer.max()) == MOST - 1, "there are heaps"
+    assert int(batch.objects.layer.max()) == MOST - 1, "there are piles"
     alone = [
         compose.finished(
-            replace(batch, things=replace(batch.things, meant=batch.things.layer == k))
+            replace(batch, objects=replace(batch.objects, target=batch.objects.layer == k))
         ).mask
         for k in range(MOST)
     ]

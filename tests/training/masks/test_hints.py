@@ -55,8 +55,8 @@ def test_hints_mean_one_visible_thing() -> None:
     drawn = draw_hints(np.random.default_rng(1), 300, 1.0, 4)
     covers = torch.zeros(300, 3, 16, 16)
     covers[:, 0, :8], covers[:, 2, 8:] = 1, 1  # the second is hidden
-    meant = torch.tensor([True, False, False]).expand(300, 3)
-    found = hinted(covers, meant, drawn)
+    target = torch.tensor([True, False, False]).expand(300, 3)
+    found = hinted(covers, target, drawn)
     assert torch.equal(found.any(1), ~drawn.nothing) and int(found.sum(1).max()) == 1
     assert not bool(found[:, 1].any())
     assert 0.65 < float(found[:, 0].float().mean()) < 0.85  # .94 (.6 + .4 / 2)

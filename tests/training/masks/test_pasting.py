@@ -1,4 +1,4 @@
-"""Things and their shadows lie where they were put."""
+"""Objects and their shadows lie where they were placed."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ import torch
 
 from training.masks.ingredients import LENGTH, SIDE
 from training.masks.pasting import CutOuts, shadows
-from training.masks.scenes import Things, draw_scenes
+from training.masks.scenes import PastedObjects, draw_scenes
 
 from .test_composites import ingredients
 
@@ -19,17 +19,17 @@ FRAME = 96
 DISC, BAR = 0.9, 0.1  # thin bodies come first
 
 
-def things(number: int, body: float) -> Things:
-    """One upright thing of each photo, in the middle, not varied."""
+def objects(number: int, body: float) -> PastedObjects:
+    """One upright object of each photo, in the middle, not varied."""
     _, found = draw_scenes(np.random.default_rng(0), 40 * number, (0, 1, 0))
-    some = found.chosen(torch.nonzero(found.meant)[:number, 0])
+    some = found.chosen(torch.nonzero(found.target)[:number, 0])
     same = torch.ones(number)
     return replace(
         some, body=body * same, angle=0 * same, mirror=same, place=torch.zeros(number, 2)
     )
 
 
-def placed(some: Things) -> tuple[torch.Tensor, torch.Tensor]:
+def placed(some: PastedObjects) -> tuple[torch.Tensor, torch.Tensor]:
     cut_outs = CutOuts(torch.from_numpy(ingredients().bodies))
     levels = cut_outs.levels(some.length * (FRAME / SIDE / LENGTH))
     groups = {int(k): torch.nonzero(levels == k)[:, 0] for k in levels.unique()}
@@ -38,7 +38,7 @@ def placed(some: Things) -> tuple[torch.Tensor, torch.Tensor]:
 
 def test_things_have_their_place_and_length() -> None:
     lengths = torch.tensor([24.0, 48, 90])  # of a frame of SIDE, from pictures of each size
-    some = replace(things(3, DISC), length=lengths, place=torch.tensor([[0.2, -0.1]] * 3))
+    some = replace(objects(3, DISC), length=lengths, place=torch.tensor([[0.2, -0.1]] * 3))
     _, cover = placed(some)
     across = (torch.arange(FRAME) + 0.5) * (2 / FRAME) - 1
     area = cover.sum((1, 2, 3))
@@ -49,7 +49,7 @@ def test_things_have_their_place_and_length() -> None:
 
 
 def test_things_are_turned_and_stretched() -> None:
-    turned = replace(things(2, BAR), length=torch.full((2,), 60.0))
+    turned = replace(objects(2, BAR), length=torch.full((2,), 60.0))
     turned = replace(
         turned, angle=torch.tensor([0, torch.pi / 2]), stretch=torch.tensor([1.0, 1.3])
     )
@@ -61,7 +61,7 @@ def test_things_are_turned_and_stretched() -> None:
 
 
 def test_things_have_their_light() -> None:
-    some = things(4, DISC)
+    some = objects(4, DISC)
     body, cover = placed(some)
     light = body.sum((2, 3)) / cover.sum((2, 3))
     assert torch.allclose(light, some.gain, rtol=0.02)
@@ -69,7 +69,7 @@ def test_things_have_their_light() -> None:
 
 def test_shadows_fall_where_they_should() -> None:
     some = replace(
-        things(2, DISC),
+        objects(2, DISC),
         length=torch.full((2,), 40.0),
         shear=torch.tensor([[1.0, 0.5], [1.0, 0.5]]),
         strength=torch.tensor([[0.8, 0.0], [0.0, 0.0]]),

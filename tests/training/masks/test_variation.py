@@ -12,21 +12,21 @@ import torch
 from isc_core.networks.mask_network import SIDE
 from training.masks.composites import CompositeDraws, Composites
 from training.masks.scenes import draw_scenes
-from training.masks.variation import ground_variation, match, varied_light, varied_things
+from training.masks.variation import ground_variation, match, varied_light, varied_objects
 
 from .test_composites import ingredients
 
 
 def test_things_are_stretched_and_keep_their_place() -> None:
     rng = np.random.default_rng(0)
-    _, things = draw_scenes(rng, 50, (0, 0, 1))
-    varied, _ = varied_things(things, rng)
-    assert torch.equal(varied.place, things.place)
+    _, objects = draw_scenes(rng, 50, (0, 0, 1))
+    varied, _ = varied_objects(objects, rng)
+    assert torch.equal(varied.place, objects.place)
     assert float(varied.stretch.log().std()) == pytest.approx(0.15, abs=0.03)
     assert (varied.channels.sort(1).values == torch.arange(3)).all()
     exchanged = (varied.channels != torch.arange(3)).any(1).float().mean()
     assert 0.15 < float(exchanged) < 0.35  # one order in six is the same
-    assert float(varied.body.mean()) < 0.45 < float(things.body.mean()), "thin ones are more often"
+    assert float(varied.body.mean()) < 0.45 < float(objects.body.mean()), "thin ones are more often"
 
 
 def test_masks_of_varied_composites_cover_as_much() -> None:
@@ -35,8 +35,8 @@ def test_masks_of_varied_composites_cover_as_much() -> None:
     batch = draw(np.random.default_rng(1))
     plain = replace(
         batch,
-        things=replace(batch.things, stretch=torch.ones(len(batch.things))),
-        thing_variation=None,
+        objects=replace(batch.objects, stretch=torch.ones(len(batch.objects))),
+        object_variation=None,
         ground_variation=None,
     )
     areas = [compose.finished(one).mask.flatten(1).sum(1).numpy() for one in (plain, batch)]
@@ -69,11 +69,11 @@ def test_some_backgrounds_change_at_a_line() -> None:
 
 def test_matched_things_have_the_colour_of_what_they_cover() -> None:
     rng = np.random.default_rng(0)
-    _, things = draw_scenes(rng, 40, (0, 1, 0))
-    _, drawn = varied_things(things, rng)
-    cover = torch.zeros(len(things), 1, 16, 16)
+    _, objects = draw_scenes(rng, 40, (0, 1, 0))
+    _, drawn = varied_objects(objects, rng)
+    cover = torch.zeros(len(objects), 1, 16, 16)
     cover[:, :, 4:12, 4:12] = 1
-    light = torch.tensor([0.2, 0.3, 0.4])[:, None, None].expand(len(things), 3, 16, 16)
+    light = torch.tensor([0.2, 0.3, 0.4])[:, None, None].expand(len(objects), 3, 16, 16)
     body = 0.8 * cover.expand(-1, 3, -1, -1)
     found = match(body, cover, light, drawn)
     assert torch.equal(found[~drawn.matched], body[~drawn.matched])

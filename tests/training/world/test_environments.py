@@ -38,22 +38,22 @@ def test_a_panorama_keeps_its_light(folder: Path) -> None:
 
 
 @pytest.mark.slow
-def test_one_of_six_is_judged_and_the_split_is_stable(folder: Path) -> None:
-    def judged(seed: int) -> list[str]:
-        return [one.name for one in read_panoramas(folder, seed) if one.judged]
+def test_one_of_six_is_held_out_and_the_split_is_stable(folder: Path) -> None:
+    def held_out(seed: int) -> list[str]:
+        return [one.name for one in read_panoramas(folder, seed) if one.held_out]
 
-    assert len(judged(3)) == 2 and judged(3) == judged(3)
-    assert len({tuple(judged(seed)) for seed in range(6)}) > 1
-    before = judged(3)
+    assert len(held_out(3)) == 2 and held_out(3) == held_out(3)
+    assert len({tuple(held_out(seed)) for seed in range(6)}) > 1
+    before = held_out(3)
     write(folder / "z_later.exr", photo(2 * ROWS))
-    assert judged(3) == before
+    assert held_out(3) == before
 
 
-def test_what_is_judged_has_no_sibling_to_learn_from(tmp_path: Path) -> None:
+def test_what_is_held_out_has_no_sibling_to_learn_from(tmp_path: Path) -> None:
     for name in ("hall_01", "hall_02", "hall_03", "hall_04", "hall_05", "quay"):
         write(tmp_path / f"{name}.exr", photo())
     for seed in range(5):
-        assert [one.name for one in read_panoramas(tmp_path, seed) if one.judged] == ["quay"]
+        assert [one.name for one in read_panoramas(tmp_path, seed) if one.held_out] == ["quay"]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -0.1])

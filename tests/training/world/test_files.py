@@ -137,15 +137,15 @@ def test_each_reference_is_in_one_set(tmp_path: Path) -> None:
         write_views(tmp_path / VIEWS / f"{k:05d}.npz", name, [view], "")
     found = {split: [view.name for view in views_in(tmp_path, split)] for split in Split}
     assert sorted(name for part in found.values() for name in part) == sorted(names)
-    assert found[Split.SOURCE] == ["scan/cat", "scan/dog"]
-    assert 0 < len(found[Split.BODY]) < 10
+    assert found[Split.UNSEEN_SOURCE] == ["scan/cat", "scan/dog"]
+    assert 0 < len(found[Split.UNSEEN_BODY]) < 10
     for split, part in found.items():
         assert part == [name for name in names if split_of(name) == split]
 
 
 def test_one_reference_in_eight_is_held_out() -> None:
     names = [f"family/lathe/{k:04d}" for k in range(2000)]
-    share = sum(split_of(name) == Split.BODY for name in names) / len(names)
+    share = sum(split_of(name) == Split.UNSEEN_BODY for name in names) / len(names)
     assert share == pytest.approx(1 / 8, abs=0.02)
 
 

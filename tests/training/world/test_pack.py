@@ -49,7 +49,7 @@ ATLAS = Atlas(
     np.arange(5).astype(np.uint8),
     np.array([True, False, True, False, False]),
 )
-WORLD = PackedWorld({Split.TRAIN: VIEWS[:2], Split.BODY: VIEWS[2:]}, PANORAMAS, ATLAS)
+WORLD = PackedWorld({Split.TRAIN: VIEWS[:2], Split.UNSEEN_BODY: VIEWS[2:]}, PANORAMAS, ATLAS)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ def test_a_pack_gives_back_its_world(pack: Path) -> None:
     found = read_pack(pack)
     assert [len(found.views[split]) for split in Split] == [2, 1, 0]
     for seen, view in zip(
-        [*found.views[Split.TRAIN], *found.views[Split.BODY]], VIEWS, strict=True
+        [*found.views[Split.TRAIN], *found.views[Split.UNSEEN_BODY]], VIEWS, strict=True
     ):
         assert (seen.name, seen.source, seen.distance) == (view.name, view.source, view.distance)
         for exact in ("mask", "visible", "directions"):
@@ -77,7 +77,7 @@ def test_a_pack_gives_back_its_world(pack: Path) -> None:
         assert np.abs(seen.depth.astype(float) - view.depth).max() < 0.002
         assert np.abs(seen.thickness.astype(float) - view.thickness).max() < 0.012
     for seen_light, light in zip(found.panoramas, PANORAMAS, strict=True):
-        assert (seen_light.name, seen_light.judged) == (light.name, light.judged)
+        assert (seen_light.name, seen_light.held_out) == (light.name, light.held_out)
         np.testing.assert_array_equal(seen_light.radiance, light.radiance)
     for part in ("maps", "kinds", "tileable"):
         np.testing.assert_array_equal(getattr(found.atlas, part), getattr(ATLAS, part))
@@ -128,9 +128,9 @@ def test_worlds_are_packed_into_the_bytes_that_are_allowed(tmp_path: Path) -> No
     (line,) = pack_worlds([world], tmp_path / "hdri", path, most, seed=0)
     assert path.stat().st_size <= most and str(path) in line
     found = read_pack(path)
-    assert len(found.views[Split.TRAIN]) > len(found.views[Split.BODY]) > 0
+    assert len(found.views[Split.TRAIN]) > len(found.views[Split.UNSEEN_BODY]) > 0
     assert all(split_of(one.name) == split for split in Split for one in found.views[split])
-    assert sum(one.judged for one in found.panoramas) == 1
+    assert sum(one.held_out for one in found.panoramas) == 1
 
 
 def test_bodies_that_are_packed_come_last() -> None:
@@ -163,7 +163,7 @@ def test_too_few_bytes_for_a_pack_are_refused_and_leave_nothing(tmp_path: Path) 
 def test_a_fit_reads_a_pack_as_it_reads_a_folder(tmp_path: Path) -> None:
     world, path = world_folder(tmp_path), tmp_path / "world.isw"
     pack_worlds([world], tmp_path / "hdri", path, 10**8, seed=0)
-    splits = (Split.TRAIN, Split.BODY)
+    splits = (Split.TRAIN, Split.UNSEEN_BODY)
     packed = read_world([path], None, splits, 0)
     plain = read_world([world], tmp_path / "hdri", splits, 0)
     assert {s: len(v) for s, v in packed.views.items()} == {
