@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from isc_core.result_files.solids.body import Body, continued
+from isc_core.result_files.solids.solid_mesh import SolidMesh, continued
 
 ROUND, REACH = 1.0, 8
 _BELOW = 0.5  # pixels between the part in front and what goes on under it
@@ -67,13 +67,13 @@ def steps_of(height: np.ndarray, mask: np.ndarray, least: float) -> Steps:
 
 
 def cut(
-    body: Body, height: np.ndarray, mask: np.ndarray, steps: Steps
+    body: SolidMesh, height: np.ndarray, mask: np.ndarray, steps: Steps
 ) -> tuple[np.ndarray, np.ndarray]:
     """Cut a body, and let the surface behind go on.
 
     Parameters
     ----------
-    body : Body
+    body : SolidMesh
         With a vertex at each pixel.
     height : (H, W) ndarray
     mask : (H, W) bool ndarray

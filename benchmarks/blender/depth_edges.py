@@ -30,8 +30,8 @@ from scipy import ndimage
 
 from isc_core.result_files.mesh import limit_rim
 from isc_core.result_files.solids.back import Back
-from isc_core.result_files.solids.body import Body, make_body
 from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import SolidMesh, make_solid_mesh
 from isc_core.result_files.solids.surface import vertex_normals
 from isc_core.result_files.turned_view import View, turned_view
 
@@ -238,12 +238,12 @@ def turned(body: SeenBody) -> dict[str, list[float]]:
     return rows
 
 
-def _rounded(body: SeenBody, height: np.ndarray) -> Body:
+def _rounded(body: SeenBody, height: np.ndarray) -> SolidMesh:
     cosine = np.ones(body.mask.shape)
-    return make_body(height, cosine, body.mask, Rim(body.mask), Back.ROUNDED, 0)
+    return make_solid_mesh(height, cosine, body.mask, Rim(body.mask), Back.ROUNDED, 0)
 
 
-def _plain(body: Body) -> Mesh:
+def _plain(body: SolidMesh) -> Mesh:
     return np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1), body.faces
 
 

@@ -31,8 +31,8 @@ from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.evaluation.metrics import psnr
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.result_files.solids.back import Back
-from isc_core.result_files.solids.body import make_body
 from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import make_solid_mesh
 from isc_core.result_files.solids.surface import placed, vertex_normals
 from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
@@ -86,7 +86,7 @@ def drawn(result: ResultArrays, kind: str) -> Drawn:
     """
     if kind in BEFORE:
         return _former(result, kind == "former flat")
-    body = make_body(
+    body = make_solid_mesh(
         result.height,
         result.normal[..., 2],
         result.mask,

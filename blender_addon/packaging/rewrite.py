@@ -42,7 +42,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.result_files.object_folders",
         "isc_core.result_files.reading_notes_text",
         "isc_core.result_files.solids.back",
-        "isc_core.result_files.solids.body",
+        "isc_core.result_files.solids.solid_mesh",
         "isc_core.result_files.solids.rim",
         "isc_core.result_files.solids.surface",
         "isc_core.scene.diagnostics",

@@ -6,8 +6,8 @@ Rim and back have confidence 0.
 import numpy as np
 
 from isc_core.result_files.solids.back import Back
-from isc_core.result_files.solids.body import continued
 from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import continued
 from isc_core.result_files.solids.surface import Solid, before_camera, make_solid
 from isc_core.shading.perspective import view_directions
 
@@ -45,7 +45,7 @@ def body_geometry(
         If the object is too thin for a mesh, or the size is not positive.
     """
     solid = _solid(result, back, triangles)
-    body = solid.body
+    body = solid.mesh
     vertices = _placed(result, solid) * metres_per_pixel(result, size_metres)
     rows, columns = body.pixels.T
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
@@ -88,8 +88,8 @@ def _heights(result: ResultArrays) -> np.ndarray:
 
 def _placed(result: ResultArrays, solid: Solid) -> np.ndarray:
     """(V, 3): the vertices in pixels, camera frame, the mesh's origin at 0."""
-    (row, column), heights, camera = solid.body.places.T, solid.body.heights, camera_of(result)
+    (row, column), heights, camera = solid.mesh.places.T, solid.mesh.heights, camera_of(result)
     if result.eye is None or camera is None:
         return np.stack([column - result.origin[0], result.origin[1] - row, heights], -1)
     eye = result.eye.astype(np.float64) / result.metres_per_pixel
-    return eye + before_camera(solid.body.places, eye[2] - heights, camera)
+    return eye + before_camera(solid.mesh.places, eye[2] - heights, camera)

@@ -423,9 +423,9 @@ def _outlined(
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
     seen, sides = heights_seen(height, mask, camera), 1 if options.back is Back.OPEN else 2
     solid = make_solid(seen, normal, mask, rim, view, options.back, options.triangles // sides)
-    places = placed(solid.body, camera)
-    body, normals = solid.body, solid.normals(places)
-    return _Shape(places, normals, body.faces, solid.uv(), None, body.pixels, solid.detail)
+    places = placed(solid.mesh, camera)
+    mesh, normals = solid.mesh, solid.normals(places)
+    return _Shape(places, normals, mesh.faces, solid.uv(), None, mesh.pixels, solid.detail)
 
 
 def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:

@@ -33,8 +33,8 @@ from .mesh import limit_rim
 from .mesh_options import MeshOptions
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 from .solids.back import Back
-from .solids.body import Body, make_body
 from .solids.rim import Rim
+from .solids.solid_mesh import SolidMesh, make_solid_mesh
 from .solids.surface import heights_seen, placed
 from .turned_view import turned_view
 
@@ -93,7 +93,7 @@ def turned_panels(
 
 def _coarse_body(
     frame: Frame, small: Mapping[str, np.ndarray], camera: Camera | None
-) -> tuple[Body, np.ndarray] | None:
+) -> tuple[SolidMesh, np.ndarray] | None:
     """The closed body of a panel's maps, a vertex every `_STEP` pixels, and its vertices in the
     panel's pixels; None for an object too thin for it.
     """
@@ -113,7 +113,7 @@ def _coarse_body(
         )
     limited = limit_rim(height, inside, MeshOptions().rim)
     seen = heights_seen(limited, inside, camera)
-    body = make_body(seen, np.ones(inside.shape), inside, Rim(share), Back.ROUNDED, 0)
+    body = make_solid_mesh(seen, np.ones(inside.shape), inside, Rim(share), Back.ROUNDED, 0)
     return body, placed(body, camera) * _STEP
 
 

@@ -15,8 +15,8 @@ from benchmarks.blender.depth_edges import (
     step_shares,
 )
 from isc_core.result_files.solids.back import Back
-from isc_core.result_files.solids.body import make_body
 from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import make_solid_mesh
 from isc_core.result_files.turned_view import turned_view
 
 SIZE, JUMP = 60, 12.0
@@ -42,7 +42,7 @@ def test_a_step_is_between_two_pixels_and_a_slope_is_none() -> None:
 
 def test_a_cut_leaves_no_hole_from_the_side() -> None:
     height, mask = plates()
-    body = make_body(height, np.ones(mask.shape), mask, Rim(mask), Back.FLAT, 0)
+    body = make_solid_mesh(height, np.ones(mask.shape), mask, Rim(mask), Back.FLAT, 0)
     vertices, faces = cut(body, height, mask, steps_of(height, mask, JUMP / 2))
     whole = np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1)
     for yaw in (-30.0, 0.0, 30.0):

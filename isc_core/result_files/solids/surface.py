@@ -1,4 +1,4 @@
-"""A body with the normals of its visible side: what a mesh with a back is made of.
+"""A solid mesh with the normals of its visible side.
 
 The recovered normals of the visible side are in its vertices, and what lies between these in a
 tangent-space normal map. Rim and back have the normals of their faces.
@@ -15,24 +15,24 @@ from ...photo.camera import Camera
 from ...shading.perspective import lifted_points, object_axis
 from ..triangulation.vertex_normals import interpolated_normals
 from .back import Back
-from .body import Body, continued, make_body
 from .rim import Rim
+from .solid_mesh import SolidMesh, continued, make_solid_mesh
 
 
 @dataclass(frozen=True)
 class Solid:
-    """A body and its normals.
+    """A mesh and its normals.
 
     Attributes
     ----------
-    body : Body
+    mesh : SolidMesh
     smooth : (N, 3) ndarray
         Unit normals of its first N vertices, those of the visible side.
     detail : (H, W, 3) ndarray
         Unit vectors of the normal map in tangent space.
     """
 
-    body: Body
+    mesh: SolidMesh
     smooth: np.ndarray
     detail: np.ndarray
 
@@ -49,7 +49,7 @@ class Solid:
         (V, 3) ndarray
             Unit vectors; those of rim and back are means of the faces', by area.
         """
-        normals = vertex_normals(vertices, self.body.faces)
+        normals = vertex_normals(vertices, self.mesh.faces)
         normals[: len(self.smooth)] = self.smooth
         return normals
 
@@ -61,7 +61,7 @@ class Solid:
         (V, 2) ndarray
         """
         height, width = self.detail.shape[:2]
-        row, column = self.body.texture.T
+        row, column = self.mesh.texture.T
         return np.stack([(column + 0.5) / width, 1 - (row + 0.5) / height], -1)
 
 
@@ -74,7 +74,7 @@ def make_solid(
     back: Back,
     triangles: int,
 ) -> Solid:
-    """Make a body of a height map.
+    """Build the solid of a height map.
 
     Parameters
     ----------
@@ -99,15 +99,15 @@ def make_solid(
     InputError
         If no block of 2 x 2 pixels lies inside.
     """
-    body = make_body(height, (normal * view).sum(-1), mask, rim, back, triangles)
+    mesh = make_solid_mesh(height, (normal * view).sum(-1), mask, rim, back, triangles)
     smooth, detail = interpolated_normals(
-        body.visible, _continued_normals(normal, mask, body.pixels), view
+        mesh.visible, _continued_normals(normal, mask, mesh.pixels), view
     )
-    return Solid(body, smooth, detail)
+    return Solid(mesh, smooth, detail)
 
 
 def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) -> np.ndarray:
-    """Return the heights of which a body is made.
+    """Return the heights that `make_solid` takes.
 
     Parameters
     ----------
@@ -128,12 +128,12 @@ def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) ->
     return np.asarray(depth * (-camera.focal_length / depth[mask].mean()))
 
 
-def placed(body: Body, camera: Camera | None) -> np.ndarray:
-    """Return the vertices of a body made of `heights_seen`.
+def placed(mesh: SolidMesh, camera: Camera | None) -> np.ndarray:
+    """Return the vertices of a mesh made of `heights_seen`.
 
     Parameters
     ----------
-    body : Body
+    mesh : SolidMesh
     camera : Camera or None
 
     Returns
@@ -142,9 +142,9 @@ def placed(body: Body, camera: Camera | None) -> np.ndarray:
         Pixels, camera frame.
     """
     if camera is not None:
-        return before_camera(body.places, -body.heights, camera)
-    row, column = body.places.T
-    return np.stack([column, -row, body.heights], -1)
+        return before_camera(mesh.places, -mesh.heights, camera)
+    row, column = mesh.places.T
+    return np.stack([column, -row, mesh.heights], -1)
 
 
 def before_camera(places: np.ndarray, depth: np.ndarray, camera: Camera) -> np.ndarray:
@@ -170,7 +170,7 @@ def before_camera(places: np.ndarray, depth: np.ndarray, camera: Camera) -> np.n
 
 
 def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """(H, W, 3): the unit normals, also of pixels of the body just beyond the mask."""
+    """(H, W, 3): the unit normals, also of pixels of the mesh just beyond the mask."""
     inside = mask.copy()
     inside[pixels[:, 0], pixels[:, 1]] = True
     found = continued(np.where(mask[..., None], normal, 0), mask, inside)

@@ -8,15 +8,15 @@ from scipy import ndimage
 from isc_core.errors import InputError
 from isc_core.result_files.mesh import limit_rim
 from isc_core.result_files.solids.back import Back
-from isc_core.result_files.solids.body import Body, make_body
 from isc_core.result_files.solids.outline import outlined, smooth_cover
 from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import SolidMesh, make_solid_mesh
 from isc_core.result_files.turned_view import turned_view
 
 CLOSED = (Back.FLAT, Back.ROUNDED, Back.MIRRORED)
 
 
-def solid(body: Body) -> trimesh.Trimesh:
+def solid(body: SolidMesh) -> trimesh.Trimesh:
     vertices = np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1)
     return trimesh.Trimesh(vertices, body.faces, process=False)
 
@@ -31,7 +31,7 @@ def hemisphere(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("triangles", [0, 2000])
 def test_a_hemisphere_becomes_a_ball(back: Back, triangles: int) -> None:
     height, mask = hemisphere(40, 100)
-    mesh = solid(make_body(height, height / 40, mask, Rim(mask), back, triangles))
+    mesh = solid(make_solid_mesh(height, height / 40, mask, Rim(mask), back, triangles))
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(4 / 3 * np.pi * 40**3, rel=0.08)
     assert mesh.bounds[0, 2] == pytest.approx(-40, abs=4)
@@ -44,7 +44,7 @@ def test_any_mask_becomes_a_closed_body(back: Back, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = ndimage.gaussian_filter(rng.normal(size=(60, 70)), 2) > 0
     height = 200 * ndimage.gaussian_filter(rng.normal(size=mask.shape), 2)
-    body = make_body(height, np.ones(mask.shape), mask, Rim(mask), back, 500)
+    body = make_solid_mesh(height, np.ones(mask.shape), mask, Rim(mask), back, 500)
     mesh = solid(body)
     assert mesh.is_watertight and mesh.is_winding_consistent
     assert mesh.volume > 0 and mesh.area_faces.min() > 0
@@ -55,14 +55,14 @@ def test_front_and_back_meet_in_the_outline_alone() -> None:
     rng = np.random.default_rng(0)
     _, mask = hemisphere(25, 64)
     height = 60 * ndimage.gaussian_filter(rng.normal(size=mask.shape), 3)
-    body = make_body(height, np.ones(mask.shape), mask, Rim(mask), Back.MIRRORED, 0)
+    body = make_solid_mesh(height, np.ones(mask.shape), mask, Rim(mask), Back.MIRRORED, 0)
     inner = int(body.front.sum())
     behind = body.heights[-inner:]
     np.testing.assert_array_equal(body.places[:inner], body.places[-inner:])
     assert (behind < body.heights[:inner]).all()
 
 
-def texture_scales(body: Body) -> tuple[np.ndarray, np.ndarray]:
+def texture_scales(body: SolidMesh) -> tuple[np.ndarray, np.ndarray]:
     """Least and largest texture pixels per pixel of surface of each hidden face; face areas."""
     faces = body.faces[~body.front[body.faces].any(1)]
     vertices = np.stack([body.places[:, 1], -body.places[:, 0], body.heights], -1)[faces]
@@ -80,7 +80,7 @@ def texture_scales(body: Body) -> tuple[np.ndarray, np.ndarray]:
 def test_the_texture_of_a_rounded_back_is_stretched_little() -> None:
     """The pixels in front of the sides would be stretched thirtyfold there."""
     height, mask = hemisphere(80, 180)
-    body = make_body(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
+    body = make_solid_mesh(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
     scales, area = texture_scales(body)
     good = (scales[:, 0] < 1.5) & (scales[:, 1] > 0.3)
     assert area[good].sum() > 0.8 * area.sum()
@@ -88,7 +88,7 @@ def test_the_texture_of_a_rounded_back_is_stretched_little() -> None:
     assert area[straight].sum() < 0.03 * area.sum()
 
 
-def leaning_bar(back: Back, flat: float) -> tuple[Body, np.ndarray]:
+def leaning_bar(back: Back, flat: float) -> tuple[SolidMesh, np.ndarray]:
     """A round bar whose outline crosses the columns of a hard mask, and its normal in the plane."""
     radius, shape = 40.0, (240, 120)
     row, column = (np.indices(shape).T - np.array(shape) / 2 + 0.3).T
@@ -96,7 +96,7 @@ def leaning_bar(back: Back, flat: float) -> tuple[Body, np.ndarray]:
     away = row * across[0] + column * across[1]
     mask = (np.abs(away) < radius) & (np.abs(row) < 115)
     height = limit_rim(flat * np.sqrt(np.maximum(radius**2 - away**2, 0)), mask, 3)
-    return make_body(height, np.ones(mask.shape), mask, Rim(mask), back, 0), across
+    return make_solid_mesh(height, np.ones(mask.shape), mask, Rim(mask), back, 0), across
 
 
 @pytest.mark.parametrize("flat", [0.5, 1.0])
@@ -121,7 +121,9 @@ def test_the_texture_behind_the_outline_has_no_teeth(flat: float) -> None:
 def test_texture_comes_from_inside(seed: int) -> None:
     rng = np.random.default_rng(seed)
     mask = ndimage.gaussian_filter(rng.normal(size=(90, 80)), 4) > 0
-    body = make_body(np.ones(mask.shape), np.ones(mask.shape), mask, Rim(mask), Back.ROUNDED, 0)
+    body = make_solid_mesh(
+        np.ones(mask.shape), np.ones(mask.shape), mask, Rim(mask), Back.ROUNDED, 0
+    )
     np.testing.assert_array_equal(body.texture[body.front], body.places[body.front])
     rows, columns = np.rint(body.texture).astype(int).T + 9
     wide = np.pad(mask, 9)
@@ -132,7 +134,7 @@ def test_texture_comes_from_inside(seed: int) -> None:
 def test_the_rim_of_a_ball_lies_in_a_plane() -> None:
     """Depths of single pixels would be 10 pixels apart, as their distances to the outline are."""
     height, mask = hemisphere(80, 180)
-    body = make_body(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
+    body = make_solid_mesh(height, height / 80, mask, Rim(mask), Back.ROUNDED, 0)
     inner = int(body.front.sum())
     rim = body.heights[inner : len(body.heights) - inner]
     assert np.ptp(rim) < 3.5
@@ -167,7 +169,7 @@ def test_an_object_too_thin_is_refused() -> None:
     mask = np.zeros((20, 20), bool)
     mask[10, 3:15] = True
     with pytest.raises(InputError, match="2 x 2"):
-        make_body(np.zeros((20, 20)), np.ones((20, 20)), mask, Rim(mask), Back.ROUNDED, 0)
+        make_solid_mesh(np.zeros((20, 20)), np.ones((20, 20)), mask, Rim(mask), Back.ROUNDED, 0)
 
 
 def disc(radius: float, centre: np.ndarray) -> np.ndarray:
@@ -195,17 +197,17 @@ def test_the_outline_follows_the_cover_between_the_pixels(radius: float) -> None
     assert soft < hard / 3 and soft < steps / 10
 
 
-def fur(back: Back) -> tuple[Rim, Body]:
+def fur(back: Back) -> tuple[Rim, SolidMesh]:
     """A ball whose rim is soft on the right."""
     height, mask = hemisphere(40, 110)
     row, column = np.indices(mask.shape) - 55 + 0.3
     away = np.hypot(row, column) - 40
     soft = (column > 0) & (np.abs(away) < 16)
     rim = Rim(np.where(soft, np.clip(0.5 - away / 20, 0, 1), np.clip(0.5 - away, 0, 1)), soft)
-    return rim, make_body(height, height / 40, mask, rim, back, 3000)
+    return rim, make_solid_mesh(height, height / 40, mask, rim, back, 3000)
 
 
-def layers(body: Body, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
+def layers(body: SolidMesh, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """How many triangles lie over each place."""
     corners = body.places[body.faces]
     count = np.zeros(len(rows), int)

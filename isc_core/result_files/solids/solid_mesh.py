@@ -1,4 +1,4 @@
-"""A body from the height map of its visible side: a smooth outline, a rounded rim, a back.
+"""A solid mesh from the height map of its visible side: a smooth outline, a rounded rim, a back.
 
 Problem: a photo shows one side. Turned, that sheet ends in the steps of its pixels, and half of the
 form is missing.
@@ -23,7 +23,7 @@ and at least `_LEAST` sqrt(u) behind the front, so that the two meet in the outl
 graphs over the same triangles: they do not cross each other, and before a pinhole camera, along
 whose rays the back lies, neither. The texture of a rounded back is folded in at the outline (see
 `texture_places`), that of the others is the texture of the pixel in front. Where the rim is soft,
-the body ends at its core, and the sheet goes on alone (see `rim`).
+the closed part ends at its core, and the sheet goes on alone (see `rim`).
 
 Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
 artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
@@ -56,8 +56,8 @@ _STEP = 1e3  # pixels of height between core and sheet, for small triangles ther
 
 
 @dataclass(frozen=True)
-class Body:
-    """A mesh over the pixels.
+class SolidMesh:
+    """Front, rim and back of an object, as a mesh over the pixels.
 
     Attributes
     ----------
@@ -86,15 +86,15 @@ class Body:
     texture: np.ndarray
 
 
-def make_body(
+def make_solid_mesh(
     height: np.ndarray,
     cosine: np.ndarray,
     mask: np.ndarray,
     rim: Rim,
     back: Back,
     triangles: int,
-) -> Body:
-    """Make a body.
+) -> SolidMesh:
+    """Build the mesh of an object from its height map.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def make_body(
 
     Returns
     -------
-    Body
+    SolidMesh
         Closed but for `Back.OPEN` and the sheets of a soft rim.
 
     Raises
@@ -137,7 +137,9 @@ def make_body(
     front = np.arange(len(heights)) < sheet.inner
     if back is Back.OPEN:
         visible = sheet.pixel_triangles
-        return Body(sheet.places, heights, sheet.pixels, sheet.faces, front, visible, sheet.places)
+        return SolidMesh(
+            sheet.places, heights, sheet.pixels, sheet.faces, front, visible, sheet.places
+        )
     closed = _of_core(sheet, thin)
     if back is Back.FLAT:
         return _used(_walled(sheet, closed, heights, front, mask))
@@ -146,15 +148,15 @@ def make_body(
     middle = np.where(edge, last, middle)
     depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
     behind = np.minimum(middle - depth, known - _LEAST * round_height)
-    body = _used(_joined(sheet, closed, heights, behind, front))
+    mesh = _used(_joined(sheet, closed, heights, behind, front))
     if back is Back.MIRRORED:
-        return body
-    hidden = ~body.front & core[body.pixels[:, 0], body.pixels[:, 1]]
+        return mesh
+    hidden = ~mesh.front & core[mesh.pixels[:, 0], mesh.pixels[:, 1]]
     outline = (np.arange(len(hidden)) < len(front))[hidden]
-    body.texture[hidden] = folded_places(
-        u, section, body.places[hidden], body.pixels[hidden], outline
+    mesh.texture[hidden] = folded_places(
+        u, section, mesh.places[hidden], mesh.pixels[hidden], outline
     )
-    return body
+    return mesh
 
 
 def _rolled(
@@ -233,14 +235,14 @@ def _of_core(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
 
 def _joined(
     sheet: Outlined, closed: np.ndarray, heights: np.ndarray, behind: np.ndarray, front: np.ndarray
-) -> Body:
+) -> SolidMesh:
     """The sheet and, with the points of the core's outline in common, the back."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
     own = np.arange(n) < inner
     own[sheet.faces[~closed]] = False
     other = np.where(own[sheet.faces], sheet.faces + n, sheet.faces)[closed, ::-1]
-    return Body(
+    return SolidMesh(
         np.concatenate([sheet.places, sheet.places[:inner]]),
         np.concatenate([heights, behind[rows, columns]]),
         np.concatenate([sheet.pixels, sheet.pixels[:inner]]),
@@ -251,19 +253,19 @@ def _joined(
     )
 
 
-def _used(body: Body) -> Body:
-    """The body without vertices that no triangle has."""
-    kept, faces = renumbered(body.faces)
-    if len(kept) == len(body.places):
-        return body
-    vertices = (body.places, body.heights, body.pixels, body.front, body.texture)
+def _used(mesh: SolidMesh) -> SolidMesh:
+    """The mesh without unused vertices."""
+    kept, faces = renumbered(mesh.faces)
+    if len(kept) == len(mesh.places):
+        return mesh
+    vertices = (mesh.places, mesh.heights, mesh.pixels, mesh.front, mesh.texture)
     places, heights, pixels, front, texture = (values[kept] for values in vertices)
-    return Body(places, heights, pixels, faces, front, body.visible, texture)
+    return SolidMesh(places, heights, pixels, faces, front, mesh.visible, texture)
 
 
 def _walled(
     sheet: Outlined, closed: np.ndarray, heights: np.ndarray, front: np.ndarray, mask: np.ndarray
-) -> Body:
+) -> SolidMesh:
     """The sheet, a plane behind it, and two triangles of wall at each edge of the outline."""
     n = len(heights)
     size = (np.ptp(np.argwhere(mask), axis=0) + 1).max()
@@ -276,7 +278,7 @@ def _walled(
             np.stack([rim[:, 1], rim[:, 0] + n, rim[:, 1] + n], -1),
         ]
     )
-    return Body(
+    return SolidMesh(
         np.concatenate([sheet.places, sheet.places]),
         np.concatenate([heights, np.full(n, heights.min() - _BEHIND * size)]),
         np.concatenate([sheet.pixels, sheet.pixels]),
