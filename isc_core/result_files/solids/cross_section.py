@@ -1,7 +1,8 @@
 """The ellipse that a rounded body has as its section across the outline.
 
 Problem: the membrane u of a body (see `solid_mesh`) ends at pixels, so that close to the outline it
-has their steps. Where the surface turns away from the viewer, a step of a pixel is many pixels deep.
+has their steps. Where the surface turns away from the viewer, a step of a pixel is many pixels
+deep.
 
 Equation: along its gradient g, u has the second derivative -c, limited to c = 2 (a ball) to 4 (a
 bar). So u is c / 2 (a^2 - r^2) at r = |g| / c pixels from the axis, with
