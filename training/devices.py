@@ -1,4 +1,4 @@
-"""Which devices can fit a network, and what they are good at."""
+"""Devices for training, and their fast data types."""
 
 import argparse
 

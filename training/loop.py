@@ -258,13 +258,13 @@ def fit(
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         for optimizer in optimizers:
             optimizer.step()
-        _follow(average, network, clock.step, schedule)
+        _update_average(average, network, clock.step, schedule)
         clock.tick()
         report.add(clock.step, loss, terms, clock.over)
         if clock.step % _CHECKPOINT_EVERY == 0 or clock.over:
             _write(average, network, optimizers, clock, options.output)
             if held_out:
-                print(f"  held out: {_shown(_mean_terms(average, held_out))}", flush=True)
+                print(f"  held out: {_formatted(_mean_terms(average, held_out))}", flush=True)
     return average
 
 
@@ -339,11 +339,11 @@ def _mean_terms(network: Net, batches: Sequence[Any]) -> dict[str, float]:
     return whole
 
 
-def _shown(terms: dict[str, float]) -> str:
+def _formatted(terms: dict[str, float]) -> str:
     return ", ".join(f"{name} {value:.4f}" for name, value in terms.items())
 
 
-def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedule) -> None:
+def _update_average(average: nn.Module, network: nn.Module, step: int, schedule: Schedule) -> None:
     """Move the running average toward the current weights."""
     kept_share = min(schedule.average_limit, (step + 1) / (step + schedule.average_delay))
     pairs = zip(average.state_dict().values(), network.state_dict().values(), strict=True)
@@ -370,7 +370,7 @@ class _Report:
         if done % _REPORT_EVERY and not last:
             return
         means = (self._smoothed / (1 - 0.99**self._count)).tolist()
-        shown = _shown(dict(zip(["loss", *terms], means, strict=True)))
+        shown = _formatted(dict(zip(["loss", *terms], means, strict=True)))
         seconds = time.monotonic() - self._began
         print(f"step {done}: {shown} ({seconds:.0f} s)", flush=True)
 

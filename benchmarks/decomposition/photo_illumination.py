@@ -103,7 +103,7 @@ def balanced_scenes(
     from training.priors.panorama_photos import read_pictures
     from training.world.files import Split
     from training.world.recipes import LightKind, Paint, Shares
-    from training.world.samples import Darkroom, draw_batch
+    from training.world.samples import PhotoRenderer, draw_batch
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
@@ -126,7 +126,7 @@ def balanced_scenes(
         turn = draw.recipes["turn"][0].double().numpy()
         colour = _balance(*pictures[int(draw.recipes["environment"][0])], turn, balance, rng)
         ambient = torch.from_numpy(1 / colour[None]).float()
-        return Darkroom(found.bank, 1, _SIDE)(
+        return PhotoRenderer(found.bank, 1, _SIDE)(
             replace(draw, recipes={**draw.recipes, "ambient": ambient}), store
         )
 

@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 import isc_core
-from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.layers import normals_and_shading
 from isc_core.decomposition.models import solve
 from isc_core.decomposition.settings import Settings
 from isc_core.decomposition.task import DecompositionTask, SolveOptions
@@ -83,7 +83,9 @@ def solver_normals(settings: Settings, solve_size: int) -> Estimator:
         options = SolveOptions(solve_size=solve_size, fit_lobe=False, check_assumptions=False)
         found = solve(DecompositionTask(photo, photo, settings, options=options))
         return at_size(
-            shaded(found.height, found.light, photo.mask)[0], photo.mask, truth.mask.shape
+            normals_and_shading(found.height, found.light, photo.mask)[0],
+            photo.mask,
+            truth.mask.shape,
         )
 
     return estimate

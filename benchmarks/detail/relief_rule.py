@@ -26,7 +26,7 @@ from typing import Any
 import numpy as np
 
 from isc_core.decomposition.detail import Pyramid
-from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.layers import normals_and_shading
 from isc_core.decomposition.models import solve
 from isc_core.decomposition.pipeline import WORKING_SIZE
 from isc_core.decomposition.settings import MOST_DETAIL, Settings
@@ -62,7 +62,7 @@ def evidence_and_scores(body: Path) -> dict[str, Any]:
     evidence, relief = pyramid.evidence(), pyramid.relief(MOST_DETAIL)
     truth, scores = read_truth(body), []
     for share in SHARES:
-        normal = shaded(found.height + share * relief, found.light, pyramid.mask)[0]
+        normal = normals_and_shading(found.height + share * relief, found.light, pyramid.mask)[0]
         scores.append(score_relief(normal, truth.normal, truth.mask, truth.smooth))
     figures = {
         name: [np.asarray(getattr(one, name)).tolist() for one in scores]

@@ -106,7 +106,7 @@ def lit_bodies(
     from training.networks.scene_batches import read_world
     from training.world.files import Split
     from training.world.recipes import Shares
-    from training.world.samples import OUTPUT, Darkroom, draw_batch
+    from training.world.samples import OUTPUT, PhotoRenderer, draw_batch
     from training.world.view_batches import ViewStore
 
     torch.manual_seed(seed)
@@ -122,7 +122,7 @@ def lit_bodies(
         draw = draw_batch(
             bodies, np.array([k]), 1, found.atlas, found.held_out_environments, rng, shares
         )
-        sample = Darkroom(found.bank, 1, side or OUTPUT)(draw, store)
+        sample = PhotoRenderer(found.bank, 1, side or OUTPUT)(draw, store)
         mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
         photo, ratio, normal, shading = (
             part[0].permute(1, 2, 0).numpy()

@@ -29,19 +29,19 @@ from .task import SceneEstimate
 _MUCH_CLIPPED = 0.1  # of the object; single highlights are smaller
 _MUCH_DOUBTFUL = 0.005  # of the light: a highlight of a hundredth of the object
 _RAGGED = 0.5  # of the mask outside blocks of 2 x 2 pixels, which no mesh covers
-LIKELY_CLEAR = 0.3  # probability of a mirror or glass
-LIKELY_SEVERAL = 0.6  # probability of several lamps
+MIRROR_OR_GLASS_THRESHOLD = 0.3  # probability of a mirror or glass
+SEVERAL_LAMPS_THRESHOLD = 0.6  # probability of several lamps
 _LEAST = 0.1  # of the confidence remains
 _COLOURED = 0.5  # of it remains in light of too strong a colour
 
 
 def check_scene(prediction: ScenePrediction) -> tuple[AssumptionWarning, ...]:
-    """Check what the object is made of and the number of lamps.
+    """Check the material of the object and the number of lamps.
 
     Parameters
     ----------
     prediction : ScenePrediction
-        What the network says of the photo.
+        Of the photo.
 
     Returns
     -------
@@ -49,9 +49,9 @@ def check_scene(prediction: ScenePrediction) -> tuple[AssumptionWarning, ...]:
         Empty where the assumptions hold.
     """
     clear, several, found = 1 - float(prediction.kinds[0]), prediction.lamps.several, []
-    if clear > LIKELY_CLEAR:
+    if clear > MIRROR_OR_GLASS_THRESHOLD:
         found.append(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, round(clear, 4)))
-    if several > LIKELY_SEVERAL:
+    if several > SEVERAL_LAMPS_THRESHOLD:
         found.append(AssumptionWarning(WarningKind.SEVERAL_LIGHTS, round(several, 4)))
     return tuple(found)
 
@@ -79,7 +79,7 @@ def check_photo(photo: Photo) -> tuple[AssumptionWarning, ...]:
 
 
 def check_highlights(diagnostics: Diagnostics) -> tuple[AssumptionWarning, ...]:
-    """Check whether much light stays that may be highlights.
+    """Check whether much light that may be highlights remains in the diffuse image.
 
     Parameters
     ----------
@@ -112,8 +112,8 @@ def share_in_blocks(mask: np.ndarray) -> float:
     return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
 
 
-def share_that_holds(diagnostics: Diagnostics) -> float:
-    """Compute the factor of the confidence of a photo that violates assumptions.
+def confidence_factor(diagnostics: Diagnostics) -> float:
+    """Compute the factor by which the confidence of a photo that violates assumptions is lowered.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def with_warnings(
     estimate : SceneEstimate
         What a model recovered.
     prediction : ScenePrediction
-        What the network says of the photo.
+        Of the photo.
 
     Returns
     -------
@@ -153,7 +153,7 @@ def with_warnings(
     """
     warnings, split, lamps = check_scene(prediction), estimate.split, prediction.lamps
     if warnings:
-        split = scale_confidence(split, share_that_holds(Diagnostics(warnings=warnings)))
+        split = scale_confidence(split, confidence_factor(Diagnostics(warnings=warnings)))
     diagnostics = replace(
         estimate.diagnostics,
         scene_classes={

@@ -15,7 +15,7 @@ would leave lines along each edge in d, and these are no relief.
 
 From the coarsest level on, the relief R of a level is that which explains d
 (`shading.relief_from_shading`), found from 2 U R of the level before. The height is that of the
-solve plus b R of the finest level; b, which is 0 for paint, is what the whole object says
+solve plus b R of the finest level; b, which is 0 for paint, is estimated from the whole object
 (`shading.relief_evidence`). On the coarsest level R loses its low frequencies too, so that no level
 moves the overall shape; the light stays as it is.
 
@@ -27,8 +27,8 @@ doi:10.1145/566654.566574.
 Tiles: a value depends on pixels near it alone, so relief is the same, bit for bit, for tiles of any
 size.
 
-Limits: relief is where the light from SIRFS says; where that light is from the wrong side, dents
-become bumps.
+Limits: the sign of relief is that of the light from SIRFS; where that light is from the wrong side,
+dents become bumps.
 """
 
 from collections.abc import Iterator
@@ -62,7 +62,7 @@ from .task import DecompositionTask, SceneEstimate
 MULTIPLE = 8  # sides of the frame on the coarsest level, and of tiles
 TILE = 384  # pixels of a tile's side: its maps stay in the cache
 _SOLVED = 300  # pixels: the coarsest level's object is not longer
-_TELLING = 1200  # pixels: levels with a longer object are not asked for evidence
+_MOST_EVIDENCE = 1200  # pixels: no evidence is taken from levels with a longer object
 _MARGIN = 16
 _PERIOD = 0.026  # of the object's length: 6.7 pixels of the solve
 _SIGMA = 0.2829  # of the low pass over the period of which it keeps half
@@ -101,7 +101,7 @@ class Level:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """Smooth maps of a level, interpolated where they are asked for.
+    """Smooth maps of a level, interpolated on demand.
 
     Attributes
     ----------
@@ -145,7 +145,7 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
         If the monitor cancels.
     """
     known, settings = task.known, task.settings
-    # What tells relief from paint was fitted to photos.
+    # The rule that distinguishes relief from paint was fitted to photos.
     is_photo = settings.illumination == Illumination.PHOTO
     if not (settings.detail and is_photo) or known.height is not None or known.depth is not None:
         return estimate
@@ -184,13 +184,12 @@ def fine_relief(
     light : (9, 3) ndarray
         Log-shading SH coefficients, reference convention.
     finest : int
-        Length of the object, pixels, at the finest level that is looked at.
+        Length of the object, pixels, at the finest level that is used.
     monitor : Monitor, optional
     rule : ReliefRule, optional
         By default the shipped one.
     tile : int
-        Side of the tiles that are worked on, pixels, a multiple of 8: memory and time alone depend
-        on it.
+        Side of the tiles, pixels, a multiple of 8: only memory and time depend on it.
 
     Returns
     -------
@@ -266,9 +265,9 @@ class Pyramid:
         return cls(mask, frame, levels, slope, features)
 
     def evidence(self) -> Evidence | None:
-        """Return what the whole object says of relief; None where it is too small."""
+        """Return the evidence for relief of the whole object; None where it is too small."""
         levels, found = self._from_coarsest(np.stack(self.slope, axis=2)), []
-        for level, _, smooth in takewhile(lambda one: one[1] <= _TELLING, levels):
+        for level, _, smooth in takewhile(lambda one: one[1] <= _MOST_EVIDENCE, levels):
             rows, columns = (slice(0, n) for n in level.mask.shape)
             right, down = smooth.at((rows, columns))
             gain = shading_gain((right, down), self.light[:, 0])

@@ -1,7 +1,7 @@
-"""How wrong normals and reflectance probably are, in degrees and in log units.
+"""Expected errors of normals and reflectance, in degrees and in log units.
 
-Problem: a confidence between 0 and 1 ranks pixels, but nobody knows what .4 means. An artist wants
-to know how many degrees the normals may be off, and where.
+Problem: a confidence between 0 and 1 ranks pixels, but .4 has no unit. A user needs the error of
+the normals in degrees, and where it is large.
 
 Equation: the scene network gives the mean m of the probable unit normals at each pixel, so that
 s = arccos |m| is how widely they spread, and the log shading with its deviation q. SIRFS ends at a
@@ -12,8 +12,8 @@ the predicted one, brightness aside. If the two sources were independent, square
     error of log reflectance = sqrt(f^2 q^2 + g^2 r^2)
 
 The second holds as the diffuse image is reflectance times shading. The five constants are fitted by
-least squares to the errors of lit bodies that the network has not learned from, see `CALIBRATION`.
-The confidence is 2^(-error of the normal / 20 degrees).
+least squares to the errors on held-out bodies, see `CALIBRATION`. The confidence is 2^(-error of
+the normal / 20 degrees).
 
 Citation: calibration of a regression's uncertainty: V. Kuleshov, N. Fenner, S. Ermon, "Accurate
 uncertainties for deep learning using calibrated regression", ICML 2018, arXiv:1807.00263; Laplace
@@ -21,7 +21,7 @@ and normal deviations: see `networks.scene_network`.
 
 Limits: the mean error over many pixels of about the same expectation; a single pixel's error varies
 by as much. Errors of the separation count only as far as they bend shape and shading. Calibrated on
-opaque bodies: for mirrors and glass it is a little low, for hair and cast shadows of other things
+opaque bodies: for mirrors and glass it is a little low, for hair and cast shadows of other objects
 unknown. Measured in docs/methods/expected_error.md.
 """
 
@@ -37,7 +37,7 @@ from ..photo import Photo
 from ..scene.decomposition import Decomposition
 from ..scene.diagnostics import ExpectedErrorDiagnostics
 from ..scene.expected_error import ExpectedError
-from .assumption_checks import share_that_holds
+from .assumption_checks import confidence_factor
 
 HALF = 20.0  # degrees of error at which the confidence is .5
 _DARKEST = 1e-6
@@ -71,7 +71,7 @@ CALIBRATION = Calibration(7.337, 0.723, 0.780, 0.660, 1.015)
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the errors are expected from, at N pixels.
+    """Quantities that predict the errors, at N pixels.
 
     Attributes
     ----------
@@ -166,14 +166,14 @@ def with_expected_error(
     ----------
     d : Decomposition
     prediction : ScenePrediction
-        What the network says of the working photo.
+        Of the working photo.
     working : Photo
 
     Returns
     -------
     Decomposition
         The confidence of a photo that violates assumptions is lower by the factor of
-        `assumption_checks.share_that_holds`.
+        `assumption_checks.confidence_factor`.
     """
     normal, shading, mask = d.normal, d.shading, working.mask
     factor = mask.shape[0] / d.mask.shape[0]
@@ -197,7 +197,7 @@ def with_expected_error(
     error, diagnostics = ExpectedError(maps[..., 0], maps[..., 1]), d.provenance.diagnostics
     means = (round(float(part[d.mask].mean(dtype=float)), 4) for part in np.moveaxis(maps, -1, 0))
     diagnostics = replace(diagnostics, expected_error=ExpectedErrorDiagnostics(*means))
-    confidence = share_that_holds(diagnostics) * confidence_of(error.normal)
+    confidence = confidence_factor(diagnostics) * confidence_of(error.normal)
     return replace(
         d,
         confidence=np.where(d.mask, confidence, 0).astype(np.float32),

@@ -6,15 +6,15 @@ that leaves highlights in the diffuse image: shape and light are bent to explain
 reflectance shows them as bright albedo.
 
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
-form shows of highlights: t is a lower bound of the log(I / D) that the scene network predicts
+the scene network adds: t is a lower bound of the log(I / D) that it predicts
 (`separation.support.ratio_bound`), and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being
 nearly white (`separation.support.light_tint`). Colour and form decide together, region by region,
-what of that was a highlight and what was print (`separation.support.highlight_evidence`); the rest
-is given back. Under clipped highlights the paint around is continued
+what of that was a highlight and what was print (`separation.support.highlight_evidence`); the image
+is restored where it was print. The paint under clipped highlights is inpainted
 (`separation.support.clipped_texture`). SIRFS on D_1 gives shape and light. They give a better
 separation: where the network removed much of what colour had left
-(`ResidualHighlights.unreliable`), too little of the albedo is visible; it is continued from the
-surroundings, in the shading at that place,
+(`ResidualHighlights.unreliable`), too little of the albedo is visible; it is inpainted from the
+surroundings, with the shading at that place,
 
     log R = average of log D_1 - SH(normal) over nearby reliable pixels,
     D = min(D_1, R exp(SH(normal)))
@@ -25,15 +25,15 @@ Form adds to colour only where highlights stand out that colour has left
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
 the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
 The step from D_1 to D is kept if E falls, otherwise D_1 stays: E never rises. There is one step:
-SIRFS again on D bends the shape by the errors of the continued albedo, and did not pay
+SIRFS again on D distorts the shape by the errors of the inpainted albedo, and was no gain
 (docs/methods/joint.md).
 
-Citation: inpainting of highlights that keeps to the light: P. Tan, S. Lin, L. Quan, H.-Y. Shum
-2003, doi:10.1109/ICCV.2003.1238333; averages of known values: H. Knutsson and C.-F. Westin 1993,
-doi:10.1109/CVPR.1993.341081.
+Citation: inpainting of highlights that respects the illumination: P. Tan, S. Lin, L. Quan, H.-Y.
+Shum 2003, doi:10.1109/ICCV.2003.1238333; averages of known values: H. Knutsson and C.-F. Westin
+1993, doi:10.1109/CVPR.1993.341081.
 
 Limits: those of the network. A broad veil without a peak stays. Albedo that ends under a highlight
-is continued smoothly.
+is inpainted smoothly.
 """
 
 from dataclasses import dataclass, field, replace
@@ -54,20 +54,20 @@ from ..photo.highlight_marks import HighlightMarks
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation import HIGHLIGHT_ODDS
-from ..separation.support.clipped_texture import continue_under_clipped
-from ..separation.support.highlight_evidence import classified_highlights
+from ..separation.support.clipped_texture import inpaint_clipped
+from ..separation.support.highlight_evidence import classify_highlights
 from ..separation.support.light_tint import limit_tint
 from ..separation.support.ratio_bound import (
     RemovalOptions,
     highlights_stand_out,
     ratio_lower_bound,
 )
-from .layers import separated_first, shaded
+from .layers import normals_and_shading, separated_at_both_scales
 from .lobe import fit_specular
 from .shape import Shape, confidence_weight, energy_of, recover_shape
 from .task import DecompositionTask, SceneEstimate
 
-# shares of the object's diagonal: distances from which albedo is continued
+# shares of the object's diagonal: radii of the averages that inpaint albedo
 _REACHES = (
     0.004,
     0.008,
@@ -77,7 +77,7 @@ _REACHES = (
     0.12,
     0.25,
 )
-_HALF = 0.5  # of the object unreliable: there is nothing to continue its albedo from
+_HALF = 0.5  # of the object unreliable: too little is left to inpaint its albedo from
 _SPREAD = 2  # pixels around clipped ones that mix with them
 _MOSTLY = 0.5  # of a clipped hole lies in a kept region
 _ENOUGH = 0.1  # of a neighbourhood known: nearer ones decide
@@ -85,7 +85,7 @@ _ENOUGH = 0.1  # of a neighbourhood known: nearer ones decide
 
 @dataclass(frozen=True)
 class JointOptions:
-    """When highlights stand out, and how the step beyond MDR is weighed.
+    """Thresholds of highlights, and the weight of the step beyond MDR.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class JointOptions:
     network : RemovalOptions
         When light that the network expects to be a highlight is removed.
     odds : float
-        That removed light was a highlight, to be exceeded; above 0.
+        Least odds at which removed light is taken for a highlight; above 0.
     """
 
     unreliable_from: float = 0.15
@@ -132,7 +132,7 @@ class SupportedLayers:
     residual : ResidualHighlights or None
         What form adds; None if nothing.
     doubtful : float
-        See `highlight_evidence.Judgement`.
+        As `highlight_evidence.ClassifiedHighlights.doubtful`.
     """
 
     split: Separation
@@ -156,7 +156,7 @@ class JointStep:
     diffuse : (h, w, 3) ndarray
         D if the step was kept, otherwise D_1.
     kept : bool
-        Whether albedo was continued.
+        Whether albedo was inpainted.
     """
 
     shape: Shape
@@ -188,7 +188,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     """
     options = options or JointOptions(odds=task.settings.highlight_odds)
     monitor, working = task.monitor, task.working
-    split, layers = separated_first(task)
+    split, layers = separated_at_both_scales(task)
     task = replace(task, split=None)
     with task.clock.stage("separation"):
         support = supported_layers(
@@ -207,7 +207,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     step = _step(task, residual, layers.diffuse, weight, options)
     outcome = JointOutcome.UNCHANGED
     if residual is not None:
-        outcome = JointOutcome.CONTINUED if step.kept else JointOutcome.REMOVED
+        outcome = JointOutcome.INPAINTED if step.kept else JointOutcome.REMOVED
     split = _split(layers if task.one_scale else split, residual, step, task, options)
     lobe = fit_specular(split, step.shape, task, monitor.part(0.92, 0.96))
     diagnostics = replace(
@@ -232,8 +232,10 @@ def _step(
         return JointStep(recover_shape(by_colour, task, monitor, weight), by_colour, False)
     start = residual.diffuse
     shape = recover_shape(start, task, monitor, weight)
-    _, shading = shaded(shape.working_height, shape.light, mask, task.options.layer_dtype)
-    cleaner = continue_albedo(residual, shading, start, mask)
+    _, shading = normals_and_shading(
+        shape.working_height, shape.light, mask, task.options.layer_dtype
+    )
+    cleaner = inpaint_albedo(residual, shading, start, mask)
     before, after = (energy_of(diffuse, shape, task, weight) for diffuse in (start, cleaner))
     kept = lowers_energy(before, after, start, cleaner, mask, options)
     return JointStep(shape, cleaner if kept else start, kept)
@@ -248,7 +250,7 @@ def supported_layers(
     clipped: np.ndarray | None = None,
     marks: HighlightMarks | None = None,
 ) -> SupportedLayers:
-    """Add what form shows of highlights to what colour shows, and keep what both support.
+    """Add the network's highlights to those found by colour, and keep what both support.
 
     Parameters
     ----------
@@ -259,13 +261,13 @@ def supported_layers(
     mask : (H, W) ndarray of bool
         The object.
     prediction : ScenePrediction or LayerPrediction, optional
-        What the scene network says of the image; by default the shipped one is asked.
+        Of the image; by default that of the shipped network.
     options : JointOptions, optional
         Thresholds.
     clipped : (H, W) ndarray of bool, optional
-        Where highlights hide the paint, it is continued from around.
+        The paint under clipped highlights is inpainted.
     marks : HighlightMarks, optional
-        What a person says of highlights.
+        Places that a user has marked as highlight or print.
 
     Returns
     -------
@@ -275,20 +277,20 @@ def supported_layers(
     residual = detect_residual_highlights(image, split.diffuse, mask, prediction, options)
     cleaner = split.diffuse if residual is None else residual.diffuse
     form = prediction.log_ratio, prediction.ratio_scale
-    classified = classified_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
+    classified = classify_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
     hidden = _hidden(classified.kept, clipped, mask)
     kept = classified.kept | hidden
     split = replace(
         split,
-        diffuse=_given_back(split.diffuse, image, kept, mask),
-        specular=_only(split.specular, kept),
-        residual=_only(split.residual, kept),
+        diffuse=_restored(split.diffuse, image, kept, mask),
+        specular=_restricted(split.specular, kept),
+        residual=_restricted(split.residual, kept),
     )
     diffuse = split.diffuse
     if residual is not None:
-        diffuse = _given_back(cleaner, image, kept, mask, out=cleaner)
+        diffuse = _restored(cleaner, image, kept, mask, out=cleaner)
     if hidden.any():
-        whole = continue_under_clipped(diffuse, image, hidden, mask, prediction.log_shading)
+        whole = inpaint_clipped(diffuse, image, hidden, mask, prediction.log_shading)
         diffuse = diffuse if residual is not None else diffuse.copy()
         np.copyto(diffuse, whole, where=hidden[..., None])
     if residual is not None and kept.any():
@@ -311,7 +313,7 @@ def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> n
     return np.asarray(belongs[labels])
 
 
-def _given_back(
+def _restored(
     diffuse: np.ndarray,
     image: np.ndarray,
     kept: np.ndarray,
@@ -329,7 +331,7 @@ def _given_back(
     return found
 
 
-def _only(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
+def _restricted(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
     found = np.zeros_like(layer)
     for block in row_blocks(kept.shape, pixels=1 << 14):
@@ -362,7 +364,7 @@ def detect_residual_highlights(
     mask : (H, W) ndarray of bool
         The object.
     prediction : ScenePrediction or LayerPrediction, optional
-        What the scene network says of the image; by default the shipped one is asked.
+        Of the image; by default that of the shipped network.
     options : JointOptions, optional
         Thresholds.
 
@@ -376,7 +378,7 @@ def detect_residual_highlights(
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows
-        left[rows] = _left(image[rows], diffuse[rows], expected[rows], mask[rows])
+        left[rows] = _remaining_ratio(image[rows], diffuse[rows], expected[rows], mask[rows])
     if not highlights_stand_out(left, mask, options.network.stands_out):
         return None
     much = left.mean(axis=2) > options.unreliable_from
@@ -391,10 +393,10 @@ def detect_residual_highlights(
     return ResidualHighlights(cleaner, unreliable)
 
 
-def _left(
+def _remaining_ratio(
     image: np.ndarray, diffuse: np.ndarray, expected: np.ndarray, mask: np.ndarray
 ) -> np.ndarray:
-    """What the network expects (h, w, 3) of log(I / D), beyond what is taken off."""
+    """Predicted log(I / D) (h, w, 3) less that of the separation by colour, at least 0."""
     inside = mask[..., None]
     taken = np.log(
         np.maximum(np.where(inside, image, 1), 1e-9)
@@ -423,10 +425,10 @@ def without_unreliable(confidence: np.ndarray, residual: ResidualHighlights | No
     return np.where(residual.unreliable, 0, confidence).astype(np.float32)
 
 
-def continue_albedo(
+def inpaint_albedo(
     residual: ResidualHighlights, shading: np.ndarray, start: np.ndarray, mask: np.ndarray
 ) -> np.ndarray:
-    """Continue the albedo of unreliable pixels from their surroundings.
+    """Inpaint the albedo of unreliable pixels from their surroundings.
 
     Parameters
     ----------
@@ -512,8 +514,8 @@ def _split(
         if residual is not None:
             diffuse = residual.diffuse
             if step.kept:
-                _, shading = shaded(shape.height, shape.light, photo.mask, dtype)
-                diffuse = continue_albedo(residual, shading, diffuse, photo.mask)
+                _, shading = normals_and_shading(shape.height, shape.light, photo.mask, dtype)
+                diffuse = inpaint_albedo(residual, shading, diffuse, photo.mask)
     if residual is None:
         return start
     diffuse = diffuse.astype(dtype)

@@ -58,7 +58,7 @@ def separated(
     return replace(split, diffuse=diffuse)
 
 
-def separated_first(task: DecompositionTask) -> tuple[Separation, Separation]:
+def separated_at_both_scales(task: DecompositionTask) -> tuple[Separation, Separation]:
     """Separate the photo at both scales by the separator of the settings.
 
     Parameters
@@ -133,7 +133,7 @@ def scale_confidence(split: Separation, share: float = 0.5) -> Separation:
     return replace(split, confidence=np.float32(share) * split.confidence)
 
 
-def shaded(
+def normals_and_shading(
     height: np.ndarray, light: np.ndarray, mask: np.ndarray, dtype: _Dtype = np.float32
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute normals and shading of a height under a light: shading = exp(SH(normal)).

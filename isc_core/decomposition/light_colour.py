@@ -60,16 +60,16 @@ def under_light(
         If the monitor cancels.
     """
     settings = task.settings
-    wanted = settings.light_colour == LightColour.ESTIMATE
+    estimated = settings.light_colour == LightColour.ESTIMATE
     checked = task.options.check_assumptions and settings.model in SEPARATING_MODELS
-    if not (wanted or checked):
+    if not (estimated or checked):
         return solver(task)
-    with ThreadPoolExecutor(1) as aside:
-        asked = aside.submit(_estimated, task)
-        used = wanted and asked.result().determined  # a model waits only for a colour that it uses
-        colour = asked.result().colour if used else np.ones(3)
-        estimate = _back(solver(_whitened(task, colour)), colour) if used else solver(task)
-        light = asked.result()
+    with ThreadPoolExecutor(1) as pool:
+        future = pool.submit(_estimated, task)
+        used = estimated and future.result().determined  # only then the model waits for it
+        colour = future.result().colour if used else np.ones(3)
+        estimate = _with_light(solver(_whitened(task, colour)), colour) if used else solver(task)
+        light = future.result()
     split = scale_confidence(estimate.split) if light.outcome.too_strong else estimate.split
     diagnostics = replace(
         estimate.diagnostics, light_colour=_diagnostics(light, settings.light_colour, used)
@@ -92,7 +92,8 @@ def under_given_light(
     task : DecompositionTask
         The photo and the settings.
     solver : callable
-        All that follows, predictions included: it sees the photo without the light's colour.
+        The rest of the pipeline, predictions included: it gets the photo without the light's
+        colour.
 
     Returns
     -------
@@ -110,13 +111,13 @@ def under_given_light(
     if given is None:
         return solver(task)
     colour = np.array(given)
-    return _back(solver(_whitened(task, colour)), colour)
+    return _with_light(solver(_whitened(task, colour)), colour)
 
 
-def _diagnostics(light: Illuminant, asked: str, used: bool) -> LightColourDiagnostics:
+def _diagnostics(light: Illuminant, setting: str, used: bool) -> LightColourDiagnostics:
     red, green, blue = (round(float(part), 4) for part in light.colour)
     return LightColourDiagnostics(
-        LightColour.BALANCED if asked == LightColour.ESTIMATE and not used else asked,
+        LightColour.BALANCED if setting == LightColour.ESTIMATE and not used else setting,
         (red, green, blue),
         round(light.confidence, 4),
         light.outcome,
@@ -151,7 +152,7 @@ def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:
     return replace(photo, image=whitened(photo.image, colour))
 
 
-def _back(estimate: SceneEstimate, colour: np.ndarray) -> SceneEstimate:
+def _with_light(estimate: SceneEstimate, colour: np.ndarray) -> SceneEstimate:
     """The estimate under the photo's light; height and confidence stay."""
     brdf = None if estimate.brdf is None else _lobe(estimate.brdf, colour)
     return replace(

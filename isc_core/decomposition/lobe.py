@@ -20,7 +20,7 @@ from ..scene.lobe_fit import LobeFit, LobeFitOptions, LobeFitOutcome, LobeModel
 from ..shading.brdf.roughness import blender_from_alpha
 from ..sirfs.priors.prior_file import shipped_prior_set
 from ..sirfs.silhouette import silhouette_normals
-from .layers import shaded
+from .layers import normals_and_shading
 from .shape import Shape
 from .task import DecompositionTask
 
@@ -38,7 +38,7 @@ class FittedLobe:
     Attributes
     ----------
     brdf : LobeFit or None
-        The fit; None where no separator looked for highlights.
+        The fit; None where no separator was run.
     clipped : float
         Share of the object that is clipped.
     """
@@ -98,7 +98,7 @@ def fit_specular(
     Returns
     -------
     FittedLobe
-        Without a fit where no separator looked for highlights.
+        Without a fit where no separator was run.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def fit_specular(
             return FittedLobe(LobeFit.without_lobe(model, none, photo.image.shape), clipped)
         from ..lobe_fitting import PixelData, fit_lobe
 
-        normal, shading = shaded(shape.height, shape.light, photo.mask)
+        normal, shading = normals_and_shading(shape.height, shape.light, photo.mask)
         fit = fit_lobe(
             split.specular,
             normal,

@@ -30,7 +30,7 @@ import numpy as np
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..separation import separate
-from .layers import shaded, unseparated
+from .layers import normals_and_shading, unseparated
 from .lobe import fit_specular
 from .shape import recover_shape
 from .task import DecompositionTask, SceneEstimate
@@ -62,7 +62,9 @@ def mbp(task: DecompositionTask) -> SceneEstimate:
     monitor.report(f"separating the reflectance ({method})", 0.88)
     photo = task.maps
     with task.clock.stage("separation"):
-        _, shading = shaded(shape.height, shape.light, photo.mask, task.options.layer_dtype)
+        _, shading = normals_and_shading(
+            shape.height, shape.light, photo.mask, task.options.layer_dtype
+        )
         split = split_reflectance(
             photo.image, shading, photo.mask, photo.clipped, method, monitor.part(0.88, 0.92)
         )

@@ -1,20 +1,20 @@
-"""Modified Dichromatic Reflectance: the specular light is separated first, SIRFS sees the diffuse
-image.
+"""Modified Dichromatic Reflectance: the specular light is separated first, then SIRFS solves the
+diffuse image.
 
 Equation: image = reflectance * shading + specular.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image"
 (2016; no DOI); the dichromatic model: S. A. Shafer 1985, doi:10.1002/col.5080100409.
 
-With `Settings.confidence_weights` a pixel counts in SIRFS' reflectance terms by the separation's
-confidence (`sirfs.reflectance`).
+With `Settings.confidence_weights` pixels are weighted in SIRFS' reflectance terms by the
+separation's confidence (`sirfs.reflectance`).
 
 Limits: SIRFS takes the separation's errors, in either direction, at face value.
 """
 
 from dataclasses import replace
 
-from .layers import separated_first
+from .layers import separated_at_both_scales
 from .lobe import fit_specular
 from .shape import confidence_weight, recover_shape
 from .task import DecompositionTask, SceneEstimate
@@ -40,7 +40,7 @@ def mdr(task: DecompositionTask) -> SceneEstimate:
     Cancelled
         If the monitor cancels.
     """
-    split, working = separated_first(task)
+    split, working = separated_at_both_scales(task)
     weight = confidence_weight(working.confidence, task.settings.confidence_weights)
     shape = recover_shape(working.diffuse, task, task.monitor.part(0.08, 0.92), weight)
     lobe = fit_specular(split, shape, task, task.monitor.part(0.92, 0.96))

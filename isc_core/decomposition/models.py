@@ -1,15 +1,14 @@
-"""The models: how separation, shape and light are combined to explain one photo. One model a file,
-and one function that knows their names.
+"""The models: how separation, shape and light are combined to explain one photo. One model per
+file, and one function that looks them up by name.
 
 A model is a function from a `DecompositionTask` to a `SceneEstimate`: `sirfs_only.sirfs`,
 `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with. `toning` makes toned
-photos grey, `light_colour` decides which colour of light they see; those that recover shape and
-light are given what a network sees in the photo (`predictions`), and `assumption_checks` lowers the
-confidence of photos that violate what the models assume.
+photos grey, `light_colour` divides the light's colour out; those that recover shape and light use
+the predictions of a network (`predictions`), and `assumption_checks` lowers the confidence of
+photos that violate what the models assume.
 
-The network, the separation by colour and the loading of kernels do not wait for each other: they
-run on threads; `load` begins while the photo is read. Results are those of the same functions,
-whenever they run.
+The network, the separation by colour and the loading of kernels are independent of each other and
+run on threads; `load` begins while the photo is read. The order does not affect results.
 
 Limits: where the light's colour is to be estimated, it changes the photo that is separated, which
 then waits. Python interprets one thread at a time: what overlaps are array operations.
@@ -89,7 +88,7 @@ def _solved(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Predict, solve and check."""
-    with _Ahead(task) as ahead:
+    with _BackgroundWork(task) as ahead:
         task = with_predictions(task)
         estimate = under_light(task, lambda lit: solver(ahead.added(lit)))
     estimate = replace(estimate, prediction=task.prediction)
@@ -101,8 +100,8 @@ def _solved(
     return with_warnings(task.maps, estimate, task.prediction)
 
 
-class _Ahead:
-    """Work for a task that begins with the `with` block, and ends with it at the latest.
+class _BackgroundWork:
+    """Separation and loading of kernels on threads, during a `with` block.
 
     Parameters
     ----------
@@ -144,7 +143,7 @@ class _Ahead:
         split, self._split = self._split, None  # it is not kept while the task is solved
         return task if split is None else replace(task, split=split.result())
 
-    def __enter__(self) -> "_Ahead":
+    def __enter__(self) -> "_BackgroundWork":
         return self
 
     def __exit__(

@@ -37,7 +37,7 @@ from ..shading.perspective import (
     view_directions,
 )
 from ..shading.spherical_harmonics import light_from_reference, real_sh
-from .layers import shaded
+from .layers import normals_and_shading
 from .settings import CameraChoice, Settings
 from .task import SceneEstimate
 
@@ -95,7 +95,7 @@ def before_camera(
         Coefficients of log shading, camera frame.
     """
     axis = object_axis(camera, mask)
-    flat, _ = shaded(estimate.height, estimate.light, mask)
+    flat, _ = normals_and_shading(estimate.height, estimate.light, mask)
     normal = lifted_normals(estimate.height, camera, axis).astype(np.float32)
     normal[~mask] = VIEW
     light = light_from_reference(estimate.light)
@@ -151,7 +151,7 @@ def lobe_before_camera(
     fit = estimate.brdf
     if fit is None or not fit.lights:
         return fit
-    flat = shaded(estimate.height, estimate.light, mask)[0][mask].astype(float)
+    flat = normals_and_shading(estimate.height, estimate.light, mask)[0][mask].astype(float)
     view = view_directions(camera, (mask.shape[0], mask.shape[1]))[mask]
     before, after = _mirrored(flat, VIEW), _mirrored(normal[mask].astype(float), view)
     lights = []

@@ -26,7 +26,7 @@ from ..shading.spherical_harmonics import light_from_reference, light_to_referen
 from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import share_in_blocks
 from .expected_error import with_expected_error
-from .layers import shaded
+from .layers import normals_and_shading
 from .models import DecompositionTask, SceneEstimate, Settings, solve
 from .perspective import before_camera, lobe_before_camera, with_camera
 from .settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
@@ -208,7 +208,7 @@ def assemble(
     """
     mask, split, height, camera = photo.mask, estimate.split, estimate.height, photo.camera
     if camera is None:
-        normal, shading = shaded(height, estimate.light, mask)
+        normal, shading = normals_and_shading(height, estimate.light, mask)
         light, brdf = light_from_reference(estimate.light), estimate.brdf
     else:
         normal, shading, light = before_camera(estimate, camera, mask, known_light=known_light)

@@ -1,8 +1,7 @@
-"""What the scene network says of a photo, as soft terms of the models.
+"""Predictions of the scene network, as soft terms of the models.
 
-The network is asked once, about the working photo as it was taken, with its highlights: it has
-learned from such photos. What a protocol gives or a user knows is not replaced: normals that are
-given, the shape behind an observed depth.
+The network is run once, on the working photo with its highlights, since it was trained on such
+photos. Quantities that are given are not replaced: normals, or a shape behind an observed depth.
 
 Equation: see `networks.scene_network`; how normals, shading and light enter SIRFS is in
 `sirfs.normal_prior`, `sirfs.shading_term` and `sirfs.priors.light_posterior`.
@@ -19,12 +18,12 @@ from .task import DecompositionTask
 
 
 def with_predictions(task: DecompositionTask) -> DecompositionTask:
-    """Ask the network, and add normals, shading and light as far as the settings use them.
+    """Run the network, and add normals, shading and light as far as the settings use them.
 
     Parameters
     ----------
     task : DecompositionTask
-        What it has already stays.
+        Predictions that it already has are kept.
 
     Returns
     -------

@@ -33,7 +33,7 @@ class CameraChoice(StrEnum):
     Attributes
     ----------
     AUTO
-        From the photo's EXIF; orthographic where it tells no focal length.
+        From the photo's EXIF; orthographic where it has no focal length.
     ORTHOGRAPHIC
         Parallel rays.
     """
@@ -48,8 +48,8 @@ class Illumination(StrEnum):
     Attributes
     ----------
     PHOTO
-        A photo of balanced colours in any light: priors of their own, and more trust in what the
-        network predicts.
+        A white-balanced photo in any light: priors of their own, and larger weights of the
+        network's predictions.
     NATURAL
         The MIT-Berkeley objects in natural light.
     LABORATORY
@@ -201,8 +201,8 @@ class Settings:
     camera : CameraChoice or str
         The camera, or its focal length: millimetres, 35-mm equivalent by the diagonal.
     highlight_odds : float
-        For the model joint: odds, to be exceeded, that light which colour or form would take off is
-        a highlight, and not print; 0 takes off all of it.
+        For the model joint: light is removed where its odds of being a highlight, and not print,
+        exceed this number; 0 removes all candidates.
     """
 
     model: str = "joint"
@@ -268,8 +268,8 @@ class Settings:
         return self.illumination == Illumination.PHOTO and self.light_colour != LightColour.FREE
 
     @property
-    def tempers_saturation(self) -> bool:
-        """Whether SIRFS sees saturated colours as less saturated, for the noise in them."""
+    def desaturates(self) -> bool:
+        """Whether SIRFS solves a less saturated photo, because dark channels are noisy."""
         return self.illumination == Illumination.PHOTO
 
     def check(self) -> None:

@@ -1,18 +1,20 @@
 """Shape and light of a diffuse image by SIRFS, as the models use it.
 
-Problem: the priors know how bright albedo and light are in photos, but a float file may have any
+Problem: the priors expect albedo and light as bright as in photos, but a float file may have any
 exposure.
 
 Equation: such an image is multiplied by a gain that brings it to the brightness of photos, and the
 recovered light is divided by the gain, so that neither shape nor roughness depend on the exposure.
 
-In the darkest channel of a saturated colour noise, compression and what neighbours reflect are
-large beside the object's own light, and log shading makes relief of them. Photos are solved with a
-part of their largest channel in every channel, I'_c = (I_c + v max I) / (1 + v): grey and
-brightness stay, and the channels' ratio is bounded by (1 + v) / v. Reflectance is that of I.
+In the darkest channel of a saturated colour, noise, compression and interreflections are large
+relative to the object's own light, and become relief in the log shading. A part of the largest
+channel is therefore added to every channel of photos before they are solved, I'_c = (I_c + v max I)
+/ (1 + v): grey and brightness stay, and the channels' ratio is bounded by (1 + v) / v. Reflectance
+is that of I.
 
-Limits: what the exposure of a photo says about its albedo is then lost: without it the ten training
-objects have 2 % more error, in natural and in laboratory light; at a level of .55 11 %, at .4 20 %.
+Limits: the information on albedo in the exposure of a photo is then lost: without it the ten
+training objects have 2 % more error, in natural and in laboratory light; at a level of .55 11 %, at
+.4 20 %.
 """
 
 from dataclasses import dataclass, replace
@@ -40,7 +42,7 @@ from .task import DecompositionTask
 # photos and .4 to 1 in others.
 _TYPICAL_LEVEL = 0.75
 _BRIGHT = 95.0  # percentile: most highlights are smaller
-_VEIL = 0.1  # chosen on held-out bodies; docs/methods/light_colour.md
+_DESATURATION = 0.1  # chosen on held-out bodies; docs/methods/light_colour.md
 _LEAST_WEIGHT = 0.05
 
 
@@ -131,14 +133,14 @@ def energy_of(
     return _recover(diffuse, task, fixed, Monitor(), weight).terms.total
 
 
-def tempered(image: np.ndarray, veil: float = _VEIL) -> np.ndarray:
+def desaturated(image: np.ndarray, amount: float = _DESATURATION) -> np.ndarray:
     """Bound the ratio of a pixel's channels.
 
     Parameters
     ----------
     image : (H, W, 3) ndarray
         Linear, not negative.
-    veil : float, optional
+    amount : float, optional
         v above, not negative.
 
     Returns
@@ -146,7 +148,7 @@ def tempered(image: np.ndarray, veil: float = _VEIL) -> np.ndarray:
     (H, W, 3) ndarray
         Of the same type; the largest channel of each pixel stays.
     """
-    share = image.dtype.type(veil)
+    share = image.dtype.type(amount)
     return (image + share * image.max(axis=2, keepdims=True)) / (1 + share)
 
 
@@ -186,8 +188,8 @@ def _recover(
         if known.light is None or channels == 3
         else known.light.mean(axis=1, keepdims=True)
     )
-    if channels == 3 and settings.tempers_saturation and task.known.light is None:
-        diffuse = tempered(diffuse)
+    if channels == 3 and settings.desaturates and task.known.light is None:
+        diffuse = desaturated(diffuse)
     gain = _exposure_gain(working)
     if light is not None and gain != 1:
         light = scaled_light(light, np.log(gain))

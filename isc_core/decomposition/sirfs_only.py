@@ -5,7 +5,7 @@ Equation: image = reflectance * shading.
 Citation: J. T. Barron, J. Malik, "Shape, illumination, and reflectance from shading", TPAMI 2015,
 doi:10.1109/TPAMI.2014.2377712.
 
-Limits: highlights become pale albedo and bend the shape.
+Limits: highlights become pale albedo and distort the shape.
 """
 
 from .layers import unseparated

@@ -1,4 +1,4 @@
-"""What every model is given, and what it returns."""
+"""Input and output of every model."""
 
 import time
 from collections.abc import Iterator
@@ -72,19 +72,19 @@ class SolveOptions:
     drop_near_edge : bool
         Occluding-contour points near the frame are ignored.
     layer_dtype : type
-        Precision of the layers and of the shading that they are divided by.
+        Floating-point type of the layers and of the shading that they are divided by.
     fit_lobe : bool
         A lobe is fitted to the specular layer.
     check_assumptions : bool
         The photo is checked against the models' assumptions, and the light's colour is estimated
         even where it is not used.
     scene_network : SceneNetwork or None
-        What looks at the photo; None for the shipped network.
+        The scene network; None for the shipped one.
     prediction_weights : PredictionWeights or None
-        How far predicted normals, shading and light coefficients are trusted; None: as usual in
-        the illumination.
+        Weights of predicted normals, shading and light coefficients; None for those of the
+        illumination.
     light_colour_weight : LightColourWeight
-        How strongly white light is expected, where it is.
+        Weight of the prior of white light, where it is used.
     """
 
     solve_size: int = SOLVE_SIZE
@@ -122,7 +122,7 @@ class DecompositionTask:
     split : Separation or None
         Layers of `maps` by the separator of the settings, where already computed.
     prediction : ScenePrediction or None
-        What the scene network says of the working photo, where already asked.
+        The scene network's prediction for the working photo, where already computed.
     normal_estimate : NormalEstimate or None
         Predicted normals at the working scale, where already computed; used in any light.
     shading_estimate : ShadingEstimate or None
@@ -178,7 +178,7 @@ class SceneEstimate:
         A baseline's own log shading at the working scale, where it has one. The maps of a result
         never use it, since their shading is that of the light on the normals.
     prediction : ScenePrediction or None
-        What the scene network says of the working photo, where it was asked.
+        The scene network's prediction for the working photo, where it was run.
     """
 
     split: Separation

@@ -7,9 +7,9 @@ Equation: the grey photo, of the luminance Y, is solved with one channel. Every 
 reflectance, is then multiplied by I / Y, pixel by pixel: the layers sum to the photo again, and the
 light is white.
 
-Limits: a photo is toned where the user says so, since a toned photo and a photo of one-coloured
-things show the same colours. Not told, the light of photos is expected to be white, and most of the
-tone is in the reflectance, too.
+Limits: a photo is toned where the user says so, since a toned photo and a photo of objects of one
+colour look the same. Otherwise the light is expected to be white, and most of the tone goes into
+the reflectance.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ def under_tone(
     ----------
     task : DecompositionTask
     solver : callable
-        All that follows, predictions included.
+        The rest of the pipeline, predictions included.
 
     Returns
     -------

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..decomposition.shape import exposure_normalisation, tempered
+from ..decomposition.shape import desaturated, exposure_normalisation
 from ..scene.decomposition import Decomposition
 from ..sirfs.priors.prior_file import shipped_priors
 from ..sirfs.priors.priors import Priors
@@ -118,5 +118,5 @@ def with_diffuse(
     -------
     ReflectanceTerms
     """
-    light = np.maximum(gain * tempered(diffuse.astype(float)), _DARKEST)
+    light = np.maximum(gain * desaturated(diffuse.astype(float)), _DARKEST)
     return replace(terms, log_diffuse=np.where(mask[..., None], np.log(light), 0.0), mask=mask)

@@ -32,7 +32,7 @@ _Member = TypeVar("_Member", bound=StrEnum)
 _OLD_JOINT = (
     ("no highlights but", JointOutcome.UNCHANGED),
     ("continuing the paint under them did not", JointOutcome.REMOVED),
-    ("and the paint under them continued", JointOutcome.CONTINUED),
+    ("and the paint under them continued", JointOutcome.INPAINTED),
 )
 _OLD_WARNINGS = (
     ("looks like a mirror", WarningKind.MIRROR_OR_GLASS),

@@ -42,7 +42,7 @@ _JOINT = {
         "highlights that colour does not show were removed; continuing the albedo under them did "
         "not lower the energy"
     ),
-    JointOutcome.CONTINUED: (
+    JointOutcome.INPAINTED: (
         "highlights that colour does not show were removed, and the albedo under them continued "
         "with the help of shape and light"
     ),

@@ -38,14 +38,14 @@ class JointOutcome(StrEnum):
     UNCHANGED
         No highlights stand out that colour does not show: the result is MDR's.
     REMOVED
-        Such highlights were removed; continuing the albedo under them did not lower the energy.
-    CONTINUED
-        Such highlights were removed, and the albedo under them continued.
+        Such highlights were removed; inpainting the albedo under them did not lower the energy.
+    INPAINTED
+        Such highlights were removed, and the albedo under them was inpainted.
     """
 
     UNCHANGED = "unchanged"
     REMOVED = "highlights removed"
-    CONTINUED = "albedo continued"
+    INPAINTED = "albedo continued"
 
 
 class LobeFitOutcome(StrEnum):
@@ -86,7 +86,7 @@ class LobeStatus(StrEnum):
     Attributes
     ----------
     NOT_FITTED
-        No separator looked for highlights.
+        No separator was run.
     NO_HIGHLIGHTS
         There are next to no highlights.
     HIDDEN

@@ -15,7 +15,7 @@ class LightCoefficientsEstimate:
         Log-shading SH coefficients, ISC's convention (`shading.spherical_harmonics`).
     covariance : (27, 27) ndarray
         Of the coefficients one channel after the other, positive definite. The brightness shared
-        by all channels is taken as unknown, whatever is said of it here.
+        by all channels is taken as unknown, whatever its covariance here.
     """
 
     mean: np.ndarray

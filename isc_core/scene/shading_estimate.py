@@ -10,7 +10,7 @@ class ShadingEstimate:
     """Predicted log shading of an object.
 
     The brightness that shading and albedo share is unknown: one constant per image, the same in all
-    channels, may be added to `log_shading` without changing what it says.
+    channels, may be added to `log_shading` without a change of meaning.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""The separator of this project: it removes only highlights that a photo proves to be highlights.
+"""The separator of this project: it removes a highlight only where colour shows that it is one.
 
 Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). By colour alone pale
-reflectance passes for a highlight; the harm then far exceeds what all highlights are worth. So a
+reflectance is mistaken for a highlight, with larger errors than those of all highlights. So a
 candidate s is found by colour, and then has to pass tests.
 
 Equation: with C = max I - min I, which white light leaves unchanged, and the diffuse ratio q = min
@@ -244,7 +244,7 @@ def separate(
         Pixels outside have no influence.
     options : IscOptions, optional
     clipped : (H, W) bool ndarray, optional
-        Pixels whose true value lies above the recorded one: they shape no statistic.
+        Pixels whose true value lies above the recorded one: statistics ignore them.
     monitor : Monitor, optional
     prior : (H, W) ndarray, optional
         Probability of a visible highlight, in [0, 1]; 0.5 where unknown.
@@ -280,7 +280,7 @@ def separate(
     candidates = _candidates(photo, ratios, options)
     monitor.report("removing highlights", 0.8)
     if factor == 1:
-        specular, low = _weighed(candidates, prior), photo.low
+        specular, low = _combined(candidates, prior), photo.low
     else:
         specular, low = _of_full_size(image, mask, ratios, candidates, factor, prior)
     peak = _peak(image, mask)
@@ -650,14 +650,14 @@ def _of_full_size(
         by_hue = _specular(part.low, part.chroma, hue_share)
         by_place = _specular(part.low, part.chroma, share)
         here = None if prior is None else prior[block.rows]
-        specular[block.rows] = _weighed(
+        specular[block.rows] = _combined(
             _Candidates(by_hue, gain_by_hue, by_place, gain_by_place, share), here
         )
         low[block.rows] = part.low
     return specular, low
 
 
-def _weighed(candidates: _Candidates, prior: np.ndarray | None) -> np.ndarray:
+def _combined(candidates: _Candidates, prior: np.ndarray | None) -> np.ndarray:
     """s, the larger of the two candidates as far as they are gains."""
     return np.maximum(
         candidates.by_hue * _apply_prior(candidates.gain_by_hue, prior),

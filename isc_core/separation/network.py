@@ -1,14 +1,14 @@
-"""Separation by what the highlight network sees, for photos of any size.
+"""Separation by the highlight network, for photos of any size.
 
-Problem: a highlight on a grey surface has the surface's colour; what reveals it is its form, its
-place on the shape, and the reflectance around it. The network weighs them all, but it also takes
-some bright albedo for highlights. Light that is wrongly taken off does more harm than a highlight
-that stays.
+Problem: a highlight on a grey surface has the surface's colour; the cues are its form, its place on
+the shape, and the reflectance around it. The network uses all of them, but it also mistakes some
+bright albedo for highlights. Light that is removed by mistake does more harm than a highlight that
+remains.
 
-Equation: the network expects specular light s, with a standard deviation
+Equation: the network predicts specular light s, with a standard deviation
 (`networks.highlight_network`); `doubt` is subtracted from its log odds. Where the odds are right,
-taking s off lowers the expected squared error; s of less than a fifth of a detail stays. From the
-photo as a whole nothing is taken unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
+removing s lowers the expected squared error; s of less than a fifth of a detail stays. Nothing is
+removed from the photo unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
 `stands_out`. D = I exp(-t), and `light_tint` limits the colour of the removed light. Confidence is
 1 / (1 + e / u), e the deviation and u a tenth of the mean light.
 
@@ -96,7 +96,7 @@ def separate(
 
 
 def expected_ratio(image: np.ndarray, prediction: HighlightPrediction) -> np.ndarray:
-    """Return the log ratio of a photo and of what is left of it without the expected highlights.
+    """Return the log ratio of a photo and of what remains of it without the predicted highlights.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def expected_ratio(image: np.ndarray, prediction: HighlightPrediction) -> np.nda
     Returns
     -------
     (H, W, 3) float32 ndarray
-        Not negative, 0 where there are no highlights, or hardly likely ones.
+        Not negative, 0 where there are no highlights, or only unlikely ones.
     """
     light = np.where(prediction.share > _LEAST_LIKELY, prediction.specular, 0)[..., None]
     inside, least = light > 0, np.float32(_MIN_SHARE) * image

@@ -20,8 +20,8 @@ smooth one, never negative:
     L <- L * (K'(S / (K L)) + c) / (K'(1) + c)
 
 with c = 0. A direction behind the object is seen by few normals, all near the rim. There, 100 steps
-multiply what these few ask for: up to 80 times the mean light has stood in one pixel right behind
-an object, where a glossy surface mirrors it at its rim. With c of a twentieth of the largest K'(1),
+amplify the errors of these few: one pixel right behind an object reached 80 times the mean light,
+which a glossy surface mirrors at its rim. With c of a twentieth of the largest K'(1),
 `recovered_environment` has the same fixed points and as good a shading, and such directions stay
 near the mean light. Both are meant for equal solid angles.
 
@@ -42,7 +42,7 @@ from .spherical_harmonics import real_sh
 
 # Normals at a time: their kernel is a matrix with a column for every pixel of the environment.
 _CHUNK = 4096
-_INERTIA = 0.05  # chosen on scenes 6 to 32 of `benchmarks.refinement.gloss_scenes`
+_DAMPING = 0.05  # chosen on scenes 6 to 32 of `benchmarks.refinement.gloss_scenes`
 
 
 def directions(rows: int) -> np.ndarray:
@@ -112,7 +112,7 @@ def environment_from_shading(
     rows: int = 32,
     iterations: int = 100,
     viewer: np.ndarray | None = None,
-    inertia: float = 0.0,
+    damping: float = 0.0,
 ) -> np.ndarray:
     """Find an environment in which Lambertian surfaces look as in a recovered light.
 
@@ -125,8 +125,9 @@ def environment_from_shading(
         Of Richardson-Lucy.
     viewer : (3,) ndarray, optional
         Unit vector from the object toward the viewer, camera frame; z by default.
-    inertia : float, optional
-        c over the largest K'(1) of a solid angle, 0 or more: holds directions that few normals see.
+    damping : float, optional
+        c over the largest K'(1) of a solid angle, 0 or more: keeps directions that few normals see
+        near the mean light.
 
     Returns
     -------
@@ -140,11 +141,11 @@ def environment_from_shading(
     wanted = np.exp(real_sh(normals) @ illumination)
     reach = kernel.sum(0)[:, None]
     size = solid_angles(rows).reshape(-1, 1)
-    held = inertia * (reach / size).max() * size
+    damped = damping * (reach / size).max() * size
     radiance = np.broadcast_to(wanted.mean(0), (kernel.shape[1], 3)).copy()
     for _ in range(iterations):
         correction = kernel.T @ (wanted / np.maximum(kernel @ radiance, 1e-12))
-        correction = (correction + held) / np.maximum(reach + held, 1e-9)
+        correction = (correction + damped) / np.maximum(reach + damped, 1e-9)
         radiance *= np.where(reach > 1e-9, correction, 1)
     return np.ascontiguousarray(radiance.reshape(rows, 2 * rows, 3), np.float32)
 
@@ -164,7 +165,7 @@ def recovered_environment(
     (rows, 2 rows, 3) float32 ndarray
         Linear radiance, >= 0; from behind about the mean light.
     """
-    return environment_from_shading(illumination, rows, viewer=viewer, inertia=_INERTIA)
+    return environment_from_shading(illumination, rows, viewer=viewer, damping=_DAMPING)
 
 
 def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:

@@ -1,6 +1,6 @@
-"""Where does the paint change? What the colours of neighbouring pixels say.
+"""Edges of paint, from the colours of neighbouring pixels.
 
-Problem: at an edge of paint, fine changes of brightness say nothing of relief.
+Problem: at an edge of paint, fine changes of brightness are no evidence of relief.
 
 Equation: pixels of one paint are alike in the guide
 

@@ -1,8 +1,8 @@
-"""Are an object's fine changes of brightness relief or paint? The whole object tells.
+"""Whether an object's fine changes of brightness are relief or paint, from the whole object.
 
-Problem: a patch of grey print may look like relief under some light. Over the whole object the
-light gives it away: relief is strong where shading changes fast with the slope, and seen along that
-direction; paint knows nothing of the light.
+Problem: a patch of grey print may look like relief under some light. Over the whole object they
+differ: relief has strong contrast where shading changes fast with the slope, and along that
+direction; paint is independent of the light.
 
 Equation: with y the log luminance less its Gaussian average and the gain g = d log S / d slope,
 over the blocks of 8 x 8 pixels inside the object,
@@ -27,9 +27,9 @@ illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et
 surface texture while simultaneously estimating illumination direction", IJCV 62, 2005,
 doi:10.1007/s11263-005-4635-4.
 
-Limits: one belief for an object, so print beside relief gets a middle one. A pattern of stripes
-that lies along the light by chance looks like relief. Where the light is the same from everywhere
-there is no evidence.
+Limits: one probability for an object, so print beside relief gets an intermediate one. A pattern of
+stripes that lies along the light by chance looks like relief. Where the light is the same from
+everywhere there is no evidence.
 """
 
 from dataclasses import dataclass
@@ -49,7 +49,7 @@ _NOTHING, _ALL = 0.3, 0.6  # probabilities: up to the one nothing is added, from
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a level, or the mean over levels, says.
+    """Evidence of a level, or its mean over levels.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Evidence:
 
 @dataclass(frozen=True)
 class ReliefRule:
-    """How evidence becomes a belief.
+    """Logistic regression of the probability of relief.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class ReliefRule:
         return float(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
 
     def share(self, evidence: Evidence | None) -> float:
-        """Return by how much found relief is multiplied.
+        """Return the factor of the relief that was found.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class ReliefRule:
         Returns
         -------
         float
-            0 without evidence, so that nothing is made up.
+            0 without evidence, so that no relief is added.
         """
         return 0.0 if evidence is None else added_share(self.probability(evidence))
 
@@ -127,7 +127,7 @@ def added_share(probability: float) -> float:
 def evidence_of(
     image: np.ndarray, mask: np.ndarray, gain: tuple[np.ndarray, np.ndarray]
 ) -> Evidence | None:
-    """Weigh one level of a photo.
+    """Compute the evidence of one level of a photo.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def mean_evidence(found: list[Evidence | None]) -> Evidence | None:
     Returns
     -------
     Evidence or None
-        None if no level says anything.
+        None if no level has evidence.
     """
     known = [one for one in found if one is not None]
     if not known:

@@ -1,9 +1,9 @@
 """Relief on a smooth surface from fine changes of shading, by linear shape from shading.
 
-Problem: under known light, fine changes of brightness say how fine relief tilts a surface, though
+Problem: under known light, fine changes of brightness determine the slope of fine relief, though
 only along the direction in which shading changes. Where lights of several colours come from several
-directions, fine changes of colour say more, as in photometric stereo. Across all these directions,
-and where shading hardly changes with the slope, the photo says nothing.
+directions, fine changes of colour determine more, as in photometric stereo. Across all these
+directions, and where shading hardly changes with the slope, the photo has no information.
 
 Equation: of C features (log brightness, and logarithms of ratios of channels), let S_c be that of
 the shading as a function of the slope, and e_c that of the light without the paint. With s_0 the

@@ -13,7 +13,7 @@ from training.priors.panorama_photos import (
     draw_turn,
     photograph,
 )
-from training.priors.photographed_bodies import uneven
+from training.priors.photographed_bodies import height_steps
 from training.priors.white_balance import ALGORITHMS, GREY_WORLD
 from training.world.environments import Panorama
 
@@ -62,9 +62,9 @@ def test_height_jumps_where_the_normals_do_not_say_so() -> None:
     slope = 0.8
     normal = np.broadcast_to(np.array([-slope, 0, 1]) / np.hypot(slope, 1), (20, 20, 3))
     plane = slope * columns + 0.0 * rows
-    assert not uneven(plane, normal).any()
+    assert not height_steps(plane, normal).any()
     stepped = plane + 5.0 * (columns >= 10)
-    found = uneven(stepped, normal)
+    found = height_steps(stepped, normal)
     assert found[:, 9:11].all() and not found[:, :9].any() and not found[:, 11:].any()
     holed = np.where(rows == 3, np.nan, plane)
-    assert not uneven(holed, normal).any()
+    assert not height_steps(holed, normal).any()

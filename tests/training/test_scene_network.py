@@ -23,7 +23,7 @@ from isc_core.networks.scene_network import (
     channels_of,
 )
 from training.networks.highlight_module import HighlightNetworkModule
-from training.networks.scene_module import SceneNetworkModule, light_surprise, network_channels
+from training.networks.scene_module import SceneNetworkModule, light_nll, network_channels
 from training.world.samples import OBJECT, OUTPUT, Sample
 
 WIDTHS = (6, 8, 8, 10)
@@ -222,7 +222,7 @@ def test_the_likelihood_of_light_is_that_of_a_gaussian_of_low_rank() -> None:
         torch.zeros_like(error), factors, torch.exp(2 * log_scale)
     )
     expected = -gauss.log_prob(error) / LIGHT
-    torch.testing.assert_close(light_surprise(error, log_scale, factors), expected)
+    torch.testing.assert_close(light_nll(error, log_scale, factors), expected)
 
 
 def test_weights_of_another_network_are_refused_in_one_line() -> None:

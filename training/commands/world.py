@@ -1,4 +1,4 @@
-"""`isc world build` and `isc world pack`: the bodies that the networks learn from."""
+"""`isc world build` and `isc world pack`: the training bodies of the networks."""
 
 import argparse
 from pathlib import Path

@@ -1,1 +1,1 @@
-"""Pictures that the mask network learns from: lit bodies pasted before backgrounds."""
+"""Training pictures of the mask network: lit bodies pasted before backgrounds."""

@@ -22,7 +22,7 @@ from ..world.tensor_batch import TensorBatch, chosen
 
 SHARES = (0.2, 0.45)  # of backgrounds: plain ones; tables before crops or plain ones
 _PATTERN_PIXEL = 0.3  # standard deviation of the blur of a pattern, pixels of the table's front
-_SPARSE = 3  # every third row and column says how bright a crop is
+_SPARSE = 3  # the exposure of a crop is that of every third row and column
 
 
 @dataclass(frozen=True)

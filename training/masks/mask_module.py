@@ -22,7 +22,7 @@ from isc_core.networks.layers import DARK
 from isc_core.networks.mask_network import COARSE, EVIDENCE, INPUTS, Count
 
 from ..networks.blocks import load_arrays, stored_arrays
-from ..networks.encoder_decoder import EncoderDecoderModule, quieten
+from ..networks.encoder_decoder import EncoderDecoderModule, start_small
 from .composites import Composite
 
 DOWN, UP = (64, 128, 192, 96), (96, 96, 64)
@@ -45,7 +45,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         self.hidden = nn.Linear(2 * sum(down[-COARSE:]), HIDDEN)
         self.count = nn.Linear(HIDDEN, len(Count))
         nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
-        quieten(self.out, self.count)
+        start_small(self.out, self.count)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -62,7 +62,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         counts : (B, 3) tensor
             As `MaskNetwork` returns them.
         """
-        odds, levels = self.walked(inputs)
+        odds, levels = self.encoded_and_decoded(inputs)
         coarse = [layer.float() for layer in levels[-COARSE:]]
         features = [part for layer in coarse for part in (layer.mean((2, 3)), layer.amax((2, 3)))]
         return odds, self.count(functional.relu(self.hidden(torch.cat(features, 1))))

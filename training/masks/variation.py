@@ -1,8 +1,8 @@
 """More objects and backgrounds than there are bodies and panoramas, and harder ones.
 
-Problem: a fit sees each of some thousand bodies a hundred times, and learns them by heart. Bodies
-of the colour of what is behind them, thin bodies, and edges of the background that touch a body are
-what masks fail at, and are rare where everything is drawn evenly.
+Problem: a fit sees each of some thousand bodies a hundred times, and overfits them. Bodies of the
+colour of what is behind them, thin bodies, and edges of the background that touch a body are what
+masks fail at, and are rare where everything is drawn evenly.
 
 Equation: a body is stretched along its own axes by factors s and 1 / s, log s ~ N(0, .15); three
 objects and backgrounds in ten have their colour channels exchanged. The light I of half of the

@@ -1,4 +1,4 @@
-"""Calibrate the uncertainties of a scene network on bodies and light that it has not seen.
+"""Calibrate the uncertainties of a scene network on held-out bodies and light.
 
   python -m training.networks.calibration WORLD... --panoramas DIR --weights NPZ -o SCENE.npz
 
@@ -44,7 +44,7 @@ from .scene_module import SceneNetworkModule, network_channels
 
 _NORMAL, _LAPLACE = 0.6827, 1 - np.exp(-1)  # shares within one scale
 _BATCHES, _SIZE = 24, 32
-_SPARSE = 7  # of the pixels, one in so many: neighbours say the same
+_SPARSE = 7  # of the pixels, one in so many: neighbours are correlated
 
 
 def temperatures(network: SceneNetworkModule, samples: Iterable[Sample]) -> np.ndarray:

@@ -43,8 +43,8 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
         )
         self.out = nn.Conv2d(up[-1], block**2 * outputs, 3, padding=1)
 
-    def walked(self, inputs: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
-        """Go down and up again.
+    def encoded_and_decoded(self, inputs: torch.Tensor) -> tuple[torch.Tensor, list[torch.Tensor]]:
+        """Apply encoder and decoder.
 
         Parameters
         ----------
@@ -72,7 +72,7 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
         return maps, levels
 
     def begin(self, weights: dict[str, np.ndarray] | None) -> None:
-        """Start from weights, or without, from the shipped scene network's levels down.
+        """Start from weights, or without, from the encoder of the shipped scene network.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
             self.load_arrays(weights)
 
     def start_from_scene(self, arrays: dict[str, np.ndarray]) -> None:
-        """Take what the scene network knows: the levels down whose channels agree.
+        """Start with the scene network's weights of the encoder levels whose channels agree.
 
         Parameters
         ----------
@@ -104,8 +104,8 @@ class EncoderDecoderModule(nn.Module):  # type: ignore[misc]
         return [pair for block in [*self.down, *self.up] for pair in block.pairs]
 
 
-def quieten(*layers: nn.Conv2d | nn.Linear) -> None:
-    """Make last layers begin with small answers.
+def start_small(*layers: nn.Conv2d | nn.Linear) -> None:
+    """Scale the initial weights of last layers so that first outputs are small.
 
     Parameters
     ----------

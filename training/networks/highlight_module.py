@@ -6,8 +6,8 @@ the true specular light t and the photo I,
 
     sum_k w_k H(g_k, sigma(o_k)) / sum_k w_k + log(1 + |s - t|^2 / (|t|^2 + 10^-3 |I|^2)) / 2,
 
-H the cross entropy, w_k = b_k / (b_k + .15 mean I). The first term says of every detail what it is;
-the squared error alone, of few bright pixels, is learned ten times as slowly.
+H the cross entropy, w_k = b_k / (b_k + .15 mean I). The first term classifies every detail; with
+the squared error alone, which depends on few bright pixels, training is ten times slower.
 
 Citation: see `training.networks.scene_module`.
 
@@ -26,7 +26,7 @@ from isc_core.networks.scene_network import SIDE
 
 from ..world.samples import Sample
 from .blocks import load_arrays, stored_arrays
-from .encoder_decoder import EncoderDecoderModule, quieten
+from .encoder_decoder import EncoderDecoderModule, start_small
 from .scene_module import network_channels as photo_channels
 
 DOWN, UP = (64, 128, 192, 96), (64, 64, 48)
@@ -51,12 +51,12 @@ class HighlightNetworkModule(EncoderDecoderModule):
     def __init__(self, down: tuple[int, ...] = DOWN, up: tuple[int, ...] = UP) -> None:
         super().__init__(INPUTS, len(REACHES), down, up, BLOCK)
         nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
-        quieten(self.out)
+        start_small(self.out)
         nn.init.constant_(self.out.bias, _START)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, photo: torch.Tensor, mask: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-        """Predict what bright details are.
+        """Classify bright details.
 
         Parameters
         ----------
@@ -69,7 +69,7 @@ class HighlightNetworkModule(EncoderDecoderModule):
             Log odds of specular light; the details.
         """
         bands = bands_of(photo, mask)
-        odds, _ = self.walked(network_channels(photo, mask, bands))
+        odds, _ = self.encoded_and_decoded(network_channels(photo, mask, bands))
         return odds, bands
 
     def loss(self, batch: Sample) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:

@@ -3,12 +3,12 @@
   python -m training.networks.highlight_network WORLD... [--panoramas DIR] [--weights NPZ]
   [--minutes N] -o HIGHLIGHT.npz
 
-WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are taken while the
-network learns: of opaque bodies, most of them with print, often white on a strong colour. For each
-photo the specular light is as strong as the recipe says, times a random factor, or absent; colour
-channels are exchanged. The fit starts from the scene network's levels down, or with `--weights`
-from an archive that an earlier run wrote; `--resume` continues an interrupted one, `--side 96` sees
-photos smaller. Held-out bodies under held-out panoramas are measured every thousand steps.
+WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are rendered during
+training: of opaque bodies, most of them with print, often white on a strong colour. For each photo
+the specular light is that of the recipe times a random factor, or absent; colour channels are
+exchanged. The fit starts from the scene network's levels down, or with `--weights` from an archive
+that an earlier run wrote; `--resume` continues an interrupted one, `--side 96` makes photos
+smaller. The loss on held-out bodies under held-out panoramas is measured every thousand steps.
 
 Equation: see `training.networks.highlight_module`.
 

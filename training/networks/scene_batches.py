@@ -1,4 +1,4 @@
-"""Batches of photos from worlds, panoramas and patterns, for whoever fits or measures networks.
+"""Batches of photos from worlds, panoramas and patterns, for training and evaluation.
 
 Limits: views lit together are of about one size, so that lighting wastes little; the pool mixes
 them.
@@ -19,16 +19,16 @@ from isc_core.io.npy import read_arrays
 from ..loop import Net, RunOptions, Schedule, fit
 from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
-from ..world.invented_environments import invented_room, invented_sky, studio
 from ..world.lit_pictures import LitPictures
 from ..world.pack import PackedWorld, read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
+from ..world.procedural_environments import procedural_room, procedural_sky, studio
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT, Darkroom, Draw, Sample, draw_batch
+from ..world.samples import OUTPUT, Draw, PhotoRenderer, Sample, draw_batch
 from ..world.view_batches import PreparedView, ViewStore, prepared
 
-_INVENTED = 60  # surroundings of each of three kinds
+_PROCEDURAL = 60  # environments of each of three kinds
 _OFTEN = 3  # panoramas are drawn so many times as often again
 PHOTOS = 8  # taken of each lit view, on average: lighting takes three times as long
 POOL = 512  # lit views; on a GPU, which lights more at once, several times as many
@@ -106,7 +106,7 @@ class SceneBatches:
     side : int
         Of the photos, pixels.
     alter : callable, optional
-        See `Darkroom`.
+        See `PhotoRenderer`.
     device : str
         Where photos are made.
     """
@@ -121,7 +121,7 @@ class SceneBatches:
     ) -> None:
         self._draw, self._device = draw, device
         pool = POOL if device == "cpu" else _GPU_POOL
-        self._darkroom = Darkroom(bank.to(device), pool, side, alter)
+        self._renderer = PhotoRenderer(bank.to(device), pool, side, alter)
         self._views = ViewStore(draw.views, device)
 
     def __call__(self, rng: np.random.Generator) -> Sample:
@@ -150,12 +150,12 @@ class SceneBatches:
         Sample
             On the device.
         """
-        return self._darkroom(drawn.to(self._device), self._views)
+        return self._renderer(drawn.to(self._device), self._views)
 
 
 @dataclass(frozen=True)
 class World:
-    """All that photos are drawn from.
+    """The data from which photos are drawn.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ class World:
 def read_world(
     paths: Sequence[Path], panoramas: Path | None, splits: Sequence[Split], seed: int
 ) -> World:
-    """Read views and panoramas, and invent the rest.
+    """Read views and panoramas, and draw procedural environments.
 
     Parameters
     ----------
@@ -196,23 +196,23 @@ def read_world(
     Raises
     ------
     InputError
-        If a folder is no world, or there is nothing to learn from.
+        If a folder is no world, or there are no views.
     """
     packs = [read_pack(path) for path in paths if path.is_file()]
     folders = [path for path in paths if not path.is_file()]
     views = {split: _prepared_views(packs, folders, split) for split in splits}
     if not all(views.values()):
-        raise InputError(f"{paths[0]} has no views to learn from: build more bodies")
+        raise InputError(f"{paths[0]} has no views for training: build more bodies")
     if panoramas is None and not packs:
         raise InputError("name a folder of panoramas with --panoramas; only packs have their own")
     found = packs[0].panoramas if panoramas is None else read_panoramas(panoramas, seed)
     rng = np.random.default_rng([seed, 7])
-    invented = [
-        make(rng) for _ in range(_INVENTED) for make in (invented_room, invented_sky, studio)
+    procedural = [
+        make(rng) for _ in range(_PROCEDURAL) for make in (procedural_room, procedural_sky, studio)
     ]
     atlas = packs[0].atlas if packs else read_patterns(folders[0])
-    bank = bank_of([*(one.radiance for one in found), *invented], atlas)
-    held_out = np.array([one.held_out for one in found] + [False] * len(invented))
+    bank = bank_of([*(one.radiance for one in found), *procedural], atlas)
+    held_out = np.array([one.held_out for one in found] + [False] * len(procedural))
     photographed = np.flatnonzero(~held_out[: len(found)])
     training = np.concatenate([np.flatnonzero(~held_out), np.repeat(photographed, _OFTEN)])
     return World(views, atlas, bank, training, np.flatnonzero(held_out))
@@ -230,7 +230,7 @@ def _prepared_views(
 
 
 def add_photo_arguments(parser: argparse.ArgumentParser, rate: float) -> None:
-    """Add what networks that learn from photos of worlds have in common to a command line.
+    """Add the options that programs which train on photos of worlds have in common.
 
     Parameters
     ----------
@@ -261,14 +261,14 @@ def read_given(
     Returns
     -------
     world : World
-        Bodies to learn from, and held-out ones.
+        Views of training and held-out bodies.
     weights : dict of str to ndarray or None
         What the fit starts from.
 
     Raises
     ------
     InputError
-        If a file cannot be read, a folder is no world, or there is nothing to learn from.
+        If a file cannot be read, a folder is no world, or there are no views.
     """
     given: Path | None = arguments.weights
     weights = None if given is None else dict(read_arrays(given))
@@ -286,7 +286,7 @@ def fit_to_photos(
     options: RunOptions,
     alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
 ) -> None:
-    """Fit a network to photos that are taken while it learns.
+    """Fit a network to photos that are rendered during training.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def fit_to_photos(
     schedule : Schedule
     options : RunOptions
     alter : callable, optional
-        See `Darkroom`.
+        See `PhotoRenderer`.
     """
     if options.device != "cpu":
         draw = replace(draw, every=_GPU_EVERY)

@@ -49,7 +49,7 @@ from isc_core.networks.scene_network import (
 
 from ..world.samples import Sample
 from .blocks import load_arrays, stored_arrays
-from .encoder_decoder import EncoderDecoderModule, quieten
+from .encoder_decoder import EncoderDecoderModule, start_small
 
 WIDTHS = (64, 160, 256, 384)
 HIDDEN = 192
@@ -69,7 +69,7 @@ class SceneNetworkModule(EncoderDecoderModule):
         self.hidden = nn.Linear(2 * sum(widths[-COARSE:]), HIDDEN)
         self.light = nn.Linear(HIDDEN, GLOBAL)
         nn.init.kaiming_normal_(self.out.weight, nonlinearity="relu")
-        quieten(self.out, self.light)
+        start_small(self.out, self.light)
         self.to(memory_format=torch.channels_last)
 
     def forward(self, inputs: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
@@ -86,7 +86,7 @@ class SceneNetworkModule(EncoderDecoderModule):
         vector : (B, GLOBAL) tensor
             As `RawPrediction` describes them.
         """
-        maps, levels = self.walked(inputs)
+        maps, levels = self.encoded_and_decoded(inputs)
         cover, features = functional.avg_pool2d(inputs[:, 3:4], BLOCK // 2), []
         for level, layer in enumerate(levels):
             cover = functional.avg_pool2d(cover, 2)
@@ -185,8 +185,8 @@ def network_channels(photo: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
 
 
 def _thinned(maps: torch.Tensor, batch: Sample, *, random: bool) -> tuple[torch.Tensor, Sample]:
-    """Every second row and column: neighbours say almost the same, and losses of all pixels would
-    take longer than the convolutions.
+    """Every second row and column: neighbours are correlated, and losses of all pixels would take
+    longer than the convolutions.
     """
     row, column = (int(k) for k in torch.randint(2, (2,))) if random else (0, 0)
     parts = {
@@ -265,7 +265,7 @@ def _light_terms(
 ) -> dict[str, torch.Tensor]:
     sizes = [LIGHT, LIGHT, LIGHT * FACTORS, COUNTS, PLACE_COUNT, KIND_COUNT]
     mean, log_scale, factors, counts, places, kinds = vector.split(sizes, dim=1)
-    distance = light_surprise(
+    distance = light_nll(
         batch.light - mean,
         log_scale.clamp(MIN_LOG_SCALE, MAX_LOG_SCALE),
         FACTOR_SCALE * factors.reshape(-1, LIGHT, FACTORS),
@@ -282,12 +282,10 @@ def _light_terms(
     }
 
 
-def light_surprise(
-    error: torch.Tensor, log_scale: torch.Tensor, factors: torch.Tensor
-) -> torch.Tensor:
+def light_nll(error: torch.Tensor, log_scale: torch.Tensor, factors: torch.Tensor) -> torch.Tensor:
     """Return the negative log likelihood of errors for a Gaussian of low rank.
 
-    As `torch.distributions.LowRankMultivariateNormal`, but nothing waits for the device.
+    As `torch.distributions.LowRankMultivariateNormal`, but without synchronising with the device.
 
     Parameters
     ----------

@@ -3,11 +3,11 @@
   python -m training.networks.scene_network WORLD... [--panoramas DIR] [--weights NPZ]
   [--device cuda] [--minutes N] -o SCENE.npz
 
-WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are taken while the
-network learns (`training.world.samples`), and none is used twice.
-`--weights` starts from an archive that an earlier run wrote, `--resume` continues an interrupted
-one; `--side 64` sees photos smaller, which is a quarter of the work. Held-out bodies under held-out
-panoramas are measured every thousand steps.
+WORLD are folders of `isc world build`, or packs of `isc world pack`. Photos are rendered during
+training (`training.world.samples`), and none is used twice. `--weights` starts from an archive that
+an earlier run wrote, `--resume` continues an interrupted one; `--side 64` makes photos smaller,
+which is a quarter of the work. The loss on held-out bodies under held-out panoramas is measured
+every thousand steps.
 
 Equation: see `training.networks.scene_module`.
 

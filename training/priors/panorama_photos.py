@@ -1,11 +1,11 @@
 """Photos of panoramas: a camera in the middle, turned at random, exposed and white-balanced; and
-the light that then falls on a thing in front of it.
+the light that then falls on an object in front of it.
 
 Equation: a camera sees the panorama L within its field of view, scaled so that the mean luminance
-of the picture is a middle grey times e^z, z ~ N(0, s^2), and cut at white. White balance divides
-by a part a of the colour e that an algorithm estimates from this picture, 0 <= a <= 1: panoramas
-have been balanced by their photographers, and cameras trust no picture fully. A matt white ball
-before the camera shows
+of the picture is a middle grey times e^z, z ~ N(0, s^2), and cut at white. White balance divides by
+a part a of the colour e that an algorithm estimates from this picture, 0 <= a <= 1: panoramas have
+been balanced by their photographers, and cameras correct the estimated colour only in part. A matt
+white ball before the camera shows
 
     S(n) = 1/pi integral of L(w) / e^a max(n . w, 0) dw,    log S(n) ~ sum_k b_k(n) l_k
 
@@ -13,7 +13,7 @@ with l fitted by least squares over the normals that face the camera, as they pr
 
 Citation: as `white_balance`.
 
-Limits: nothing casts shadows; the thing itself is not in the picture that is balanced; the ground
+Limits: nothing casts shadows; the object itself is not in the picture that is balanced; the ground
 is as far away as the rest of the panorama.
 """
 

@@ -3,10 +3,10 @@
   python -m training.priors.photo_priors WORLD --panoramas DIR -o photo.npz [--bodies N]
   [--photos N] [--seed K]
 
-WORLD is a folder of `isc world build`: its bodies of seeds are made again at the solver's size, as
-far as networks learn from them, and painted with its patterns (`photographed_bodies`). Panoramas
-that are not held out are photographed (`panorama_photos`). Nothing else goes into the file: no
-measured object, no research-only data.
+WORLD is a folder of `isc world build`: its training bodies of seeds are made again at the solver's
+size and painted with its patterns (`photographed_bodies`). Panoramas that are not held out are
+photographed (`panorama_photos`). Nothing else goes into the file: no measured object, no
+research-only data.
 
 The program prints what white balance leaves, and the median log likelihood of lights, brightness
 aside, under the new prior and under that of MIT-Berkeley's natural light.

@@ -73,7 +73,7 @@ class Painter:
 
 
 def made_bodies(built: int, families: int, count: int, seed: int) -> list[BodyReference]:
-    """Choose bodies that a world makes itself and that networks learn from.
+    """Choose training bodies that a world makes itself.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def training_object(
     albedo = np.zeros((SIDE * SIDE, 3), np.float32)
     albedo[hits.valid] = painter.paint(hits, rng)
     reflectance, clipped = _photographed(albedo.reshape(SIDE, SIDE, 3), mask, rng)
-    rough = uneven(height, hits.normal.reshape(SIDE, SIDE, 3))
+    rough = height_steps(height, hits.normal.reshape(SIDE, SIDE, 3))
     return TrainingObject(
         reference.name,
         reflectance,
@@ -131,7 +131,7 @@ def training_object(
     )
 
 
-def uneven(height: np.ndarray, normal: np.ndarray) -> np.ndarray:
+def height_steps(height: np.ndarray, normal: np.ndarray) -> np.ndarray:
     """Find where a height jumps.
 
     Parameters

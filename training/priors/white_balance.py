@@ -13,7 +13,7 @@ Citation: J. van de Weijer, T. Gevers, A. Gijsenij 2007, doi:10.1109/TIP.2007.90
 T. Gevers, J. van de Weijer 2011, doi:10.1109/TIP.2011.2118224 (survey, and the parameters).
 
 Limits: cameras combine such statistics with knowledge of lamps and of their sensor, and are better;
-nobody publishes how.
+their methods are not published.
 """
 
 from dataclasses import dataclass
@@ -55,7 +55,7 @@ class WhiteBalance:
         Returns
         -------
         (3,) ndarray
-            Linear RGB of geometric mean 1; white where too few pixels tell anything.
+            Linear RGB of geometric mean 1; white where too few pixels are usable.
         """
         values = np.stack([self._values(photo[..., c]) for c in range(3)], axis=-1)
         used = values[ndimage.binary_erosion(photo.max(axis=-1) < _CLIPPED, border_value=1)]

@@ -1,1 +1,1 @@
-"""The world that the networks learn from: bodies, colours, lights and cameras."""
+"""The training data of the networks: bodies, colours, lights and cameras."""

@@ -119,7 +119,7 @@ def exposed(light: torch.Tensor, mask: torch.Tensor, exposure: torch.Tensor) -> 
     """
     bright = (light.amax(1, keepdim=True) * mask).flatten(1)
     rank = (mask.flatten(1).sum(1) * 0.01).long().clamp(min=1, max=bright.shape[1])
-    # a number that the device does not have to tell
+    # known without waiting for the device
     most = bright.topk(max(1, bright.shape[1] // 100), dim=1).values.gather(1, rank[:, None] - 1)
     return (exposure[:, None] / most.clamp(min=1e-6))[..., None, None]
 

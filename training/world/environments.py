@@ -1,7 +1,7 @@
 """Light from all around: photographed panoramas, and what gloss shows of them.
 
 An environment is an image (rows, 2 rows, 3) of linear radiance in the layout of
-`isc_core.shading.environment_map`. `invented_environments` draws those that nobody photographed.
+`isc_core.shading.environment_map`. `procedural_environments` draws others.
 
 Equation: reduction takes the mean radiance of the solid angle that a pixel covers, so that the
 light as a whole stays the same. A gloss of width a (GGX) reflects, for a viewer along the

@@ -1,7 +1,7 @@
 """Batches of lit views from recipes: the numbers of `training.world.recipes` become tensors.
 
 Problem: drawing is cheap and particular, lighting is expensive and uniform. Worker processes draw;
-the device that learns paints and lights whole batches.
+the device of the fit paints and lights whole batches.
 
 Equation: see `training.world.recipes` (paint) and `training.world.lighting` (light).
 

@@ -1,7 +1,8 @@
 """Random recipes of pictures: paint, gloss and light of one view, as a few numbers.
 
-Problem: a network learns what it sees varied. Each choice here is a way in which photographs of
-things differ: one colour or many, print or none, gloss of any sharpness, light of any kind.
+Problem: a network generalises over what varies in training. Each choice here is a way in which
+photographs of objects differ: one colour or many, print or none, gloss of any sharpness, light of
+any kind.
 
 Equation: albedo = a_0, then layer by layer a <- a + w g (c - a), with g the grey value of an atlas'
 map at coordinates turned and scaled at random, w its strength and c its colour.

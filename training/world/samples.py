@@ -257,7 +257,7 @@ def draw_placement(rng: np.random.Generator) -> Placement:
     )
 
 
-class Darkroom:
+class PhotoRenderer:
     """Lights what is drawn, and photographs a pool of what was lit.
 
     Lighting takes several times as long as photographing. A picture stays in the pool for pool size
@@ -331,7 +331,7 @@ def photograph(
     normal = _turned(normal, placements)
     # several times as fast as functional.normalize, which walks across the channels
     normal = normal * torch.rsqrt(normal.square().sum(1, keepdim=True).clamp(min=_LEAST**2))
-    mask = _mistaken(cover, placements)
+    mask = _perturbed(cover, placements)
     gain = exposed(diffuse + gloss, known, cameras["exposure"])
     ground = pictures.ground[..., None, None] * torch.ones_like(diffuse)
     light = torch.where(known > 0, diffuse + gloss, ground)
@@ -417,8 +417,8 @@ def _turned(normal: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch.
     return torch.cat([across[:, :1] * mirror, across[:, 1:], normal[:, 2:]], dim=1)
 
 
-def _mistaken(cover: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch.Tensor:
-    """The mask as somebody would give it: shifted, too large or too small by a pixel or two."""
+def _perturbed(cover: torch.Tensor, placements: dict[str, torch.Tensor]) -> torch.Tensor:
+    """The mask with the errors of a user's: shifted, too large or too small by a pixel or two."""
     error, shift = placements["mask_error"], placements["mask_shift"]
     theta = torch.eye(2, 3, device=cover.device).repeat(len(cover), 1, 1)
     theta[:, :, 2] = shift * (2 / OUTPUT)

@@ -1,8 +1,8 @@
-"""Small, sharp highlights on lit pictures: what lamps, windows and a flash leave on glossy things.
+"""Small, sharp highlights on lit pictures: what lamps, windows and a flash leave on glossy objects.
 
 Problem: lobes as wide as `training.world.recipes` draws them, on smooth bodies, make broad
 highlights. A network that has seen few others takes small bright spots for print: dots are common.
-Photos of plastic and glazed things have mostly small ones.
+Photos of plastic and glazed objects have mostly small ones.
 
 Equation: a source in the direction l, seen from v = (0, 0, 1), is mirrored where the normal n is
 near h = (l + v) / |l + v|. With the tangent coordinates u, w of n around h, n = h + u e_1 + w e_2

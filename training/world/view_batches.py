@@ -109,7 +109,7 @@ def batch_of(views: Sequence[PreparedView]) -> ViewBatch:
     ViewBatch
         On the CPU.
     """
-    return filled_up([_alone(view) for view in views])
+    return padded_views([_alone(view) for view in views])
 
 
 def _alone(view: PreparedView) -> ViewBatch:
@@ -153,10 +153,10 @@ class ViewStore:
         ViewBatch
             On the device.
         """
-        return filled_up([self._views[int(k)] for k in chosen])
+        return padded_views([self._views[int(k)] for k in chosen])
 
 
-def filled_up(views: Sequence[ViewBatch]) -> ViewBatch:
+def padded_views(views: Sequence[ViewBatch]) -> ViewBatch:
     """Join batches of one view each; what is filled up faces the viewer.
 
     Parameters

@@ -1,4 +1,4 @@
-"""The diffuse layer under clipped highlights, continued with the texture of the paint around.
+"""The diffuse layer under clipped highlights, inpainted with the texture of the paint around.
 
 Problem: where the sensor saturates, nothing of the paint is recorded. A smooth fill loses stripes
 and print; a copy of other patches is at times far off, where the paint repeats nowhere.
@@ -19,8 +19,8 @@ values: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x.
 Objects whose box has more than a million pixels are filled hole by hole, each from its
 surroundings, half as wide as the hole.
 
-Limits: light that the separation has left around a hole flows into it. A hole without known pixels
-around it is filled smoothly.
+Limits: specular light that the separation has left around a hole is copied into it. A hole without
+known pixels around it is filled smoothly.
 """
 
 from collections.abc import Iterator
@@ -41,14 +41,14 @@ _CELL = 64  # pixels: holes that are nearer than about two cells are filled toge
 _TOUCHING = np.ones((3, 3))
 
 
-def continue_under_clipped(
+def inpaint_clipped(
     diffuse: np.ndarray,
     image: np.ndarray,
     clipped: np.ndarray,
     mask: np.ndarray,
     log_shading: np.ndarray,
 ) -> np.ndarray:
-    """Improve the diffuse layer of clipped pixels by its surroundings.
+    """Inpaint the diffuse layer of clipped pixels from its surroundings.
 
     Parameters
     ----------

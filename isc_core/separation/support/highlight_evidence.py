@@ -1,8 +1,8 @@
 """Colour and form decide together whether removed light was a highlight, region by region.
 
 Problem: white letters, stripes and labels on strong colour have the colour of highlights, and a
-network that knows form is not sure of them. Each kind of evidence alone takes print for highlights
-now and then; removing paint by mistake does more harm than leaving a highlight.
+network that uses form is uncertain about them. Each kind of evidence alone sometimes mistakes print
+for highlights; removing paint by mistake does more harm than leaving a highlight.
 
 Equation: the removed light s = I - D falls into connected regions. With the log ratio y of image
 and diffuse image that the scene network expects, its scale b, the smallest channel m and the chroma
@@ -13,9 +13,9 @@ C = max I - min I, the log odds that removing s lowers the squared error are
 where means are weighted by s^2 and q, at most 1/2, is the slope of C against m over the region's
 flanks and a ring around it. White light raises all channels alike: where m rises, C stays. White
 paint replaces the paint around it: where m rises, C falls. Clipped pixels would show a falling C in
-either case; they and their neighbours are left out. On grey paint, colour proves nothing. A region
-keeps its s where the odds exceed `odds`; otherwise the image is restored, bit for bit. Where a
-person has marked a highlight, or print, the nearest region is what the mark says.
+either case; they and their neighbours are left out. Grey paint has no chroma to decide by. The s of
+a region is kept where the odds exceed `odds`; otherwise the image is restored, bit for bit. Marks
+of a user decide about the nearest region.
 
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. That a
 highlight leaves C unchanged: K.-J. Yoon, Y. Choi, I. S. Kweon 2006, doi:10.1109/ICIP.2006.312650.
@@ -25,8 +25,8 @@ how the odds were chosen.
 
 Limits: a region that contains both a highlight and print is kept or restored as a whole. Pale print
 of the same chroma as the paint around it looks like light. Coloured light changes C, as paint does.
-Faint and broad highlights, of which the network is not sure, stay in the image, and most on grey
-and white.
+Faint and broad highlights, which the network predicts with large scales, stay in the image, as do
+most on grey and white.
 """
 
 from collections.abc import Sequence
@@ -51,7 +51,7 @@ WEIGHTS = (-2.14, 0.706, 2.099, 4.585)
 
 @dataclass(frozen=True)
 class Evidence:
-    """What speaks for the regions of removed light, K of them.
+    """Evidence of each of the K regions of removed light.
 
     Attributes
     ----------
@@ -76,7 +76,7 @@ def highlight_evidence(
     ratio_scale: np.ndarray,
     clipped: np.ndarray | None = None,
 ) -> Evidence:
-    """Collect what speaks for each region of removed light.
+    """Compute the evidence of each region of removed light.
 
     Parameters
     ----------
@@ -167,22 +167,23 @@ def _saturation(image: np.ndarray, dark: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Judgement:
-    """Which removed light was a highlight.
+class ClassifiedHighlights:
+    """Where removed light was a highlight.
 
     Attributes
     ----------
     kept : (H, W) ndarray of bool
-        False in regions that give their light back, and outside of all regions.
+        False in regions that are restored, and outside of all regions.
     doubtful : float
-        Of the image's light: regions that give it back, though a highlight is likelier than print.
+        Share of the image's light in regions that are restored although a highlight is likelier
+        than print.
     """
 
     kept: np.ndarray
     doubtful: float
 
 
-def classified_highlights(
+def classify_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
@@ -191,7 +192,7 @@ def classified_highlights(
     odds: float,
     marks: HighlightMarks | None = None,
     clipped: np.ndarray | None = None,
-) -> Judgement:
+) -> ClassifiedHighlights:
     """Decide where removed light was a highlight.
 
     Parameters
@@ -205,7 +206,8 @@ def classified_highlights(
     ratio_scale : (H, W) ndarray
         b.
     odds : float
-        To be exceeded; larger ones keep less, 0 keeps every region that can be classified.
+        Least odds of a highlight; larger ones keep less, 0 keeps every region that can be
+        classified.
     marks : HighlightMarks, optional
         Decide without the odds; paint before highlights.
     clipped : (H, W) ndarray of bool, optional
@@ -213,7 +215,7 @@ def classified_highlights(
 
     Returns
     -------
-    Judgement
+    ClassifiedHighlights
     """
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale, clipped)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
@@ -222,7 +224,7 @@ def classified_highlights(
     if marks:
         lit, paint = (_marked(seen.labels, one, mask) for one in (marks.highlights, marks.paint))
         kept, doubtful = (kept | lit) & ~paint, doubtful & ~lit & ~paint
-    return Judgement(kept, _share_of_light(image, diffuse, doubtful, mask))
+    return ClassifiedHighlights(kept, _share_of_light(image, diffuse, doubtful, mask))
 
 
 def _share_of_light(

@@ -1,10 +1,10 @@
-"""A lower bound of the highlights that a network expects, and whether a photo has any.
+"""A lower bound of predicted highlights, and whether a photo has any.
 
-Problem: the network also takes some bright albedo for highlights, and light that is wrongly taken
-off does more harm than a highlight that stays.
+Problem: the network also mistakes some bright albedo for highlights, and light that is removed by
+mistake does more harm than a highlight that remains.
 
-Equation: the network expects y = log(I / D) with a Laplace distribution of scale b. At a pixel,
-t = max(y - d b, 0) is a lower bound of y, d = `doubt`: more than what is there is removed with a
+Equation: the network predicts y = log(I / D) with a Laplace distribution of scale b. At a pixel, t
+= max(y - d b, 0) is a lower bound of y, d = `doubt`: more than what is there is removed with a
 probability of exp(-d) / 2 only, so that the expected error falls. Highlights stand out in a photo
 if t, opened so that texture of a few pixels does not count, exceeds its 90th percentile by
 `stands_out` somewhere.
@@ -29,13 +29,13 @@ _SPECK = 0.005  # of the object's diagonal
 
 @dataclass(frozen=True)
 class RemovalOptions:
-    """When light that a network expects to be a highlight is removed.
+    """When light that a network predicts to be a highlight is removed.
 
     Attributes
     ----------
     doubt : float
-        What is subtracted from the network's expectation; not negative. Of a log ratio, in error
-        scales (`ratio_lower_bound`); of the log odds of a highlight, as it is.
+        Margin subtracted from the network's prediction; not negative. From a log ratio, in error
+        scales (`ratio_lower_bound`); from the log odds of a highlight, as it is.
     stands_out : float
         By how much the strongest highlight exceeds what is usual on the object.
     tint : float

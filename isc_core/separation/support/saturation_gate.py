@@ -1,4 +1,4 @@
-"""A guard: whether the object is saturated enough to distinguish highlights from reflectance.
+"""A safeguard: whether the object is saturated enough to distinguish highlights from reflectance.
 
 Problem: white or pale reflectance beside a coloured one looks like a highlight to a method that
 uses colour alone; on such objects methods do far more harm than all their highlights are worth.
@@ -8,9 +8,9 @@ colours and near 0 for grey; it does not depend on the exposure. Below a low val
 removed, above a high one everything found, and in between a share that rises smoothly, so that no
 small change of the photo flips the result.
 
-Limits: a guard finds nothing: highlights on grey objects stay too. One number stands for the whole
-object, so that white reflectance that covers little of it passes; and its two values were chosen on
-a dozen objects.
+Limits: nothing is detected here: highlights on grey objects remain, too. One number stands for the
+whole object, so that white reflectance that covers little of it passes; and its two values were
+chosen on a dozen objects.
 """
 
 import numpy as np

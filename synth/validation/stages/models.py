@@ -18,7 +18,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from isc_core.decomposition.layers import separated, shaded
+from isc_core.decomposition.layers import normals_and_shading, separated
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decomposition.predictions import with_predictions
 from isc_core.decomposition.settings import SEPARATING_MODELS
@@ -278,7 +278,7 @@ def _photo(inputs: StageInputs) -> Photo:
 
 
 def _estimate(inputs: StageInputs, answer: SceneEstimate) -> Estimate:
-    normal, _ = shaded(answer.height, answer.light, inputs.mask)
+    normal, _ = normals_and_shading(answer.height, answer.light, inputs.mask)
     return with_normals(
         replace(inputs, diffuse=answer.split.diffuse),
         answer.height,

@@ -85,7 +85,7 @@ def light_from(slant: float, tilt: float, length: float = 0.8) -> np.ndarray:
     return length * np.array([np.sin(s) * np.cos(t), np.sin(s) * np.sin(t), np.cos(s)])
 
 
-def shaded(shape: Shape, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def normals_and_shading(shape: Shape, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Log image (H, W, 3) and log shading (H, W) of a shape with coloured stripes."""
     x, _ = grid()
     albedo = np.where((np.floor(x / 9) % 2 == 0)[..., None], [0.8, 0.4, 0.3], [0.1, 0.2, 0.25])
@@ -221,14 +221,14 @@ def test_fit_light_of_a_flat_shape_comes_from_everywhere() -> None:
 
 
 def test_naive_is_flat_and_dark() -> None:
-    log_image, _ = shaded(hemisphere(), light_from(35, 135))
+    log_image, _ = normals_and_shading(hemisphere(), light_from(35, 135))
     answer = naive.estimate(log_image, hemisphere().mask)
     assert not answer.height.any() and not answer.light.any() and not answer.log_shading.any()
 
 
 def test_retinex_takes_paint_off_the_shading() -> None:
     shape = bumps()
-    log_image, truth = shaded(shape, light_from(45, -60))
+    log_image, truth = normals_and_shading(shape, light_from(45, -60))
     found = retinex.log_shading(log_image, shape.mask)
     for channel in range(3):
         # What a best level leaves, for the method and for the photo itself taken as shading.
@@ -239,7 +239,7 @@ def test_retinex_takes_paint_off_the_shading() -> None:
 
 
 def test_retinex_leaves_the_overall_colour_in_the_reflectance() -> None:
-    log_image, _ = shaded(hemisphere(), light_from(20, 45))
+    log_image, _ = normals_and_shading(hemisphere(), light_from(20, 45))
     mask = hemisphere().mask
     tinted = log_image + np.log([3.0, 1.0, 0.2])
     assert np.allclose(
@@ -249,7 +249,7 @@ def test_retinex_leaves_the_overall_colour_in_the_reflectance() -> None:
 
 def test_retinex_keeps_the_shape_that_paint_hides_from_plain_shading() -> None:
     shape = hemisphere()
-    log_image, _ = shaded(shape, light_from(20, 45))
+    log_image, _ = normals_and_shading(shape, light_from(20, 45))
     answer = retinex.estimate(log_image, shape.mask)
     assert shape.normal_error(answer.height) < 0.6 * shape.flat_error
     assert shape.correlation(answer.height) > 0.8
@@ -257,7 +257,7 @@ def test_retinex_keeps_the_shape_that_paint_hides_from_plain_shading() -> None:
 
 @pytest.mark.parametrize("method", baselines.METHODS)
 def test_empty_background_changes_nothing(method: str) -> None:
-    log_image, _ = shaded(hemisphere(), light_from(35, 135))
+    log_image, _ = normals_and_shading(hemisphere(), light_from(35, 135))
     mask = hemisphere().mask
     plain = baselines.estimate(method, log_image, mask)
     pads = [(11, 30), (0, 7)]

@@ -7,7 +7,7 @@ import pytest
 
 import isc_core
 from isc_core.decomposition.detail import Pyramid, fine_relief
-from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.layers import normals_and_shading
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import Settings
 from isc_core.errors import Cancelled, InputError
@@ -27,7 +27,7 @@ def ball(side: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     inside = x**2 + y**2 < radius**2
     height = np.sqrt(np.maximum(radius**2 - x**2 - y**2, 1.0))
     bumps = np.random.default_rng(seed).normal(size=(side, side)) * 0.2
-    _, shading = shaded(height + bumps, LIGHT, inside)
+    _, shading = normals_and_shading(height + bumps, LIGHT, inside)
     return 0.5 * shading, inside, height
 
 
@@ -76,7 +76,7 @@ def test_the_place_in_the_frame_does_not_matter() -> None:
 
 def test_edges_of_paint_are_no_relief_and_relief_beside_them_stays() -> None:
     diffuse, mask, height = ball(240)
-    smooth = 0.5 * shaded(height, LIGHT, mask)[1]
+    smooth = 0.5 * normals_and_shading(height, LIGHT, mask)[1]
     columns = np.arange(240)
     paint = np.where((columns // 40 % 2)[:, None], (0.9, 0.4, 0.3), (0.3, 0.5, 0.9))
     bumps, plain, printed, both = (

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decomposition.assumption_checks import share_that_holds
+from isc_core.decomposition.assumption_checks import confidence_factor
 from isc_core.decomposition.expected_error import (
     CALIBRATION,
     HALF,
@@ -104,8 +104,8 @@ def test_violated_assumptions_lower_the_confidence_and_not_its_order(
     scene: Decomposition, seen: ScenePrediction
 ) -> None:
     warned = Diagnostics(warnings=(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.7),))
-    assert share_that_holds(warned) == pytest.approx(0.3)
-    assert share_that_holds(Diagnostics()) == 1
+    assert confidence_factor(warned) == pytest.approx(0.3)
+    assert confidence_factor(Diagnostics()) == 1
     doubtful = replace(scene, provenance=replace(scene.provenance, diagnostics=warned))
     plain, lower = (
         with_expected_error(d, seen, photo_of(scene)).confidence for d in (scene, doubtful)

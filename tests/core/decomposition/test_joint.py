@@ -10,8 +10,8 @@ import pytest
 from isc_core.decomposition.joint import (
     JointOptions,
     ResidualHighlights,
-    continue_albedo,
     detect_residual_highlights,
+    inpaint_albedo,
     joint,
     supported_layers,
 )
@@ -88,7 +88,7 @@ def test_a_highlight_on_grey_paint_is_taken_off(
     nothing = float(np.square(d.specular)[d.mask].mean())
     assert error(d, mdr(task_of(d))) > 0.5 * nothing
     assert error(d, answer) < 0.5 * nothing
-    assert answer.diagnostics.joint == JointOutcome.CONTINUED
+    assert answer.diagnostics.joint == JointOutcome.INPAINTED
 
 
 @pytest.mark.slow
@@ -138,7 +138,7 @@ def test_paint_is_continued_under_the_highlight() -> None:
     shading = np.linspace(0.5, 1, 40)[None, :, None] * np.ones((40, 40, 3))
     diffuse = np.where(mask[..., None], 0.4 * shading, 0)
     image = diffuse + 0.3 * unreliable[..., None]
-    found = continue_albedo(ResidualHighlights(image, unreliable), shading, image, mask)
+    found = inpaint_albedo(ResidualHighlights(image, unreliable), shading, image, mask)
     np.testing.assert_allclose(found, diffuse, atol=1e-6)
 
 

@@ -11,7 +11,7 @@ from scipy import ndimage
 from isc_core.decomposition.light_colour import under_given_light, under_light
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decomposition.pipeline import decompose
-from isc_core.decomposition.shape import tempered
+from isc_core.decomposition.shape import desaturated
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.photo import Photo, PhotoSource
@@ -185,12 +185,12 @@ def test_a_cast_given_as_the_light_s_colour_changes_nothing_else(model: str) -> 
 def test_tempered_colours_keep_grey_and_brightness_and_bound_the_ratio_of_channels() -> None:
     image = np.random.default_rng(0).uniform(0, 1, (5, 6, 3)).astype(np.float32)
     image[0, 0], image[0, 1] = 0.4, (0.5, 0.2, 0)
-    found = tempered(image)
+    found = desaturated(image)
     assert found.dtype == np.float32
     np.testing.assert_allclose(found[0, 0], 0.4, rtol=1e-6)
     np.testing.assert_allclose(found.max(axis=2), image.max(axis=2), rtol=1e-6)
     assert (found.min(axis=2) >= 0.09 * found.max(axis=2)).all()
-    np.testing.assert_allclose(tempered(2 * image), 2 * found, rtol=1e-6)
+    np.testing.assert_allclose(desaturated(2 * image), 2 * found, rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -214,5 +214,5 @@ def test_noise_in_a_dark_channel_is_no_relief(monkeypatch: pytest.MonkeyPatch) -
         return float(np.square(off[inner]).sum(axis=1).mean() ** 0.5)
 
     found = roughness()
-    monkeypatch.setattr(Settings, "tempers_saturation", False)
+    monkeypatch.setattr(Settings, "desaturates", False)
     assert found < 0.8 * roughness()

@@ -37,7 +37,7 @@ ALL = Diagnostics(
     terms={"light": 1.5, "slant": 2.0},
     iterations=10,
     evaluations=12,
-    joint=JointOutcome.CONTINUED,
+    joint=JointOutcome.INPAINTED,
     lobe=LobeDiagnostics(LobeStatus.FITTED, LobeFitOutcome.DETERMINED, (0.2, 0.24, 0.29)),
     light_colour=LightColourDiagnostics(
         "white", (1.1, 1.0, 0.9), 0.8, IlluminantOutcome.DETERMINED, True

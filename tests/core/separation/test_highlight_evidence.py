@@ -12,7 +12,7 @@ from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
 from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import HIGHLIGHT_ODDS, separate
-from isc_core.separation.support.highlight_evidence import classified_highlights, highlight_evidence
+from isc_core.separation.support.highlight_evidence import classify_highlights, highlight_evidence
 
 RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
 SIDE = 96
@@ -35,7 +35,7 @@ def ball(stripe: float = 0.0, gloss: float = 0.0) -> tuple[np.ndarray, np.ndarra
 
 
 def supported(*evidence: Any, **options: Any) -> np.ndarray:
-    return classified_highlights(*evidence, **options).kept
+    return classify_highlights(*evidence, **options).kept
 
 
 def form(photo: np.ndarray, diffuse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -64,13 +64,13 @@ def test_likely_highlights_that_stay_are_counted() -> None:
     photo, diffuse, mask = ball(gloss=0.4)
     evidence = photo, diffuse, mask, *form(photo, diffuse)
     share = float((photo - diffuse)[mask].sum() / photo[mask].sum())
-    strict = classified_highlights(*evidence, odds=1e9)
+    strict = classify_highlights(*evidence, odds=1e9)
     assert not strict.kept.any() and strict.doubtful == pytest.approx(share, rel=0.05)
-    assert classified_highlights(*evidence, odds=HIGHLIGHT_ODDS).doubtful == 0
+    assert classify_highlights(*evidence, odds=HIGHLIGHT_ODDS).doubtful == 0
     rows, columns = np.nonzero((photo - diffuse).sum(axis=2) > 0.5)
     place = (int(columns[0]), int(rows[0]))
     for marks in (HighlightMarks((place,)), HighlightMarks((), (place,))):
-        assert classified_highlights(*evidence, odds=1e9, marks=marks).doubtful == 0
+        assert classify_highlights(*evidence, odds=1e9, marks=marks).doubtful == 0
 
 
 @pytest.mark.parametrize("stripe", [0.05, 0.12, 0.3])

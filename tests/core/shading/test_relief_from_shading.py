@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.decomposition.layers import shaded
+from isc_core.decomposition.layers import normals_and_shading
 from isc_core.shading import relief_from_shading as module
 from isc_core.shading.relief_from_shading import (
     REACH,
@@ -36,7 +36,9 @@ def test_slopes_and_their_adjoint() -> None:
 def test_log_shading_is_that_of_the_maps() -> None:
     y, x = np.mgrid[:16, :16].astype(float)
     height = 0.3 * x - 0.2 * y
-    _, shading = shaded(height, np.tile(LIGHT[:, None], 3), np.ones((16, 16), bool), np.float64)
+    _, shading = normals_and_shading(
+        height, np.tile(LIGHT[:, None], 3), np.ones((16, 16), bool), np.float64
+    )
     found = log_shading(slopes(height), LIGHT)
     assert found[8, 8] == pytest.approx(float(np.log(shading[8, 8, 0])), abs=1e-6)
 

@@ -9,7 +9,7 @@ from isc_core.errors import InputError
 from isc_core.io.exr import write_channels
 from isc_core.shading.environment_map import directions, solid_angles
 from training.world.environments import ROWS, read_panoramas, smoothed_levels
-from training.world.invented_environments import invented_room, invented_sky, studio
+from training.world.procedural_environments import procedural_room, procedural_sky, studio
 
 
 def light(environment: np.ndarray) -> np.ndarray:
@@ -97,7 +97,7 @@ def test_a_lobe_is_symmetric_about_the_mirrored_direction() -> None:
     assert (level[cosine < -0.2] == 0).all()
 
 
-@pytest.mark.parametrize("draw", [invented_room, invented_sky, studio])
+@pytest.mark.parametrize("draw", [procedural_room, procedural_sky, studio])
 def test_invented_environments_are_light_of_all_kinds(draw) -> None:
     some = [draw(np.random.default_rng(seed), 16) for seed in range(8)]
     for environment in some:

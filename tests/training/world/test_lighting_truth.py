@@ -33,10 +33,10 @@ from synth.shapes import SHAPES
 from training.world import views as views_module
 from training.world.bodies.families import family_body
 from training.world.environments import ROWS
-from training.world.invented_environments import studio
 from training.world.lighting import LitViews, Material, light_views
 from training.world.patterns import Atlas
 from training.world.pictures import bank_of, lights_of
+from training.world.procedural_environments import studio
 from training.world.recipes import lamp_places
 from training.world.view_batches import batch_of, prepared
 from training.world.views import SIDE, View, trace_view

@@ -23,8 +23,8 @@ from training.world.recipes import Shares
 from training.world.samples import (
     OBJECT,
     OUTPUT,
-    Darkroom,
     Draw,
+    PhotoRenderer,
     Sample,
     draw_batch,
     draw_placement,
@@ -64,7 +64,7 @@ def draw(seed: int, shares: Shares, count: int = 3, plain: bool = False) -> Draw
 
 def finished(one: Draw, seed: int = 0) -> Sample:
     torch.manual_seed(seed)
-    return Darkroom(bank(), 16)(one, store(one))
+    return PhotoRenderer(bank(), 16)(one, store(one))
 
 
 def store(one: Draw) -> ViewStore:
@@ -246,7 +246,7 @@ def test_the_mean_light_of_what_the_light_is_told_for_is_one() -> None:
 def test_a_smaller_photo_shows_the_same() -> None:
     one = placed(draw(2, HARMONICS, 3, plain=True), **STRAIGHT)
     torch.manual_seed(0)
-    small = Darkroom(bank(), 16, OUTPUT // 2)(one, store(one))
+    small = PhotoRenderer(bank(), 16, OUTPUT // 2)(one, store(one))
     large = finished(one)
     both = inner(functional.avg_pool2d(large.known, 2).floor()) & inner(small.known)
     off = (functional.avg_pool2d(large.normal, 2) - small.normal).norm(dim=1).numpy()

@@ -14,7 +14,7 @@ from training.world.view_batches import (
     ViewBatch,
     ViewStore,
     batch_of,
-    filled_up,
+    padded_views,
     prepared,
     stretched,
 )
@@ -68,7 +68,7 @@ def test_no_stretch_changes_nothing() -> None:
 def test_a_store_fills_up_as_batches_do() -> None:
     chosen = torch.tensor([1, 0, 1])
     batch = batch_of([VIEWS[k] for k in chosen])
-    filled = filled_up([batch_of([VIEWS[k]]) for k in chosen])
+    filled = padded_views([batch_of([VIEWS[k]]) for k in chosen])
     for store in (ViewStore(VIEWS).batch(chosen), filled):
         for name, part in vars(batch).items():
             torch.testing.assert_close(getattr(store, name), part)

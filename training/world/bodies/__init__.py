@@ -1,5 +1,5 @@
-"""Triangle bodies to learn from: furniture, invented rigid bodies, scans, bodies built with Blender
-and the shape families of `synth`, taken apart into single things and screened.
+"""Triangle meshes for training: furniture, synthetic rigid bodies, scans, bodies built with Blender
+and the shape families of `synth`, taken apart into separate items and screened.
 """
 
 from .body import Body, Source

@@ -22,7 +22,7 @@ class Source(StrEnum):
 
 @dataclass(frozen=True)
 class Body:
-    """A body to learn from.
+    """A body for training.
 
     Attributes
     ----------

@@ -1,7 +1,7 @@
-"""Models of furniture and household things, from the catalogues of Sweet Home 3D.
+"""Models of furniture and household items, from the catalogues of Sweet Home 3D.
 
 A catalogue is a zip file (`.sh3f`) of OBJ models. Its `PluginFurnitureCatalog.properties` gives the
-licence, and for each model its path and author. A model becomes up to six single things
+licence, and for each model its path and author. A model becomes up to six separate items
 (`geometry/parts.py`).
 
 Citation: E. Puybaret, Sweet Home 3D, https://www.sweethome3d.com; Debian's package
@@ -19,14 +19,14 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from .geometry.parts import single_things
+from .geometry.parts import separate_items
 from .geometry.surface import Surface, welded
 from .obj_file import read_obj
 from .screening import MOST, checked, fault
 
 CATALOGUE = "PluginFurnitureCatalog.properties"
 LARGEST = 9_000_000  # bytes of a model's OBJ file
-MOST_THINGS = 6  # of a model
+MOST_ITEMS = 6  # of a model
 _CROWDED = 4 * MOST  # triangles of a whole model
 
 
@@ -79,7 +79,7 @@ def models_in(folder: Path) -> list[Model]:
     )
 
 
-def things_of(archive: Path, member: str, name: str) -> list[Surface]:
+def items_of(archive: Path, member: str, name: str) -> list[Surface]:
     """Read a model and take it apart.
 
     Parameters
@@ -94,7 +94,7 @@ def things_of(archive: Path, member: str, name: str) -> list[Surface]:
     Returns
     -------
     list of Surface
-        Single things that pass the screening, the largest first; empty for a model of too many
+        Separate items that pass the screening, the largest first; empty for a model of too many
         triangles or with vertices that are not finite.
 
     Raises
@@ -111,8 +111,8 @@ def things_of(archive: Path, member: str, name: str) -> list[Surface]:
     if not np.isfinite(checked(surface, name).vertices).all() or len(surface.faces) > _CROWDED:
         return []
     surface, kept = welded(surface)
-    things = single_things(surface, objects[kept], 2 * MOST_THINGS)
-    return [thing for thing in things if fault(thing) is None][:MOST_THINGS]
+    items = separate_items(surface, objects[kept], 2 * MOST_ITEMS)
+    return [item for item in items if fault(item) is None][:MOST_ITEMS]
 
 
 def _models_of(archive: Path) -> list[Model]:

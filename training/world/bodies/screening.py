@@ -1,4 +1,4 @@
-"""Rules that throw out what is no body to learn from.
+"""Rules that reject meshes that are unsuitable for training.
 
 | rule | thrown out |
 | --- | --- |
@@ -79,7 +79,7 @@ def fault(surface: Surface) -> Fault | None:
     Returns
     -------
     Fault or None
-        None for a body to learn from.
+        None for a suitable body.
     """
     if not np.isfinite(surface.vertices).all() or len(surface.faces) < FEWEST:
         return Fault.DEGENERATE

@@ -20,7 +20,7 @@ from .built import CREDIT as BUILT_CREDIT
 from .built import KINDS, build
 from .families import CREDIT as FAMILY_CREDIT
 from .families import family_body
-from .furniture import models_in, things_of
+from .furniture import items_of, models_in
 from .geometry.surface import Surface
 from .scans import read_scan, scans_in
 from .screening import fault
@@ -90,10 +90,10 @@ class BodyReference:
         if self.source is Source.FAMILY:
             return [Body(self.name, self.source, family_body(self.part, self.number))]
         if self.source is Source.FURNITURE:
-            things = things_of(self._file(), self.part, self.name)
+            items = items_of(self._file(), self.part, self.name)
             return [
-                Body(f"{self.name}-{k}", self.source, finished(thing))
-                for k, thing in enumerate(things)
+                Body(f"{self.name}-{k}", self.source, finished(item))
+                for k, item in enumerate(items)
             ]
         surface = self._surface()
         return [Body(self.name, self.source, finished(surface))] if fault(surface) is None else []

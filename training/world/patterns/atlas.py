@@ -1,4 +1,4 @@
-"""An atlas of surface patterns: print, woven and grown things, from a seed.
+"""An atlas of surface patterns: print, weaves, and natural materials, from a seed.
 
 A network that never sees print takes a printed edge for a fold and white letters for a highlight.
 A map holds shares of a second colour: 0 is one colour of a palette, 255 another; the colours are

@@ -1,4 +1,4 @@
-"""What stands on things: words of products, invented words, numbers, dates and prices."""
+"""Words for printed surfaces: product words, made-up words, numbers, dates and prices."""
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def word(rng: np.random.Generator, script: Script) -> str:
     Returns
     -------
     str
-        A real or an invented one, or a number.
+        A real or a made-up one, or a number.
     """
     kind = rng.random()
     if kind < 0.12:

@@ -5,7 +5,7 @@ import pytest
 
 from isc_core.inpainting.pull_push import fill
 from isc_core.separation.support import clipped_texture
-from isc_core.separation.support.clipped_texture import continue_under_clipped
+from isc_core.separation.support.clipped_texture import inpaint_clipped
 
 SIDE = 96
 
@@ -38,7 +38,7 @@ def error(found: np.ndarray, diffuse: np.ndarray) -> float:
 def test_stripes_go_on_under_a_clipped_highlight() -> None:
     diffuse, log_shading, mask = ball(0.4)
     photo, smooth, clipped = lit(diffuse, mask)
-    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading)
     assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
 
 
@@ -53,7 +53,7 @@ def test_holes_of_a_large_object_are_filled_from_their_surroundings(
     if apart:
         clipped[70, 30:33] = True
         photo[70, 30:33] = 1
-    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading)
     assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
     np.testing.assert_array_equal(found[~clipped], smooth[~clipped])
     assert apart == bool((found[70, 30:33] != smooth[70, 30:33]).any())
@@ -62,7 +62,7 @@ def test_holes_of_a_large_object_are_filled_from_their_surroundings(
 def test_plain_paint_is_not_worse_than_the_smooth_fill() -> None:
     diffuse, log_shading, mask = ball(0)
     photo, smooth, clipped = lit(diffuse, mask)
-    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading)
     assert error(found, diffuse) <= error(smooth, diffuse) * (1 + 1e-5)
 
 
@@ -70,7 +70,7 @@ def test_plain_paint_is_not_worse_than_the_smooth_fill() -> None:
 def test_only_clipped_pixels_change_and_stay_within_the_image(stripes: float) -> None:
     diffuse, log_shading, mask = ball(stripes)
     photo, smooth, clipped = lit(diffuse, mask)
-    found = continue_under_clipped(smooth, photo, clipped, mask, log_shading)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading)
     np.testing.assert_array_equal(found[~clipped], smooth[~clipped])
     assert (found >= 0).all() and (found <= photo).all()
 
@@ -78,14 +78,12 @@ def test_only_clipped_pixels_change_and_stay_within_the_image(stripes: float) ->
 def test_nothing_known_or_nothing_clipped_leaves_the_layer() -> None:
     diffuse, log_shading, mask = ball(0)
     for clipped in (mask, np.zeros_like(mask)):
-        found = continue_under_clipped(diffuse, diffuse, clipped, mask, log_shading)
+        found = inpaint_clipped(diffuse, diffuse, clipped, mask, log_shading)
         np.testing.assert_array_equal(found, diffuse)
 
 
 def test_the_answer_repeats_bit_for_bit() -> None:
     diffuse, log_shading, mask = ball(0.4)
     photo, smooth, clipped = lit(diffuse, mask)
-    one, again = (
-        continue_under_clipped(smooth, photo, clipped, mask, log_shading) for _ in range(2)
-    )
+    one, again = (inpaint_clipped(smooth, photo, clipped, mask, log_shading) for _ in range(2))
     np.testing.assert_array_equal(one, again)

@@ -69,6 +69,6 @@ def _primitive(bpy: Any, rng: np.random.Generator, place: np.ndarray, size: np.n
             minor_radius=float(rng.uniform(0.15, 0.4)),
             **where,
         )
-    thing = bpy.context.object
-    thing.scale = size.tolist()
-    return thing
+    obj = bpy.context.object
+    obj.scale = size.tolist()
+    return obj

@@ -1,4 +1,4 @@
-"""Household things with straight edges: packages, books, tins, telephones, remote controls, toy
+"""Household objects with straight edges: packages, books, tins, telephones, remote controls, toy
 cars, houses, bricks, tea boxes, cameras.
 
 Equation: rounded boxes and cylinders, put together by a few plans with random sizes; sides bulge,
@@ -16,7 +16,7 @@ from ..geometry.surface import Surface, together
 
 
 def make(rng: np.random.Generator) -> Surface:
-    """Make a household thing.
+    """Make a household object.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
-"""Cloth draped over things, by position-based dynamics.
+"""Cloth draped over obstacles, by position-based dynamics.
 
 Equation: the cloth is a grid of points; each step moves them by inertia and gravity, then restores
 the lengths of the links between neighbours (along, across, diagonal, and to the second neighbour
-for bending), each by a part of the error at both ends, and pushes points out of the things below. A
-coarse grid settles first, then a fine one.
+for bending), each by a part of the error at both ends, and pushes points out of the obstacles
+below. A coarse grid settles first, then a fine one.
 
 Citation: M. Mueller et al. 2007, doi:10.1016/j.jvcir.2007.01.005 (position-based dynamics).
 
-Limits: no collision of the cloth with itself; things are spheres, boxes, upright ellipsoids and
+Limits: no collision of the cloth with itself; obstacles are spheres, boxes, upright ellipsoids and
 the floor.
 """
 
@@ -28,7 +28,7 @@ _MENDED = 0.42  # of a link's error a round, at each end: more of it does not co
 
 
 def make(rng: np.random.Generator) -> Surface:
-    """Make a cloth that hangs over one to three things, or is pinned at a few points.
+    """Make a cloth that hangs over one to three obstacles, or is pinned at a few points.
 
     Parameters
     ----------
@@ -44,24 +44,24 @@ def make(rng: np.random.Generator) -> Surface:
     x, z = np.meshgrid(side * rng.uniform(0.7, 1), side)
     points = np.stack([x, 0.62 + 0 * x, z], -1)
     points += 0.01 * fractal(points.reshape(-1, 3), 2, 3, 0.7, rng).reshape(x.shape)[..., None]
-    things = [_thing(rng, k) for k in range(int(rng.integers(1, 4)))]
+    obstacles = [_obstacle(rng, k) for k in range(int(rng.integers(1, 4)))]
     pinned = np.zeros(x.shape, bool)
     if rng.random() < 0.3:
-        things = []
+        obstacles = []
         for _ in range(int(rng.integers(2, 5))):
             i, j = rng.integers(0, _COARSE, 2)
             pinned[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2] = True
-    coarse = _settled(points, points, things, pinned, _STEPS)
+    coarse = _settled(points, points, obstacles, pinned, _STEPS)
     grow = _FINE / _COARSE
     fine, rest = (zoom(one, (grow, grow, 1), order=3, mode="nearest") for one in (coarse, points))
     pins = zoom(pinned.astype(float), grow, order=0) > 0.5
-    fine = _settled(fine, rest, things, pins, _FINE_STEPS)
+    fine = _settled(fine, rest, obstacles, pins, _FINE_STEPS)
     weave = 0.0015 * fractal(fine.reshape(-1, 3), 10, 2, 0.6, rng).reshape(fine.shape[:2])
     return sheet(fine + weave[..., None] * (0, 1, 0), rng.uniform(0.01, 0.03))
 
 
-def _thing(rng: np.random.Generator, number: int) -> tuple[str, np.ndarray, np.ndarray]:
-    """Kind, centre and size of a thing below; the first one is large, and in the middle."""
+def _obstacle(rng: np.random.Generator, number: int) -> tuple[str, np.ndarray, np.ndarray]:
+    """Kind, centre and size of an obstacle below; the first one is large, and in the middle."""
     spread = 0.12 if number == 0 else 0.45
     x, z = rng.normal(0, spread, 2)
     size = rng.uniform(0.3, 0.55, 3) if number == 0 else rng.uniform(0.12, 0.35, 3)
@@ -72,7 +72,7 @@ def _thing(rng: np.random.Generator, number: int) -> tuple[str, np.ndarray, np.n
 def _settled(
     points: np.ndarray,
     rest: np.ndarray,
-    things: list[tuple[str, np.ndarray, np.ndarray]],
+    obstacles: list[tuple[str, np.ndarray, np.ndarray]],
     pinned: np.ndarray,
     steps: int,
 ) -> np.ndarray:
@@ -90,7 +90,7 @@ def _settled(
             _mend(points, links)
             points[pinned] = start[pinned]
         free = points.copy()
-        for kind, centre, size in things:
+        for kind, centre, size in obstacles:
             _push_out(points, kind, centre, size)
         points[..., 1] = np.maximum(points[..., 1], _FLOOR)
         touching = (free != points).any(-1)
@@ -118,7 +118,7 @@ def _ends(points: np.ndarray, dy: int, dx: int) -> tuple[np.ndarray, np.ndarray]
 
 
 def _push_out(points: np.ndarray, kind: str, centre: np.ndarray, size: np.ndarray) -> None:
-    """Move points out of a thing, in place."""
+    """Move points out of an obstacle, in place."""
     away = points - centre
     if kind == "box":
         depth = size - np.abs(away)

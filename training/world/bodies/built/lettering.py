@@ -58,9 +58,9 @@ def _text(words: str, rng: np.random.Generator) -> Surface:
     data.offset = float(rng.uniform(0, 0.02))
     data.bevel_depth, data.bevel_resolution = float(rng.uniform(0.005, 0.03)), 3
     data.resolution_u = 5
-    thing = linked(bpy, data)
-    x, y, z = surface_of(thing).vertices.T
-    faces = surface_of(thing).faces
+    obj = linked(bpy, data)
+    x, y, z = surface_of(obj).vertices.T
+    faces = surface_of(obj).faces
     vertices = np.stack([x * rng.uniform(0.7, 1.3), -z, y], -1)  # upright: it lay on the floor
     low, high = vertices.min(0), vertices.max(0)
     return Surface(vertices - [*((low + high) / 2)[:2], low[2]], faces)

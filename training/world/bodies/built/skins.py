@@ -27,15 +27,15 @@ def make(rng: np.random.Generator) -> Surface:
     places, edges, radii = _hand(rng) if rng.random() < 0.35 else _branches(rng)
     mesh = bpy.data.meshes.new("body")
     mesh.from_pydata(places.tolist(), edges, [])
-    thing = linked(bpy, mesh)
-    skin = thing.modifiers.new("skin", "SKIN")
+    obj = linked(bpy, mesh)
+    skin = obj.modifiers.new("skin", "SKIN")
     skin.branch_smoothing = 0.5
     for vertex, radius in zip(mesh.skin_vertices[0].data, radii, strict=True):
         vertex.radius = (radius, radius * float(rng.uniform(0.8, 1.2)))
     mesh.skin_vertices[0].data[0].use_root = True
-    smooth = thing.modifiers.new("smooth", "SUBSURF")
+    smooth = obj.modifiers.new("smooth", "SUBSURF")
     smooth.levels = 3
-    surface = welded(surface_of(thing))[0]
+    surface = welded(surface_of(obj))[0]
     rough = fractal(surface.vertices, rng.uniform(2, 5), 3, 0.5, rng)
     return displaced(surface, rng.choice([0, 0.005, 0.015]) * rough)
 

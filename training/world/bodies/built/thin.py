@@ -12,7 +12,7 @@ from ..geometry.surface import Surface, together
 
 
 def make(rng: np.random.Generator) -> Surface:
-    """Make a thing of thin parts.
+    """Make an object of thin parts.
 
     Parameters
     ----------

@@ -38,12 +38,12 @@ def emptied() -> Any:
     return bpy
 
 
-def surface_of(thing: Any) -> Surface:
+def surface_of(obj: Any) -> Surface:
     """Return the triangles of an object, with its modifiers applied.
 
     Parameters
     ----------
-    thing : bpy.types.Object
+    obj : bpy.types.Object
         Of the current scene: mesh, curve, text or metaballs.
 
     Returns
@@ -53,7 +53,7 @@ def surface_of(thing: Any) -> Surface:
     """
     import bpy
 
-    evaluated = thing.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get())
     mesh = evaluated.to_mesh()
     mesh.calc_loop_triangles()
     vertices = np.empty(3 * len(mesh.vertices), np.float32)
@@ -80,9 +80,9 @@ def linked(bpy: Any, data: Any) -> Any:
     bpy.types.Object
         The object.
     """
-    thing = bpy.data.objects.new("body", data)
-    bpy.context.scene.collection.objects.link(thing)
-    return thing
+    obj = bpy.data.objects.new("body", data)
+    bpy.context.scene.collection.objects.link(obj)
+    return obj
 
 
 def mesh_object(bpy: Any, surface: Surface) -> Any:

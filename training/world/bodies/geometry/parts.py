@@ -1,17 +1,16 @@
-"""Taking a model apart into single things.
+"""Taking a model apart into separate items.
 
 Equation: a piece is a set of faces connected by shared vertices. Two pieces touch if points spread
 over both fall into the same cell of one of two cubic grids, offset by half a cell, of CELL times
-the model's longest side. Pieces that touch are one thing. A named object of the file, or what
-touches within it, is a thing of its own too if the largest face of its bounding box is below
-PORTION of its thing's: the vase on the shelf, the shade of a lamp. Things below SHARE of the
-longest one are dropped, and objects of less than FACES faces. Of the rest at most `most` are kept,
-the largest first; one whose relative extents and area are those of a larger one is dropped: the
-second of two equal chairs. Models of more than OBJECTS named objects are taken apart by contact
-alone.
+the model's longest side. Pieces that touch are one item. A named object of the file, or what
+touches within it, is an item of its own too if the largest face of its bounding box is below
+PORTION of its item's: the vase on the shelf, the shade of a lamp. Items below SHARE of the longest
+one are dropped, and objects of less than FACES faces. Of the rest at most `most` are kept, the
+largest first; one whose relative extents and area are those of a larger one is dropped: the second
+of two equal chairs. Models of more than OBJECTS named objects are taken apart by contact alone.
 
-Limits: things that stand on a common floor plate are one thing with it, and things of their own
-only if the file names them. Gaps narrower than a cell close.
+Limits: items that stand on a common floor plate are one item with it, and items of their own only
+if the file names them. Gaps narrower than a cell close.
 """
 
 import numpy as np
@@ -22,11 +21,11 @@ from .surface import Surface
 
 CELL = 0.015  # relative to the longest side of the model
 SHARE, FACES, PORTION, OBJECTS = 0.15, 150, 0.6, 200
-ALIKE = 0.02  # relative difference up to which two things are of one shape
+ALIKE = 0.02  # relative difference up to which two items are of one shape
 _POINTS = 12_000
 
 
-def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surface]:
+def separate_items(surface: Surface, objects: np.ndarray, most: int) -> list[Surface]:
     """Take a model apart.
 
     Parameters
@@ -36,7 +35,7 @@ def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surf
     objects : (M,) ndarray of int
         The file's named object of each face.
     most : int
-        Number of things to return at most.
+        Number of items to return at most.
 
     Returns
     -------
@@ -45,21 +44,21 @@ def single_things(surface: Surface, objects: np.ndarray, most: int) -> list[Surf
     """
     piece = _pieces(surface)
     touching = _contacts(surface, piece)
-    thing = _joined(int(piece.max()) + 1, touching)[piece]
-    boxes = _extents(surface, thing)
+    item = _joined(int(piece.max()) + 1, touching)[piece]
+    boxes = _extents(surface, item)
     size = np.sort(boxes, axis=1)[:, 1:].prod(1)  # the largest face of each box
-    found = [thing == k for k in np.argsort(-size, kind="stable")[: 2 * most]]
+    found = [item == k for k in np.argsort(-size, kind="stable")[: 2 * most]]
     named = np.unique(objects)
     for k in named if len(named) <= OBJECTS else ():
-        own = _largest_within(objects == k, thing)
+        own = _largest_within(objects == k, item)
         own = _touching_part(own, piece, touching)
-        whole = size[thing[np.argmax(own)]]
+        whole = size[item[np.argmax(own)]]
         if own.sum() >= FACES and _face_of_box(surface.part(own)) < PORTION * whole:
             found.append(own)
-    things = [surface.part(one) for one in found]
-    least = SHARE * max(one.extents().max() for one in things)
-    things = [one for one in things if one.extents().max() > least]
-    return _of_different_shape(sorted(things, key=_face_of_box, reverse=True), most)
+    items = [surface.part(one) for one in found]
+    least = SHARE * max(one.extents().max() for one in items)
+    items = [one for one in items if one.extents().max() > least]
+    return _of_different_shape(sorted(items, key=_face_of_box, reverse=True), most)
 
 
 def _extents(surface: Surface, label: np.ndarray) -> np.ndarray:
@@ -140,27 +139,27 @@ def _spread(surface: Surface, piece: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _joined(count: int, pairs: np.ndarray) -> np.ndarray:
-    """Number of the thing of each of `count` pieces, from the pairs that belong together."""
+    """Number of the item of each of `count` pieces, from the pairs that belong together."""
     graph = coo_matrix((np.ones(len(pairs), np.int8), tuple(pairs.T)), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _face_of_box(surface: Surface) -> float:
-    """Product of the two larger sides of the bounding box: also a size of flat things."""
+    """Product of the two larger sides of the bounding box: also a size of flat items."""
     return float(np.sort(surface.extents())[1:].prod())
 
 
-def _of_different_shape(things: list[Surface], most: int) -> list[Surface]:
+def _of_different_shape(items: list[Surface], most: int) -> list[Surface]:
     kept: list[Surface] = []
     signatures: list[np.ndarray] = []
-    for thing in things:
+    for item in items:
         if len(kept) == most:
             break
-        size = thing.extents().max()
+        size = item.extents().max()
         signature = np.log(
-            [*(np.sort(thing.extents()) / size + 0.01), thing.areas().sum() / size**2 + 0.01]
+            [*(np.sort(item.extents()) / size + 0.01), item.areas().sum() / size**2 + 0.01]
         )
         if all(np.abs(signature - other).max() > ALIKE for other in signatures):
-            kept.append(thing)
+            kept.append(item)
             signatures.append(signature)
     return kept

@@ -1,4 +1,4 @@
-"""Environments that nobody photographed: rooms, skies and studios, drawn from a seed.
+"""Procedural environments: rooms, skies and studios, drawn from a seed.
 
 Equation: radiance (rows, 2 rows, 3) in the layout of `isc_core.shading.environment_map`; 1 is about
 a white wall. A room is a box with the object inside: each direction meets a wall, and what hangs,
@@ -18,8 +18,8 @@ from isc_core.shading.environment_map import directions, resampled
 _FINER = 3
 
 
-def invented_room(rng: np.random.Generator, rows: int = 32) -> np.ndarray:
-    """Draw a room with windows, ceiling panels and things on its walls.
+def procedural_room(rng: np.random.Generator, rows: int = 32) -> np.ndarray:
+    """Draw a room with windows, ceiling panels and objects on its walls.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def invented_room(rng: np.random.Generator, rows: int = 32) -> np.ndarray:
     return _finished(radiance, rows)
 
 
-def invented_sky(rng: np.random.Generator, rows: int = 32) -> np.ndarray:
+def procedural_sky(rng: np.random.Generator, rows: int = 32) -> np.ndarray:
     """Draw an outdoor scene: clear, cloudy or overcast, at noon or in the evening.
 
     Parameters
@@ -172,7 +172,7 @@ def _ceiling(rng: np.random.Generator, u: np.ndarray, v: np.ndarray) -> np.ndarr
 
 def _floor(rng: np.random.Generator, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     radiance = np.broadcast_to(rng.uniform(0.05, 0.6) * _hue(rng, 0.3), (*u.shape, 3)).copy()
-    for _ in range(int(rng.integers(0, 5))):  # rugs, the light of a window, things
+    for _ in range(int(rng.integers(0, 5))):  # rugs, the light of a window, objects
         radiance[_box(rng, u, v, 0.2, 1.0)] = np.exp(rng.normal(-1, 0.9)) * _hue(rng, 0.4)
     return radiance
 
