@@ -35,7 +35,7 @@ from .task import DecompositionTask, SceneEstimate
 _COLOURED = 0.1  # of a channel's share: less cannot be distinguished from white
 
 
-def under_light(
+def solve_under_estimated_light(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Run a model under white light, and put back the light's colour where it is to be used.
@@ -82,7 +82,7 @@ def _estimated(task: DecompositionTask) -> Illuminant:
         return estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
 
 
-def under_given_light(
+def solve_under_given_light(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Run a solver under white light where the light's colour is given as numbers.

@@ -29,11 +29,11 @@ from ..sirfs.priors.prior_set import PriorSet
 from .assumption_checks import with_warnings
 from .detail import with_fine_relief
 from .layers import separated
-from .light_colour import under_given_light, under_light
+from .light_colour import solve_under_estimated_light, solve_under_given_light
 from .predictions import with_predictions
 from .settings import SEPARATING_MODELS, SIRFS_MODELS, LightColour, Settings
 from .task import DecompositionTask, SceneEstimate, SolveOptions
-from .toning import is_grey, under_tone
+from .toning import is_grey, solve_toned
 
 
 def solve(task: DecompositionTask) -> SceneEstimate:
@@ -61,8 +61,8 @@ def solve(task: DecompositionTask) -> SceneEstimate:
     solver = _solver(task.settings.model)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    lit = partial(under_given_light, solver=partial(_solved, solver=solver))
-    return under_tone(task, lit)
+    lit = partial(solve_under_given_light, solver=partial(_solved, solver=solver))
+    return solve_toned(task, lit)
 
 
 def load(settings: Settings, prior_set: PriorSet | None = None) -> None:
@@ -90,7 +90,7 @@ def _solved(
     """Predict, solve and check."""
     with _BackgroundWork(task) as ahead:
         task = with_predictions(task)
-        estimate = under_light(task, lambda lit: solver(ahead.added(lit)))
+        estimate = solve_under_estimated_light(task, lambda lit: solver(ahead.added(lit)))
     estimate = replace(estimate, prediction=task.prediction)
     if task.maps.mask.size > LARGE:
         give_back_memory()

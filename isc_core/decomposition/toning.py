@@ -25,7 +25,7 @@ from .settings import LightColour
 from .task import DecompositionTask, SceneEstimate
 
 
-def under_tone(
+def solve_toned(
     task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
 ) -> SceneEstimate:
     """Run a solver on the grey photo where a photo is toned, and put the tone back.

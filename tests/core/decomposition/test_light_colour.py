@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.decomposition.light_colour import under_given_light, under_light
+from isc_core.decomposition.light_colour import solve_under_estimated_light, solve_under_given_light
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.shape import desaturated
@@ -65,7 +65,7 @@ def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> N
         seen.append(task)
         return seen_by(task)
 
-    answer = under_light(task_of(photo), solver)
+    answer = solve_under_estimated_light(task_of(photo), solver)
     colour = estimate_illuminant(photo.image, photo.mask).colour
     assert seen[0].one_scale and np.allclose(seen[0].working.image, photo.image / colour, atol=1e-6)
     split, white = answer.split, seen_by(seen[0]).split
@@ -89,7 +89,10 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
     albedos: np.ndarray, asked: str
 ) -> None:
     photo = photo_of(albedos, LIGHT)
-    answer, usual = under_light(task_of(photo, asked), seen_by), seen_by(task_of(photo))
+    answer, usual = (
+        solve_under_estimated_light(task_of(photo, asked), seen_by),
+        seen_by(task_of(photo)),
+    )
     np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
     np.testing.assert_array_equal(answer.split.confidence, usual.split.confidence)
     found = answer.diagnostics.light_colour
@@ -99,7 +102,7 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
 
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
     photo = photo_of(ALBEDOS, np.array([1.3, 1.0, 0.7]))
-    answer, usual = under_light(task_of(photo), seen_by), seen_by(task_of(photo))
+    answer, usual = solve_under_estimated_light(task_of(photo), seen_by), seen_by(task_of(photo))
     assert estimate_illuminant(photo.image, photo.mask).outcome.too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
     found = answer.diagnostics.light_colour
@@ -116,7 +119,9 @@ def test_layers_that_are_known_already_are_taken_along() -> None:
         assert task.split is not None
         return replace(seen_by(task), split=task.split)
 
-    found: Separation = under_light(replace(task_of(photo), split=split), given).split
+    found: Separation = solve_under_estimated_light(
+        replace(task_of(photo), split=split), given
+    ).split
     np.testing.assert_allclose(found.diffuse, split.diffuse, atol=1e-6)
 
 
@@ -156,7 +161,7 @@ def test_a_given_colour_is_divided_out_and_put_back() -> None:
         seen.append(task)
         return seen_by(task)
 
-    answer = under_given_light(task_of(photo, "2,1,.5"), solver)
+    answer = solve_under_given_light(task_of(photo, "2,1,.5"), solver)
     colour = np.array([12, 6, 3]) / 7
     np.testing.assert_allclose(seen[0].working.image, photo.image / colour, atol=1e-6)
     np.testing.assert_allclose(

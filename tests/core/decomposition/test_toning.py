@@ -5,7 +5,7 @@ import pytest
 
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decomposition.pipeline import decompose
-from isc_core.decomposition.toning import under_tone
+from isc_core.decomposition.toning import solve_toned
 from isc_core.imaging.luminance import luminance
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.photo import Photo, PhotoSource
@@ -55,7 +55,7 @@ def test_a_toned_photo_is_solved_as_grey_and_keeps_its_tone(name: str) -> None:
         seen.append(task)
         return halved(task)
 
-    found = under_tone(DecompositionTask(photo, photo, Settings(light_colour="toned")), model)
+    found = solve_toned(DecompositionTask(photo, photo, Settings(light_colour="toned")), model)
     inside = photo.mask
     assert seen[0].one_scale
     grey = seen[0].working.image
@@ -71,7 +71,7 @@ def test_a_toned_photo_is_solved_as_grey_and_keeps_its_tone(name: str) -> None:
 )
 def test_only_a_grey_photo_is_recognised(name: str, expected: PhotoColours) -> None:
     photo = photo_like(name)
-    found = under_tone(DecompositionTask(photo, photo, Settings()), halved)
+    found = solve_toned(DecompositionTask(photo, photo, Settings()), halved)
     assert found.diagnostics.photo_colours is expected
     np.testing.assert_array_equal(found.split.diffuse, photo.image / 2)
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decomposition.light_colour import under_light
+from isc_core.decomposition.light_colour import solve_under_estimated_light
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, SolveOptions
 from isc_core.decomposition.models import solve as decompose
 from isc_core.illuminant.illuminant import estimate_illuminant
@@ -182,7 +182,7 @@ def test_predictions_are_whitened_with_the_photo() -> None:
         shading_estimate=ShadingEstimate(np.zeros((*shape, 3)), np.where(photo.mask, 0.1, 0)),
         light_coefficients=LightCoefficientsEstimate(np.zeros((9, 3)), np.eye(27)),
     )
-    under_light(told, solver)
+    solve_under_estimated_light(told, solver)
     shading, light = tasks[0].shading_estimate, tasks[0].light_coefficients
     assert shading is not None and light is not None
     np.testing.assert_allclose(
