@@ -1,10 +1,10 @@
 """Render an object, and again after it was exported and read back.
 
-Problem: does another program get what is seen? The file is imported by Blender's own importers into
+Problem: does another program show the same object?? The file is imported by Blender's own importers into
 a copy of the scene from which the original was removed, and rendered by Cycles with the same camera
 and light.
 
-Limits: both are Blender's: what its exporter and its importer both get wrong is not seen.
+Limits: both are Blender's: errors that its exporter and its importer share are not found.
 """
 
 import tempfile
@@ -74,7 +74,7 @@ def read_back(built: BuiltObject, path: Path, samples: int) -> tuple[np.ndarray,
     bpy.data.objects.remove(bpy.data.objects[name])
     before = set(bpy.data.objects)
     next(read for suffix, read in READERS.values() if path.suffix == f".{suffix}")(str(path))
-    for thing in set(bpy.data.objects) - before:
-        thing.visible_shadow, thing.visible_diffuse = flags
+    for obj in set(bpy.data.objects) - before:
+        obj.visible_shadow, obj.visible_diffuse = flags
     image, coverage = render_scene(bpy.data.scenes[scene], samples)
     return image, coverage > 0.99

@@ -1,4 +1,4 @@
-"""A still life: objects made from photos among other things, in a light that no photo had.
+"""A still life: objects made from photos among other objects, in a light that no photo had.
 
 A table with two books, a mirror ball and a candle; a low warm lamp from the right, where the photos
 had theirs at the upper left, and a cool one behind. Reflections in the ball and shadows of one

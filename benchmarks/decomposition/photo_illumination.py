@@ -1,4 +1,4 @@
-"""What do the priors of photos gain on white-balanced photos of coloured glossy things?
+"""What do the priors of photos gain on white-balanced photos of coloured glossy objects?
 
   python -m benchmarks.decomposition.photo_illumination WORLD --panoramas DIR [--count N]
   [--ways A,B,...] [--balance HOW] [--seed K] [--json FILE]

@@ -168,14 +168,14 @@ def left_out(
     candidate : int
         Number of the latter.
     """
-    for thing in sorted({_object(name) for _, name in table[0]}):
+    for subject in sorted({_object(name) for _, name in table[0]}):
         others = {
-            c: score({key: value for key, value in row.items() if _object(key[1]) != thing})
+            c: score({key: value for key, value in row.items() if _object(key[1]) != subject})
             for c, row in table.items()
         }
         best = min(others, key=lambda c: others[c])
         for group, photo in table[0]:
-            if _object(photo) == thing:
+            if _object(photo) == subject:
                 yield group, photo, table[0][group, photo], table[best][group, photo], best
 
 

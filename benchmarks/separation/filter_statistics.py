@@ -56,7 +56,7 @@ class Sample:
 
     Attributes
     ----------
-    thing : str
+    subject : str
         Name of the object.
     intensity : (H, W) ndarray
         Mean of the channels.
@@ -66,7 +66,7 @@ class Sample:
         Filter outputs of either kind.
     """
 
-    thing: str
+    subject: str
     intensity: np.ndarray
     mask: np.ndarray
     highlight: np.ndarray
@@ -212,14 +212,14 @@ def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
     area : float
         Area under the ROC curve on left-out objects.
     """
-    things = sorted({one.thing for one in samples})
+    subjects = sorted({one.subject for one in samples})
     high: list[np.ndarray] = []
     none: list[np.ndarray] = []
     for fold in range(_FOLDS):
-        left_out = set(things[fold::_FOLDS])
-        table = fitted([one for one in samples if one.thing not in left_out])
+        left_out = set(subjects[fold::_FOLDS])
+        table = fitted([one for one in samples if one.subject not in left_out])
         for one in samples:
-            if one.thing in left_out:
+            if one.subject in left_out:
                 evidence = pooled_evidence(one.intensity, one.mask, table)
                 high.append(evidence[one.highlight])
                 none.append(evidence[one.without])

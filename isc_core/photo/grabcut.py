@@ -221,8 +221,8 @@ def _cut(
 ) -> np.ndarray:
     """Label the free pixels by the mixtures of the background and of the object."""
     difference = np.zeros(free.shape)
-    background, thing = (mixture.cost(codes[free]) for mixture in mixtures)
-    difference[free] = background - thing
+    background, foreground = (mixture.cost(codes[free]) for mixture in mixtures)
+    difference[free] = background - foreground
     return minimum_cut(difference, links, free, inside)
 
 

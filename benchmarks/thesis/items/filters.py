@@ -204,7 +204,7 @@ def _filters(context: Context) -> ItemContent:
         for (kind, width), distance, one, raised in columns
     )
     header = ("filter", "width (% of the diagonal)", "total variation", "p", "p after Holm")
-    names = ", ".join(sample.thing for sample in samples)
+    names = ", ".join(sample.subject for sample in samples)
     nearest, furthest = min(cell[2] for cell in cells), max(cell[2] for cell in cells)
     text = (
         f"{len(samples)} subjects: {names}. Of the specular layers, only pixels with at "

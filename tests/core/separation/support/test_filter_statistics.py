@@ -55,7 +55,7 @@ def samples(seeds: range) -> list[Sample]:
         outputs = filter_outputs(intensity, mask)
         found.append(
             Sample(
-                f"thing{seed}",
+                f"subject{seed}",
                 intensity,
                 mask,
                 high,
@@ -141,7 +141,7 @@ def test_where_both_kinds_look_alike_the_temperature_says_nothing():
         high, none = one.mask & heads, one.mask & ~heads
         blind.append(
             Sample(
-                one.thing,
+                one.subject,
                 one.intensity,
                 one.mask,
                 high,
