@@ -1,8 +1,8 @@
 """Render an object, and again after it was exported and read back.
 
-Problem: does another program show the same object?? The file is imported by Blender's own importers into
-a copy of the scene from which the original was removed, and rendered by Cycles with the same camera
-and light.
+Problem: does another program show the same object? The file is imported by Blender's own importers
+into a copy of the scene from which the original was removed, and rendered by Cycles with the same
+camera and light.
 
 Limits: both are Blender's: errors that its exporter and its importer share are not found.
 """
