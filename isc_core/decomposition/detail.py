@@ -45,6 +45,7 @@ from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import low_pass, masked_gaussian, masked_low_pass
 from ..imaging.tiles import Place, tiles_of
+from ..imaging.window import Window
 from ..progress import Monitor
 from ..shading.paint_edges import ONE_PAINT, paint_guide, uniformity
 from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
@@ -55,7 +56,6 @@ from ..shading.relief_from_shading import (
     shading_gain,
     slopes,
 )
-from ..sirfs.recover import Window
 from .settings import Illumination
 from .task import DecompositionTask, SceneEstimate
 

@@ -19,11 +19,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..imaging.area_enlarge import enlarge_averages
-from ..imaging.framing import continued
 from ..imaging.resampling import height_scale, resample_height, resample_inside
+from ..imaging.window import Window
 from ..progress import Monitor
-from ..scene.known_inputs import DepthObservation, SceneConstraints
+from ..scene.known_inputs import SceneConstraints
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 from ..shading.occluding_contour import Contour, occluding_contour
@@ -33,6 +32,7 @@ from .problem import Problem, Terms
 from .settings import Weights
 from .shading_term import expected_shading
 from .silhouette import normals_from_silhouette
+from .solve_inputs import SolveInputs
 from .solver import SirfsResult, SolverOptions, solve
 
 MARGIN = 20
@@ -102,203 +102,6 @@ class Recovered:
     reason: str
     converged: bool
     solved_shape: tuple[int, ...]
-
-
-@dataclass(frozen=True)
-class Window:
-    """A rectangle around the object, which may reach beyond the image.
-
-    Attributes
-    ----------
-    top, left : int
-        First row and column; may be negative.
-    height, width : int
-        Size in pixels.
-    """
-
-    top: int
-    left: int
-    height: int
-    width: int
-
-    def cut(self, array: np.ndarray, fill: float | bool) -> np.ndarray:
-        """Cut the window out of an array.
-
-        Parameters
-        ----------
-        array : (H, W, ...) ndarray
-        fill : float or bool
-            Value beyond the image.
-
-        Returns
-        -------
-        (height, width, ...) ndarray
-        """
-        rows, columns = array.shape[:2]
-        out = np.full((self.height, self.width, *array.shape[2:]), fill, array.dtype)
-        a, b = max(self.top, 0), min(self.top + self.height, rows)
-        c, d = max(self.left, 0), min(self.left + self.width, columns)
-        out[a - self.top : b - self.top, c - self.left : d - self.left] = array[a:b, c:d]
-        return out
-
-    def cut_replicated(self, array: np.ndarray) -> np.ndarray:
-        """Cut the window out of an array, which continues with its border values.
-
-        Parameters
-        ----------
-        array : (H, W) ndarray
-
-        Returns
-        -------
-        (height, width) ndarray
-        """
-        rows, columns = (
-            np.clip(np.arange(start, start + size), 0, n - 1)
-            for start, size, n in zip(
-                (self.top, self.left), (self.height, self.width), array.shape, strict=True
-            )
-        )
-        return array[np.ix_(rows, columns)]
-
-    def cut_silhouette(self, silhouette: np.ndarray) -> np.ndarray:
-        """Cut the window out of a silhouette, which continues where the frame cuts it.
-
-        Parameters
-        ----------
-        silhouette : (H, W) bool ndarray
-
-        Returns
-        -------
-        (height, width) bool ndarray
-        """
-        below = self.top + self.height - silhouette.shape[0]
-        beyond = self.left + self.width - silhouette.shape[1]
-        grown = continued(
-            silhouette, max(-self.top, 0), max(below, 0), max(-self.left, 0), max(beyond, 0)
-        )
-        top, left = max(self.top, 0), max(self.left, 0)
-        return grown[top : top + self.height, left : left + self.width]
-
-    def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return an image that holds the content of the window, 0 elsewhere.
-
-        Parameters
-        ----------
-        window : (height, width, ...) ndarray
-        shape : tuple of int
-            (H, W, ...) of the image.
-
-        Returns
-        -------
-        (H, W, ...) ndarray
-        """
-        out = np.zeros(shape, window.dtype)
-        a, b = max(self.top, 0), min(self.top + self.height, shape[0])
-        c, d = max(self.left, 0), min(self.left + self.width, shape[1])
-        out[a:b, c:d] = window[a - self.top : b - self.top, c - self.left : d - self.left]
-        return out
-
-
-@dataclass(frozen=True)
-class SolveInputs:
-    """The maps a problem is made of, all at one scale.
-
-    Attributes
-    ----------
-    image : (h, w, C) ndarray
-        Linear diffuse image.
-    valid : (h, w) bool ndarray
-        Pixels whose values count.
-    silhouette : (h, w) bool ndarray
-        The object, continued beyond the photo.
-    photo : (h, w) bool ndarray
-        The part of the window inside the photo.
-    pixel_weight : (h, w) ndarray or None
-        See `Problem`.
-    normals : NormalEstimate or None
-        Predicted normals.
-    depth : DepthObservation or None
-        Observed depth.
-    shading : ShadingEstimate or None
-        Predicted log shading.
-    """
-
-    image: np.ndarray
-    valid: np.ndarray
-    silhouette: np.ndarray
-    photo: np.ndarray
-    pixel_weight: np.ndarray | None = None
-    normals: NormalEstimate | None = None
-    depth: DepthObservation | None = None
-    shading: ShadingEstimate | None = None
-
-    def cut(self, window: Window) -> "SolveInputs":
-        """Cut the window out of all maps.
-
-        Parameters
-        ----------
-        window : Window
-
-        Returns
-        -------
-        SolveInputs
-        """
-        weight, normals, depth = self.pixel_weight, self.normals, self.depth
-        shading = self.shading
-        return SolveInputs(
-            window.cut(self.image, 0),
-            window.cut(self.valid, False),
-            window.cut_silhouette(self.silhouette),
-            window.cut(self.photo, False),
-            None if weight is None else window.cut(weight, 0),
-            normals
-            and NormalEstimate(window.cut(normals.normal, 0), window.cut(normals.deviation, 0)),
-            depth and replace(depth, height=window.cut(depth.height, np.nan)),
-            shading
-            and ShadingEstimate(
-                window.cut(shading.log_shading, 0), window.cut(shading.deviation, 0)
-            ),
-        )
-
-    def scaled(self, factor: float) -> "SolveInputs":
-        """Resample all maps.
-
-        Parameters
-        ----------
-        factor : float
-            New size over the old.
-
-        Returns
-        -------
-        SolveInputs
-            `self` if the factor is 1.
-        """
-        if factor == 1:
-            return self
-        weight, normals, depth = self.pixel_weight, self.normals, self.depth
-
-        def inside(values: np.ndarray) -> np.ndarray:
-            return resample_inside(values, self.valid, factor)[0]
-
-        _, share = resample_inside(self.valid, self.valid, factor)
-        if factor > 1:
-            image = enlarge_averages(self.image, self.valid, share.shape)
-        else:
-            image = inside(self.image)
-        silhouette, photo = (
-            resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
-            for m in (self.silhouette, self.photo)
-        )
-        return SolveInputs(
-            image,
-            share >= 0.5 * share.max(),  # an object thinner than a pixel fills none by half
-            silhouette,
-            photo,
-            None if weight is None else inside(weight),
-            normals and NormalEstimate(inside(normals.normal), inside(normals.deviation)),
-            depth and _scaled_depth(depth, factor),
-            self.shading and _scaled_shading(self.shading, factor),
-        )
 
 
 def recover(
@@ -474,22 +277,6 @@ def _inside_photo(contour: Contour, photo: np.ndarray) -> Contour:
     return Contour(
         contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep]
     )
-
-
-def _scaled_depth(depth: DepthObservation, factor: float) -> DepthObservation:
-    height, share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
-    scale = height_scale(depth.height.shape, height.shape)
-    return DepthObservation(
-        np.where(share >= 0.5, height * scale, np.nan), depth.sigma * scale, depth.weight
-    )
-
-
-def _scaled_shading(shading: ShadingEstimate, factor: float) -> ShadingEstimate:
-    known = shading.deviation > 0
-    mean, share = resample_inside(shading.log_shading, known, factor)
-    deviation = resample_inside(shading.deviation, known, factor)[0]
-    inside = share >= 0.5 * share.max()
-    return ShadingEstimate(np.where(inside[..., None], mean, 0), np.where(inside, deviation, 0))
 
 
 def _scaled_height(height: np.ndarray, factor: float) -> np.ndarray:

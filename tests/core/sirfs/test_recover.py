@@ -14,7 +14,8 @@ from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
 from isc_core.scene.known_inputs import DepthObservation, SceneConstraints
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.recover import Recovered, RecoverOptions, SolveInputs, recover
+from isc_core.sirfs.recover import Recovered, RecoverOptions, recover
+from isc_core.sirfs.solve_inputs import SolveInputs
 from isc_core.sirfs.solver import SolverOptions
 
 from .small_problems import Scene, blob, made_priors, weights
