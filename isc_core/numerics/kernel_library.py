@@ -112,7 +112,7 @@ def symbol(function: Callable[..., Any], version: int) -> str:
     Returns
     -------
     str
-        For example isc_sirfs_kernels_forward_rows_0.
+        For example isc_sirfs_kernels_height_rows_forward_rows_0.
     """
     module = function.__module__.rpartition("isc_core.")[2]
     return f"isc_{module.replace('.', '_')}_{function.__name__}_{version}"

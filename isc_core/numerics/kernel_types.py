@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 _TYPE = re.compile(r"(?P<code>[bif][1248])\b(?:\[(?P<axes>\d)(?P<strided>:?)\])?")
-_GROUP = re.compile(r"(?P<name>\w*)\((?P<fields>[^()]*)\)")
+_GROUP = re.compile(r"(?P<name>[\w.]*)\((?P<fields>[^()]*)\)")
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,8 @@ class Group:
     Attributes
     ----------
     name : str
-        Class of a named tuple, in the module of the kernel; else "".
+        Class of a named tuple, as the module of the kernel writes it, for example "arrays.Photo";
+        else "".
     fields : tuple of Scalar or Array
     """
 

@@ -56,9 +56,9 @@ def announce_compilation(engine: str, monitor: Monitor) -> None:
 
 def kernels_compiled() -> bool:
     """Return whether the kernels, in their current version, were compiled before. Needs Numba."""
-    from . import kernels
+    from .kernels.height_rows import forward_rows
 
-    kernel: Any = kernels.forward_rows
+    kernel: Any = forward_rows
     code = kernel.function.__code__
     source = Path(code.co_filename)
     python = f"py{sys.version_info[0]}{sys.version_info[1]}"
@@ -96,7 +96,7 @@ def load_kernels(illumination: str) -> None:
 
 def _folder() -> Path:
     """Folder of the compiled kernels."""
-    from . import kernels
+    from .kernels.height_rows import forward_rows
 
-    kernel: Any = kernels.forward_rows
+    kernel: Any = forward_rows
     return Path(str(kernel.compiled.stats.cache_path))

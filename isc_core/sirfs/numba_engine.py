@@ -14,8 +14,16 @@ from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..shading.irradiance_basis import C1, C2, C3, C4, C5
 from ..shading.surface_stencils import fold_border
-from . import kernels, reflectance, shading_kernels, surface
+from . import reflectance, surface
 from .illumination import light_cost
+from .kernels import (
+    arrays,
+    colour_histogram,
+    expected_normals,
+    expected_shading,
+    height_rows,
+    pixel_pairs,
+)
 from .precision import strength_of
 from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
@@ -47,11 +55,11 @@ def _from_zero(table: TabulatedPotential) -> tuple[float, np.ndarray]:
     return table.low + first * table.step, table.values[first:]
 
 
-def _pairs(low: float, step: float, costs: np.ndarray, dtype: np.dtype[Any]) -> kernels.Pairs:
+def _pairs(low: float, step: float, costs: np.ndarray, dtype: np.dtype[Any]) -> pixel_pairs.Pairs:
     """The pairs with a tabulated potential, in `dtype`."""
     # differences are taken before rounding: two large float32 costs would leave nothing of a small
     # slope
-    return kernels.Pairs(
+    return pixel_pairs.Pairs(
         np.array(PAIR_OFFSETS, np.int64),
         costs.astype(dtype),
         np.diff(costs).astype(dtype),
@@ -88,7 +96,7 @@ class _NormalsTerm:
         self._sums = np.zeros(len(valid))
 
     def rows(self, geometry: np.ndarray, gradient: np.ndarray, first: int, last: int) -> None:
-        kernels.normals_rows(
+        expected_normals.normals_rows(
             first, last, geometry, self._expected, self._strength, gradient, self._sums
         )
 
@@ -121,7 +129,7 @@ class _ShadingTerm:
         self._away, self._sums = np.zeros((len(valid), channels)), np.zeros(len(valid))
 
     def residuals(self, geometry: np.ndarray, light: np.ndarray, first: int, last: int) -> None:
-        shading_kernels.residual_rows(
+        expected_shading.residual_rows(
             first,
             last,
             geometry,
@@ -138,7 +146,7 @@ class _ShadingTerm:
         return found.astype(self._mean.dtype)
 
     def pulls(self, offsets: np.ndarray, palette: np.ndarray, first: int, last: int) -> None:
-        shading_kernels.pull_rows(
+        expected_shading.pull_rows(
             first,
             last,
             self._spans,
@@ -186,7 +194,7 @@ class NumbaEngine:
         height, channels = p.valid.shape[0], p.log_image.shape[2]
         weight = p.reflectance_weight
         self._pixels = float(weight.sum())
-        self._photo = kernels.Photo(
+        self._photo = arrays.Photo(
             np.ascontiguousarray(p.log_image.transpose(0, 2, 1), t),
             weight.astype(t, order="C"),
             p.valid.astype(t, order="C"),
@@ -197,7 +205,7 @@ class NumbaEngine:
             if p.shading_only
             else (p.priors.smoothness_whiten, p.priors.parsimony_whiten)
         )
-        self._whiten = kernels.Reflectance(*(np.ascontiguousarray(m, t) for m in whiten))
+        self._whiten = arrays.Reflectance(*(np.ascontiguousarray(m, t) for m in whiten))
         # the softened difference is positive: float32 finds its cell more exactly when the table
         # starts at 0
         low, costs = _from_zero(p.priors.curvature)
@@ -214,25 +222,25 @@ class NumbaEngine:
         channels, blocks = self.problem.log_image.shape[2], len(self._blocks)
         # float64: in float32 the rounding of heights would drown their curvature
         self._padded = np.empty((height + 2, width + 2))
-        self._surface = kernels.Surface(
+        self._surface = arrays.Surface(
             np.zeros((height, 9, width), t), np.zeros((height, width), t), np.empty(height)
         )
-        self._reflectance = kernels.Reflectance(*np.zeros((2, height, channels, width), t))
+        self._reflectance = arrays.Reflectance(*np.zeros((2, height, channels, width), t))
         g_smooth, g_palette = np.zeros((2, height, channels, width), t)
-        self._pulls = kernels.Pulls(g_smooth, g_palette, np.zeros((height, width), t))
-        self._smooth_sums = kernels.PairSums(
+        self._pulls = height_rows.Pulls(g_smooth, g_palette, np.zeros((height, width), t))
+        self._smooth_sums = pixel_pairs.PairSums(
             g_smooth, np.empty((blocks, 2, channels, width), t), np.zeros(blocks)
         )
-        self._curvature_sums = kernels.PairSums(
+        self._curvature_sums = pixel_pairs.PairSums(
             self._pulls.curvature, np.empty((blocks, 2, width), t), np.zeros(blocks)
         )
         self._in_plane = np.zeros((2, height, width), t)
-        self._backward_out = kernels.Backward(
+        self._backward_out = height_rows.Backward(
             np.empty((height, 9, channels)), np.zeros((5, height + 4, width + 4), t)
         )
         self._wide = np.empty((height + 2, width + 2), t)
         if channels == 3:
-            self._cells = kernels.Cells(
+            self._cells = colour_histogram.Cells(
                 np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
             )
         self._palette_terms: dict[str, float] = {}
@@ -282,7 +290,7 @@ class NumbaEngine:
         self._each_share(partial(self._backward, folded, offsets))
         self._workers.run(
             [
-                partial(kernels.adjoint_rows, a, b, self._backward_out.derivatives, self._wide)
+                partial(height_rows.adjoint_rows, a, b, self._backward_out.derivatives, self._wide)
                 for a, b in self._shares(len(self._wide))
             ]
         )
@@ -317,7 +325,7 @@ class NumbaEngine:
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
         """All that a row needs of its neighbours' heights alone."""
-        kernels.forward_rows(
+        height_rows.forward_rows(
             first,
             last,
             self._padded,
@@ -336,7 +344,7 @@ class NumbaEngine:
 
     def _pair_block(self, k: int) -> None:
         first, last = self._blocks[k]
-        kernels.curvature_block(
+        pixel_pairs.curvature_block(
             first,
             last,
             k,
@@ -347,7 +355,7 @@ class NumbaEngine:
         )
         if self.problem.shading_only:
             return
-        kernels.smoothness_block(
+        pixel_pairs.smoothness_block(
             first,
             last,
             k,
@@ -371,17 +379,17 @@ class NumbaEngine:
         w, table = p.weights, p.priors.absolute
         nodes = table.values.shape[0]
         step = (table.high - table.low) / (nodes - 1)
-        grid = kernels.Grid(table.low, table.high, step, 1 / step, nodes)
+        grid = colour_histogram.Grid(table.low, table.high, step, 1 / step, nodes)
         palette, photo, cells = self._reflectance.palette, self._photo, self._cells
         bounds = np.empty((3, 2), np.int64)
-        kernels.palette_range(palette, photo, grid, bounds)
+        colour_histogram.palette_range(palette, photo, grid, bounds)
         counts = np.zeros(tuple(bounds[:, 1] - bounds[:, 0]))
-        kernels.locate_color(palette, photo.spans, grid, bounds, cells)
-        kernels.splat_color(photo, cells, counts)
+        colour_histogram.locate_color(palette, photo.spans, grid, bounds, cells)
+        colour_histogram.splat_color(photo, cells, counts)
         pixels = self._pixels
         blurred = np.empty_like(counts)
         taps = reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3)
-        kernels.blur_color(counts, taps, blurred)
+        colour_histogram.blur_color(counts, taps, blurred)
         overlap = float((blurred * counts).sum())
         costs = table.values[tuple(slice(a, b) for a, b in bounds)]
         scale = w.absolute / (reflectance.ABSOLUTE_DIVISOR * pixels)
@@ -390,7 +398,7 @@ class NumbaEngine:
             "parsimony": -w.parsimony * float(np.log(overlap)),
             "absolute": scale * float((costs * counts).sum()),
         }
-        kernels.gather_color(
+        colour_histogram.gather_color(
             palette, photo, grid, cells, node_gradient.astype(self.dtype), self._pulls.palette
         )
 
@@ -453,7 +461,7 @@ class NumbaEngine:
         if self._shading is not None and offsets is not None:
             self._shading.pulls(offsets, pulls.palette, first, last)
             pulls = pulls._replace(palette=self._shading.joined)
-        kernels.backward_rows(
+        height_rows.backward_rows(
             first,
             last,
             self._surface,

@@ -16,6 +16,7 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import reduce
 from pathlib import Path
 from typing import Any
 
@@ -199,9 +200,10 @@ def _numba_type(declared: Scalar | Array | Group, names: dict[str, Any]) -> Any:
 
     if isinstance(declared, Group):
         fields = [_numba_type(one, names) for one in declared.fields]
-        return (
-            types.NamedTuple(fields, names[declared.name]) if declared.name else types.Tuple(fields)
-        )
+        if not declared.name:
+            return types.Tuple(fields)
+        first, *rest = declared.name.split(".")
+        return types.NamedTuple(fields, reduce(getattr, rest, names[first]))
     element = from_dtype(np.dtype(declared.code))
     if isinstance(declared, Scalar):
         return element

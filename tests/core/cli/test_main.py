@@ -727,7 +727,8 @@ def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
         "import os, numba; from isc_core.numerics.jit import ensure_cache_folder; "
         "ensure_cache_folder()\n"
         "from isc_core.numerics import kernel_library; kernel_library.FOLDER /= 'none'\n"
-        "from isc_core.sirfs import kernels; print(kernels.forward_rows.compiled.stats.cache_path)"
+        "from isc_core.sirfs.kernels.height_rows import forward_rows\n"
+        "print(forward_rows.compiled.stats.cache_path)"
     )
     environment = {
         **os.environ,

@@ -1,14 +1,14 @@
-"""The term of the expected shading as compiled row kernels, with the formula of `shading_term`.
+"""The term of the expected shading, with the formula of `shading_term`.
 
-Its gradient with respect to the log shading joins that of the palette terms, which `backward_rows`
-of `kernels` carries on to normals and light; hence it is brought to their whitened space. Rows are
-independent of each other, and their sums are added in the order of the rows.
+Its gradient with respect to the log shading joins that of the palette terms, which
+`height_rows.backward_rows` carries on to normals and light; hence it is brought to their whitened
+space. Rows are independent of each other, and their sums are added in the order of the rows.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
 
-from ..numerics.jit import REASSOCIATED, jit
+from ...numerics.jit import REASSOCIATED, jit
 
 
 @jit(types="i8 i8 r[3] i8[2] r[2] r[3] r[2] r[3] f8[2]", math=REASSOCIATED)
@@ -20,11 +20,11 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
     first, last : int
         Rows of this call.
     geometry : (H, 9, W) ndarray
-        See `kernels.Surface`.
+        See `arrays.Surface`.
     spans : (H, 2) int64 ndarray
-        See `kernels.Photo`.
+        See `arrays.Photo`.
     light : (9, C) ndarray
-        As in `kernels.forward_rows`.
+        As in `height_rows.forward_rows`.
     mean : (H, C, W) ndarray
         Expected log shading.
     strength : (H, W) ndarray
@@ -65,7 +65,7 @@ def pull_rows(first, last, spans, residual, offsets, strength, back, palette, jo
     first, last : int
         Rows of this call.
     spans : (H, 2) int64 ndarray
-        See `kernels.Photo`.
+        See `arrays.Photo`.
     residual : (H, C, W) ndarray
         From `residual_rows`; overwritten by the gradient with respect to the log shading.
     offsets : (C,) ndarray

@@ -1,0 +1,224 @@
+"""The terms of pairs of near pixels: smoothness of the reflectance, and of the curvature.
+
+Pairs reach two rows below a block of rows. These contributions go to buffers of the block and are
+added later, in a fixed order.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+# (the compiler infers the types of every call)
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...numerics.jit import REASSOCIATED, jit
+from . import arrays
+
+# Type, see `numerics.kernel_types`.
+_PAIRS = "Pairs(i8[2] r[1] r[1] f8 f8)"
+
+
+class Pairs(NamedTuple):
+    """The pairs of a smoothness term and its tabulated potential.
+
+    Attributes
+    ----------
+    offsets : (K, 2) int64 ndarray
+        Offset (down, right) of the second pixel of each pair, down >= 0.
+    costs, rises : (M,) and (M - 1,) ndarray
+        Cost at each node, and the difference to the next node.
+    low, inverse_step : float
+        Argument at the first node, and 1 / spacing of the nodes.
+    """
+
+    offsets: np.ndarray
+    costs: np.ndarray
+    rises: np.ndarray
+    low: float
+    inverse_step: float
+
+
+class PairSums(NamedTuple):
+    """What the blocks of a smoothness term write.
+
+    Attributes
+    ----------
+    gradient : (H, ..., W) ndarray
+        Gradient with respect to the differenced quantity, unscaled.
+    spill : (B, 2, ..., W) ndarray
+        What each block adds to the two rows below it.
+    cost : (B,) ndarray
+        Sum of each block, unscaled.
+    """
+
+    gradient: np.ndarray
+    spill: np.ndarray
+    cost: np.ndarray
+
+
+@jit(types=f"i8 i8 i8 r[3] {arrays.PHOTO} {_PAIRS} PairSums(r[3] r[4] f8[1])", math=REASSOCIATED)
+def smoothness_block(first, last, block, whitened, photo, pairs, out):
+    """Compute the smoothness term of the pairs whose upper pixel lies in rows [first, last).
+
+    Parameters
+    ----------
+    first, last, block : int
+        Rows of this block, and its index.
+    whitened : (H, C, W) ndarray
+        Whitened log reflectance.
+    photo : Photo
+    pairs : Pairs
+    out : PairSums
+        Output; `gradient` is overwritten in these rows, `spill` and `cost` at `block`.
+    """
+    weight, spans = photo.weight, photo.spans
+    offsets, table, rises = pairs.offsets, pairs.costs, pairs.rises
+    gradient, spill = out.gradient, out.spill[block]
+    t = whitened.dtype.type
+    half, soft, zero = t(0.5), t(1e-8), t(0)
+    inv, low_t = t(pairs.inverse_step), t(pairs.low)
+    height, channels, width = whitened.shape
+    last_cell = t(len(table) - 2)
+    d = np.empty((channels, width), whitened.dtype)
+    w = np.empty(width, whitened.dtype)
+    s = np.empty(width, whitened.dtype)
+    f = np.empty(width, whitened.dtype)
+    cells = np.empty(width, np.int32)
+    gradient[first:last] = zero
+    spill[:] = zero
+    cost = 0.0
+    for i in range(first, last):
+        for o in range(offsets.shape[0]):
+            right, q = offsets[o, 1], i + offsets[o, 0]
+            if q >= height:
+                continue
+            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            n = b - a
+            if n <= 0:
+                continue
+            va, vb = weight[i, a:b], weight[q, a + right : b + right]
+            for k in range(n):
+                w[k] = va[k] * vb[k]
+            for c in range(channels):
+                p_row, q_row, dc = whitened[i, c, a:b], whitened[q, c, a + right : b + right], d[c]
+                for k in range(n):
+                    dc[k] = p_row[k] - q_row[k]
+            part = zero
+            if channels == 1:
+                d0 = d[0]
+                for k in range(n):
+                    position = (d0[k] - low_t) * inv
+                    cell = np.int32(max(zero, min(position, last_cell)))
+                    base, rise = table[cell], rises[cell]
+                    part += w[k] * (base + (position - t(cell)) * rise)
+                    d0[k] = w[k] * rise
+            else:
+                d0, d1, d2 = d[0], d[1], d[2]
+                for k in range(n):
+                    s[k] = half * (d0[k] * d0[k] + d1[k] * d1[k] + d2[k] * d2[k])
+                for k in range(n):
+                    f[k] = np.sqrt(s[k] * s[k] + soft)
+                for k in range(n):
+                    s[k] = w[k] * s[k] / f[k]
+                for k in range(n):
+                    f[k] = (f[k] - low_t) * inv
+                for k in range(n):
+                    cells[k] = np.int32(min(f[k], last_cell))
+                for k in range(n):
+                    f[k] -= t(cells[k])
+                for k in range(n):  # the table look-up keeps this loop from being vectorised
+                    cell = cells[k]
+                    rise = rises[cell]
+                    part += w[k] * (table[cell] + f[k] * rise)
+                    s[k] *= rise
+                for k in range(n):
+                    d0[k] *= s[k]
+                for k in range(n):
+                    d1[k] *= s[k]
+                for k in range(n):
+                    d2[k] *= s[k]
+            cost += part
+            for c in range(channels):
+                dc, g = d[c], gradient[i, c, a:b]
+                for k in range(n):
+                    g[k] += dc[k]
+                if q < last:
+                    g = gradient[q, c, a + right : b + right]
+                else:
+                    g = spill[q - last, c, a + right : b + right]
+                for k in range(n):
+                    g[k] -= dc[k]
+    out.cost[block] = cost
+
+
+@jit(types=f"i8 i8 i8 r[3] {arrays.PHOTO} {_PAIRS} PairSums(r[2] r[3] f8[1])", math=REASSOCIATED)
+def curvature_block(first, last, block, geometry, photo, pairs, out):
+    """Compute the curvature term of the pairs whose upper pixel lies in rows [first, last).
+
+    Parameters
+    ----------
+    first, last, block : int
+        Rows of this block, and its index.
+    geometry : (H, 9, W) ndarray
+        See `arrays.Surface`.
+    photo : Photo
+    pairs : Pairs
+    out : PairSums
+        Output, as in `smoothness_block`, without an axis of channels.
+    """
+    valid, spans = photo.valid, photo.spans
+    offsets, table, rises = pairs.offsets, pairs.costs, pairs.rises
+    gradient, spill = out.gradient, out.spill[block]
+    t = geometry.dtype.type
+    soft, zero, inv, low_t = t(1e-8), t(0), t(pairs.inverse_step), t(pairs.low)
+    height, width = valid.shape
+    last_cell = t(len(table) - 2)
+    d = np.empty(width, geometry.dtype)
+    w = np.empty(width, geometry.dtype)
+    f = np.empty(width, geometry.dtype)
+    cells = np.empty(width, np.int32)
+    gradient[first:last] = zero
+    spill[:] = zero
+    cost = 0.0
+    for i in range(first, last):
+        for o in range(offsets.shape[0]):
+            right, q = offsets[o, 1], i + offsets[o, 0]
+            if q >= height:
+                continue
+            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            n = b - a
+            if n <= 0:
+                continue
+            va, vb = valid[i, a:b], valid[q, a + right : b + right]
+            for k in range(n):
+                w[k] = va[k] * vb[k]
+            p_row, q_row = geometry[i, 8, a:b], geometry[q, 8, a + right : b + right]
+            for k in range(n):
+                d[k] = p_row[k] - q_row[k]
+            part = zero
+            for k in range(n):
+                f[k] = np.sqrt(d[k] * d[k] + soft)
+            for k in range(n):
+                d[k] = w[k] * d[k] / f[k]
+            for k in range(n):
+                f[k] = (f[k] - low_t) * inv
+            for k in range(n):
+                cells[k] = np.int32(min(f[k], last_cell))
+            for k in range(n):
+                f[k] -= t(cells[k])
+            for k in range(n):
+                cell = cells[k]
+                rise = rises[cell]
+                part += w[k] * (table[cell] + f[k] * rise)
+                d[k] *= rise
+            cost += part
+            g = gradient[i, a:b]
+            for k in range(n):
+                g[k] += d[k]
+            if q < last:
+                g = gradient[q, a + right : b + right]
+            else:
+                g = spill[q - last, a + right : b + right]
+            for k in range(n):
+                g[k] -= d[k]
+    out.cost[block] = cost
