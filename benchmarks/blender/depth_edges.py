@@ -28,7 +28,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from isc_core.result_files.mesh import limit_rim
+from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.rim import Rim
 from isc_core.result_files.solids.solid_mesh import SolidMesh, make_solid_mesh

@@ -25,8 +25,10 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from isc_core.result_files.mesh import MeshResult, build_mesh, limit_rim
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
+from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.result_folder import load
 from isc_core.result_files.triangulation.adaptive_triangles import (
     Patch,

@@ -63,9 +63,10 @@ from ..errors import InputError
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from .mesh import MeshResult, build_mesh
-from .mesh_options import MeshOptions
-from .object_cover import ObjectCover
+from .mesh.build import build_mesh
+from .mesh.object_cover import ObjectCover
+from .mesh.options import MeshOptions
+from .mesh.result import MeshResult
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}

@@ -29,8 +29,8 @@ from ..shading.brdf.ggx import F0
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions, toward, turn
 from ..shading.lobe_rendering import Lobe
 from ..shading.radiance import DistantLights, radiance, sh_shading
-from .mesh import limit_rim
-from .mesh_options import MeshOptions
+from .mesh.options import MeshOptions
+from .mesh.rim_heights import limit_rim
 from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 from .solids.back import Back
 from .solids.rim import Rim

@@ -39,9 +39,9 @@ from .arrays_file import ARRAYS, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
-from .mesh import MeshResult
-from .mesh_options import MeshOptions
-from .object_cover import object_cover
+from .mesh.object_cover import object_cover
+from .mesh.options import MeshOptions
+from .mesh.result import MeshResult
 
 SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
 LAYERS = {

@@ -79,7 +79,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     from isc_core.refinement import GlossOptions, refine_gloss
     from isc_core.refinement.gloss_note import gloss_line
-    from isc_core.result_files.object_cover import read_cover
+    from isc_core.result_files.mesh.object_cover import read_cover
     from isc_core.result_files.result_folder import MASK, load, require_writable_result, save
 
     if options.light:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.result_files.arrays_file import write_arrays
-from isc_core.result_files.mesh import build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.scene.decomposition import Decomposition, Provenance
 from isc_core.scene.diagnostics import Diagnostics
 from isc_core.shading.spherical_harmonics import real_sh

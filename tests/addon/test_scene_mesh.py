@@ -10,7 +10,7 @@ import pytest
 from scipy import ndimage
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.options import MeshOptions
 from tests.addon.scene_fixture import write_result
 
 

@@ -11,7 +11,7 @@ import pytest
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.result_files.arrays_file import write_arrays
-from isc_core.result_files.object_cover import object_cover
+from isc_core.result_files.mesh.object_cover import object_cover
 from tests.addon.scene_fixture import bump, write_result
 
 CENTRE, RADIUS = (27.0, 38.0), 0.4 * 64 * 0.9**0.5  # of the bump

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from isc_core.result_files.mesh import build_mesh
+from isc_core.result_files.mesh.build import build_mesh
 from synth.shapes.mesh_file import read_mesh_file
 from tests.fuzz.case import Case, Target, words
 from tests.fuzz.pictures import ball, saved

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from isc_core.decomposition.pipeline import MODELS, Settings, decompose
 from isc_core.photo import Photo, check_mask
 from isc_core.progress import Monitor, ProgressEvent
-from isc_core.result_files.mesh import build_mesh
+from isc_core.result_files.mesh.build import build_mesh
 from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import METHODS
 from tests.core.small_solves import small_solves

@@ -8,8 +8,8 @@ from pathlib import Path
 from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
 from ...result_files.arrays_file import ARRAYS, mesh_of, write_arrays
-from ...result_files.mesh_options import MeshOptions
-from ...result_files.object_cover import object_cover, read_cover
+from ...result_files.mesh.object_cover import object_cover, read_cover
+from ...result_files.mesh.options import MeshOptions
 from ...result_files.result_folder import MASK, load
 from ..interface.options import add_triangles
 from ..interface.parser import describe, hints

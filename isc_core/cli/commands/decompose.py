@@ -15,7 +15,7 @@ from ...masking.finder import MaskSearch, read_each
 from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
-from ...result_files.mesh_options import MeshOptions
+from ...result_files.mesh.options import MeshOptions
 from ...result_files.object_folders import object_folders
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save

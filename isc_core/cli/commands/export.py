@@ -17,8 +17,8 @@ from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_m
 from ...result_files.exports.targets import TARGETS
 from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
-from ...result_files.mesh_options import MeshOptions
-from ...result_files.object_cover import object_cover, read_cover
+from ...result_files.mesh.object_cover import object_cover, read_cover
+from ...result_files.mesh.options import MeshOptions
 from ...result_files.result_folder import MASK, load
 from ...result_files.solids.back import Back
 from ...scene.decomposition import Decomposition

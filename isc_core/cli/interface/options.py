@@ -12,7 +12,7 @@ from ...decomposition.settings import (
 )
 from ...io.limits import USUAL, Limits
 from ...photo import TRANSFERS
-from ...result_files.mesh_options import MeshOptions
+from ...result_files.mesh.options import MeshOptions
 from ...separation import SUMMARIES
 from .parser import table
 from .values import count, current_name, not_negative, pixel, whole

@@ -31,8 +31,9 @@ from ...imaging.bounding_box import mask_slices
 from ...imaging.upsampling import enlarged
 from ...photo import Photo
 from ...scene.decomposition import Decomposition
-from ..mesh import base_color, color_codes, dark_rings, nearest_inside
-from ..mesh_options import MeshOptions
+from ..mesh.base_color import base_color, dark_rings, nearest_inside
+from ..mesh.options import MeshOptions
+from ..mesh.texture_codes import color_codes
 
 _MOST = 4.0  # the largest ratio of fine to coarse diffuse light, and the inverse of the smallest
 _ALL_DETAIL, _NO_DETAIL = 0.4, 0.8  # specular share up to which, from which

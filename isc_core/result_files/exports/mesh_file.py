@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ...errors import InputError
 from ...io.atomic import new_file, require_writable_file
-from ..mesh import MeshResult
+from ..mesh.result import MeshResult
 from .obj import encode_obj
 from .usd import encode_usd
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import MeshResult
+from ..mesh.result import MeshResult
 from .textures import PLASTIC, MeshTextures, plain_stem
 
 _ROWS = 1 << 14  # formatted at once

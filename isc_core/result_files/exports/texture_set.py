@@ -51,7 +51,9 @@ from ...lobe_fitting.specular_level import SpecularSource
 from ...progress import Monitor
 from ...scene.decomposition import Decomposition
 from ...shading.ambient_occlusion import ambient_occlusion
-from ..mesh import MeshResult, nearest_inside, vector_codes
+from ..mesh.base_color import nearest_inside
+from ..mesh.result import MeshResult
+from ..mesh.texture_codes import vector_codes
 from .targets import TARGETS
 from .textures import PLASTIC, share_codes
 

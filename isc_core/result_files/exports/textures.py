@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..mesh import MeshResult, encoded_png
+from ..mesh.result import MeshResult
+from ..mesh.texture_codes import encoded_png
 
 PLASTIC = 0.5  # a specular texture's value for f0 = .04, as in Blender and Unreal
 

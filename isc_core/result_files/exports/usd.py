@@ -21,7 +21,7 @@ from typing import Any
 from ...errors import InputError
 from ...extras import install_command
 from ...shading.brdf.ggx import F0
-from ..mesh import MeshResult
+from ..mesh.result import MeshResult
 from .textures import PLASTIC, MeshTextures, plain_stem
 
 _MOST = 0.96  # of f0: an index of refraction is finite

@@ -13,9 +13,9 @@ from PIL import Image
 from isc_core.cli.main import main
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.photo.camera import Camera
-from isc_core.result_files.mesh import build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
-from isc_core.result_files.object_cover import read_cover
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.object_cover import read_cover
+from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.result_folder import load, save
 from isc_core.result_files.solids.back import Back
 from isc_core.scene.decomposition import COLOR_MAPS

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from isc_core.result_files.mesh import build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.triangulation.adaptive_triangles import (
     Triangulation,
     adaptive_triangles,

@@ -17,8 +17,10 @@ from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.lobe_fitting.specular_level import fitted_specular
 from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of
-from isc_core.result_files.mesh import MeshResult, build_mesh, color_codes
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
+from isc_core.result_files.mesh.texture_codes import color_codes
 from isc_core.result_files.result_folder import load, require_room, save
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
 from isc_core.shading.brdf.ggx import Ggx

@@ -10,7 +10,7 @@ import pytest
 import trimesh
 from PIL import Image
 
-from isc_core.result_files.glb import TexturedMesh, encode_glb
+from isc_core.result_files.mesh.glb import TexturedMesh, encode_glb
 
 MESH = TexturedMesh(
     np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5]]),

@@ -19,16 +19,12 @@ from isc_core.errors import InputError
 from isc_core.imaging.row_blocks import row_blocks
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
-from isc_core.result_files import mesh as mesh_module
-from isc_core.result_files.mesh import (
-    MeshResult,
-    base_color,
-    build_mesh,
-    dark_rings,
-    limit_rim,
-    nearest_inside,
-)
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh import base_color as base_color_module
+from isc_core.result_files.mesh.base_color import base_color, dark_rings, nearest_inside
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
+from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import LIGHT, ball
@@ -519,10 +515,10 @@ def test_the_nearest_pixels_inside_are_those_of_the_whole_map(
     mask = ndimage.gaussian_filter(rng.normal(size=(90, 70)), 6) > 0.02
     away, places = ndimage.distance_transform_edt(~mask, return_indices=True)
     for pixels in (70, 1 << 18):  # one row at a time, and all of them
-        monkeypatch.setattr(mesh_module, "row_blocks", partial(row_blocks, pixels=pixels))
+        monkeypatch.setattr(base_color_module, "row_blocks", partial(row_blocks, pixels=pixels))
         near, source = nearest_inside(mask, 5)
         assert np.array_equal(near, np.flatnonzero(~mask & (away <= 5)))
         assert np.array_equal(source, (places[0] * 70 + places[1]).ravel()[near])
-        depth, exact = mesh_module._depth_near(mask, 4), ndimage.distance_transform_edt(mask)
+        depth, exact = base_color_module._depth_near(mask, 4), ndimage.distance_transform_edt(mask)
         assert np.array_equal(depth[exact <= 4], exact[exact <= 4].astype(np.float32))
         assert (depth[exact > 4] > 4).all()

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.photo.grabcut import encoded_mask
-from isc_core.result_files.object_cover import object_cover, read_cover
+from isc_core.result_files.mesh.object_cover import object_cover, read_cover
 from isc_core.scene.decomposition import Decomposition
 from tests.core.ball_scene import ball
 

@@ -10,8 +10,8 @@ import pytest
 from isc_core.errors import InputError
 from isc_core.photo.camera import Camera
 from isc_core.result_files.arrays_file import arrays_of, mesh_of
-from isc_core.result_files.mesh import MeshResult
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
 from isc_core.result_files.result_folder import load, save
 from isc_core.shading.perspective import lifted_points, object_axis, view_directions
 from tests.core.perspective_scene import CAMERA, bump_before_camera

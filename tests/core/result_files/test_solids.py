@@ -6,7 +6,7 @@ import trimesh
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.result_files.mesh import limit_rim
+from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.outline import outlined, smooth_cover
 from isc_core.result_files.solids.rim import Rim

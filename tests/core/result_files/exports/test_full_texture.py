@@ -14,8 +14,8 @@ from isc_core.imaging.upsampling import enlarged
 from isc_core.photo import Photo
 from isc_core.photo.photo import PhotoSource
 from isc_core.result_files.exports.full_texture import full_texture
-from isc_core.result_files.mesh import base_color
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.base_color import base_color
+from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
 from tests.core.ball_scene import ball
 

@@ -14,8 +14,9 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
 from isc_core.result_files.exports.mesh_file import write_mesh_file
-from isc_core.result_files.mesh import MeshResult, build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
 from tests.core.ball_scene import ball
 
 FITTED = SpecularSource.FITTED

@@ -15,8 +15,9 @@ from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
 from isc_core.result_files.exports import texture_set
 from isc_core.result_files.exports.targets import TARGETS
 from isc_core.result_files.exports.texture_set import texture_files, write_texture_set
-from isc_core.result_files.mesh import MeshResult, build_mesh
-from isc_core.result_files.mesh_options import MeshOptions
+from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.result import MeshResult
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 from tests.core.ball_scene import ball

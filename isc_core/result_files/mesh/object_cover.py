@@ -21,11 +21,11 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from ..imaging.area_resize import AreaFilter
-from ..imaging.upsampling import enlarged
-from ..io.decoders import read_raster
-from ..photo.soft_rim import soft_rim
-from ..scene.decomposition import Decomposition
+from ...imaging.area_resize import AreaFilter
+from ...imaging.upsampling import enlarged
+from ...io.decoders import read_raster
+from ...photo.soft_rim import soft_rim
+from ...scene.decomposition import Decomposition
 
 _NEAR = 2  # pixels
 _SOME = 0.02  # of a pixel: less is none

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from .solids.back import Back
+from ..solids.back import Back
 
 
 @dataclass(frozen=True)

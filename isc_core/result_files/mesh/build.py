@@ -1,0 +1,283 @@
+"""A mesh of the visible side of the object, or of a solid, from the maps of a result.
+
+Problem: a height map over a mask, with its normals and reflectance, is to become an object in any
+viewer, under the recovered light, that looks like the photo.
+
+Geometry: vertices at pixel centres, one cell of two triangles where all pixels of the cell lie
+inside the mask. If that exceeds the number of triangles asked for, large triangles replace small
+ones where the surface is smooth (see `triangulation`); the silhouette keeps its pixels. Where the
+silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World axes
+are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the middle of the
+bounding box. Before a camera, vertices are on the rays of their pixels (see
+`shading.perspective`), and a pixel has its size at their mean distance.
+
+Normals: those of vertices are the recovered ones; in a mesh of fewer triangles, their mean over the
+triangles of a vertex, weighted by its barycentric coordinate. The tangent-space normal map (green
+up) holds the recovered normal of each pixel relative to the interpolated one. It is flat for a mesh
+with a vertex at each pixel. The tangent is the direction in which the texture's column grows.
+
+Back: an open mesh is one sheet with steps of one cell along the silhouette; `solids` closes it,
+with a smooth outline. Where the object's cover of the pixels is known, the outline of all meshes
+follows that, and where the rim is soft, the material has an opacity (see `object_cover`).
+
+Limits: programs that compute tangents by themselves interpolate them along the triangles: their
+normals differ by the square of what the surface turns within one.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...errors import InputError
+from ...imaging.bounding_box import mask_slices
+from ...imaging.row_blocks import row_blocks
+from ...lobe_fitting.specular_level import SpecularFit
+from ...photo.camera import Camera
+from ...shading.lights import VIEW
+from ...shading.perspective import lifted_points, object_axis, view_directions
+from ..solids.back import Back
+from ..solids.rim import Rim
+from ..solids.surface import heights_seen, make_solid, placed
+from ..triangulation.adaptive_triangles import Triangulation, adaptive_triangles
+from ..triangulation.renumbering import renumbered
+from ..triangulation.vertex_normals import (
+    detail_normals,
+    directions_at,
+    facing,
+    flat_normals,
+    mean_normals,
+)
+from .base_color import base_color
+from .glb import TexturedMesh
+from .object_cover import ObjectCover
+from .options import MeshOptions
+from .result import MeshResult
+from .rim_heights import limit_rim
+
+
+def build_mesh(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    reflectance: np.ndarray,
+    options: MeshOptions | None = None,
+    gloss: SpecularFit | None = None,
+    camera: Camera | None = None,
+    cover: ObjectCover | None = None,
+) -> MeshResult:
+    """Build the mesh of the pixels inside the mask.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels, toward the viewer.
+    normal : (H, W, 3) ndarray
+        Unit vectors, camera frame.
+    mask : (H, W) bool ndarray
+    reflectance : (H, W, 3) ndarray
+        Linear, not negative.
+    options : MeshOptions, optional
+    gloss : optional
+        Gloss of the surface; where unknown, the default roughness and no gloss.
+    camera : Camera, optional
+        Of the maps; orthographic by default.
+    cover : ObjectCover, optional
+        An outline to follow; by default the mesh ends in the steps of the mask's pixels, or, with
+        a back, halfway between them.
+
+    Returns
+    -------
+    MeshResult
+
+    Raises
+    ------
+    InputError
+        If the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
+    """
+    options, gloss = options or MeshOptions(), gloss or SpecularFit()
+    _check_inputs(height, normal, mask, reflectance, options)
+    limited = limit_rim(height, mask, options.rim)
+    if options.back is Back.OPEN and cover is None:
+        shape = _open_sheet(limited, normal, mask, options, camera)
+    else:
+        rim = Rim(mask) if cover is None else Rim(cover.share, cover.soft)
+        shape = _outlined(limited, normal, mask, rim, options, camera)
+    pixels = shape.places
+    middle = (pixels.min(0) + pixels.max(0)) / 2
+    size = options.metres_per_pixel or options.longest_side / max(mask[mask_slices(mask)].shape)
+    color, k = base_color(reflectance, mask, options.bleed)
+    mesh = TexturedMesh(
+        (pixels - middle) * size,
+        shape.faces,
+        shape.normals.astype(np.float64),
+        shape.uv,
+        shape.tangents,
+    )
+    origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
+    if camera is not None:
+        origin = _seen_origin(middle, camera)
+    return MeshResult(
+        mesh,
+        k,
+        float(size),
+        origin,
+        shape.stride,
+        shape.vertex_pixel,
+        color,
+        shape.detail,
+        options,
+        gloss,
+        camera,
+        None if camera is None else -middle * size,
+        cover=cover,
+    )
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A mesh in pixels.
+
+    `places` and `normals` (V, 3), camera frame, the pinhole at the origin, if any; `faces` (F, 3);
+    `uv` (V, 2); `tangents` (V, 3) or None; `vertex_pixel` (V, 2); `detail` (H, W, 3).
+    """
+
+    places: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray
+    tangents: np.ndarray | None
+    vertex_pixel: np.ndarray
+    detail: np.ndarray
+    stride: int = 1
+
+
+def _open_sheet(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    options: MeshOptions,
+    camera: Camera | None,
+) -> _Shape:
+    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
+    stride, grid, fewer = _triangulated(height, normal, mask, view, options.triangles)
+    vertex_pixel = grid.vertices * stride
+    row, column = vertex_pixel.T
+    if fewer:
+        smooth = mean_normals(grid, stride, normal, view)
+        detail, tangents = detail_normals(grid, stride, normal, smooth, view)
+    else:
+        smooth = facing(normal[row, column].astype(np.float32), directions_at(view, row, column))
+        detail, tangents = flat_normals(mask.shape), None
+    if camera is None:
+        places = np.stack([column, -row, height[row, column]], -1).astype(np.float64)
+    else:
+        points = lifted_points(height, camera, object_axis(camera, mask))[row, column]
+        places = points * (camera.focal_length / -points[:, 2].mean())
+    uv = np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1)
+    return _Shape(places, smooth, grid.faces, uv, tangents, vertex_pixel, detail, stride)
+
+
+def _outlined(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    rim: Rim,
+    options: MeshOptions,
+    camera: Camera | None,
+) -> _Shape:
+    """Without tangents: they would change their sign where the texture folds (see `solids`)."""
+    view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
+    seen, sides = heights_seen(height, mask, camera), 1 if options.back is Back.OPEN else 2
+    solid = make_solid(seen, normal, mask, rim, view, options.back, options.triangles // sides)
+    places = placed(solid.mesh, camera)
+    mesh, normals = solid.mesh, solid.normals(places)
+    return _Shape(places, normals, mesh.faces, solid.uv(), None, mesh.pixels, solid.detail)
+
+
+def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:
+    """Column and row at which a place before the camera is seen, and its height before the focal
+    plane; in pixels.
+    """
+    (x, y), focal = camera.principal_point, camera.focal_length
+    right, up = middle[:2] * (focal / -middle[2])
+    return float(x - 0.5 + right), float(y - 0.5 - up), float(focal + middle[2])
+
+
+def _check_inputs(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    reflectance: np.ndarray,
+    options: MeshOptions,
+) -> None:
+    for name, values in (("height", height), ("normal", normal), ("reflectance", reflectance)):
+        if values.shape[:2] != mask.shape:
+            raise InputError(
+                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: use maps of one size"
+            )
+        if not np.isfinite(values[mask]).all():
+            raise InputError(
+                f"the {name} map has NaN or infinite values inside the mask: repair it or "
+                "exclude them from the mask"
+            )
+    if not (
+        options.longest_side > 0
+        and (options.metres_per_pixel is None or options.metres_per_pixel > 0)
+    ):
+        raise InputError("the mesh's longest side and metres per pixel must be positive")
+    if options.triangles < 0:
+        raise InputError("the mesh's number of triangles cannot be negative: 0 keeps every pixel")
+
+
+def _triangulated(
+    height: np.ndarray, normal: np.ndarray, mask: np.ndarray, view: np.ndarray, budget: int
+) -> tuple[int, Triangulation, bool]:
+    """The stride of the grid, its triangles, and whether they are fewer than two a cell.
+
+    They are at most `budget` (0: as many as there are), unless the object is too thin for the cells
+    of a larger stride.
+    """
+    cells = _cells_inside(mask, 1)
+    if not cells.any():
+        raise InputError(
+            "the mask has no block of 2 x 2 pixels to build a mesh from: mark a larger region or "
+            "use a larger photo"
+        )
+    if not budget or 2 * np.count_nonzero(cells) <= budget:
+        return 1, _full_grid(cells), False
+    cosine, stride = np.empty(mask.shape, np.float32), 1
+    for block in row_blocks(mask.shape):
+        toward = view if view.ndim == 1 else view[block.rows]
+        cosine[block.rows] = (normal[block.rows] * toward).sum(axis=-1)
+    while True:
+        thin = height if stride == 1 else height[::stride, ::stride] / stride
+        thinned = thin, cells, cosine[::stride, ::stride]
+        if (found := adaptive_triangles(*thinned, budget)) is not None:
+            return stride, found, True
+        coarser = _cells_inside(mask, 2 * stride)
+        if not coarser.any():
+            found = adaptive_triangles(*thinned, 0)
+            assert found is not None
+            return stride, found, True
+        stride, cells = 2 * stride, coarser
+
+
+def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
+    size = stride + 1
+    inside = ndimage.minimum_filter(
+        mask.astype(np.uint8), size, mode="constant", origin=-(size // 2)
+    ).astype(bool)
+    return inside[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
+
+
+def _full_grid(cells: np.ndarray) -> Triangulation:
+    """Two triangles for each cell, split from its top left to its bottom right."""
+    width = cells.shape[1] + 1
+    row, column = np.nonzero(cells)
+    top_left = row * width + column
+    top_right, bottom_left, bottom_right = top_left + 1, top_left + width, top_left + width + 1
+    lower = np.stack([top_left, bottom_left, bottom_right], -1)
+    upper = np.stack([top_left, bottom_right, top_right], -1)
+    used, faces = renumbered(np.stack([lower, upper], 1))
+    return Triangulation(np.stack(np.divmod(used, width), -1), faces.reshape(-1, 3))
