@@ -179,6 +179,7 @@ def _make_result(
         highlight_odds=options.highlight_odds,
         each=_each(source, options),
         refine=options.refine,
+        light_colour=options.light_colour,
     )
     try:
         _wait(start_decompose(job, environment), monitor)
@@ -249,6 +250,7 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         options.texture_size,
         options.highlight_odds,
         refine=options.refine,
+        light_colour=options.light_colour,
     )
     build = BuildOptions(
         size_metres=options.size,

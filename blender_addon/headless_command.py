@@ -166,6 +166,12 @@ def _add_method(group: argparse._ArgumentGroup) -> None:
         help="kind of photo, as in isc decompose (default: %(default)s)",
     )
     add(
+        "--light-colour",
+        default="balanced",
+        metavar="NAME|r,g,b",
+        help="colour of the light, as in isc decompose (default: %(default)s)",
+    )
+    add(
         "--camera",
         default="auto",
         metavar="NAME|MM",

@@ -11,7 +11,7 @@ _PHOTO = "isc.photo_as_object"
 
 
 class ISC_MT_object(bpy.types.Menu):
-    """Operators on objects that ISC made."""
+    """What is in the panels, for the search."""
 
     bl_idname = "ISC_MT_object"
     bl_label = "ISC"
@@ -32,13 +32,24 @@ class ISC_MT_object(bpy.types.Menu):
         for name, text in (
             ("isc.redo", "ISC: Update Object"),
             ("isc.recolour", "ISC: Recolor"),
+            ("isc.dichromatic", "ISC: Diffuse and Specular Gain"),
+            ("isc.photo_highlights", "ISC: Show Photo Highlights"),
             ("isc.relight", "ISC: Relight"),
             ("isc.own_material", "ISC: Make Material Single-User"),
         ):
             layout.operator(name, text=text)
         layout.separator()
+        for name, text in (
+            ("isc.auto_mask", "ISC: Auto Mask"),
+            ("isc.mark_point", "ISC: Add Point to Mask"),
+            ("isc.draw_box", "ISC: Select Box"),
+            ("isc.decompose", "ISC: Create Object"),
+        ):
+            layout.operator(name, text=text)
+        layout.separator()
         layout.operator("isc.save_asset", text="ISC: Save as Asset...")
-        layout.operator("isc.export", text="ISC: Export...")
+        layout.operator("isc.export", text="ISC: Export Object...")
+        layout.operator("isc.export_textures", text="ISC: Export Texture Set...")
         layout.operator("isc.import_result", text="ISC: Import Result...")
 
 

@@ -20,6 +20,7 @@ from .scene.copies import objects_sharing_material
 from .scene.material import shows_highlights
 from .scene.material_edits import dichromatic_node
 from .scene.photo_highlights import can_show_highlights
+from .settings.usage import why_unused
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")
@@ -108,24 +109,15 @@ class _Highlights(_Panel):
     def draw(self, context: Any) -> None:
         """Draw which highlights are removed, and the buttons that mark highlights and print."""
         settings = context.scene.isc
-        if settings.model != "joint":
-            self.layout.label(text="Requires the Joint model", icon="INFO")
-        layout = self.layout.column()
-        layout.enabled = settings.model == "joint"
-        choice = layout.column()
-        choice.use_property_split = True
-        choice.prop(settings, "highlight_odds")
-        row = layout.row(align=True)
+        draw_settings(self.property_column(), settings, "highlight_odds")
+        row = self.layout.row(align=True)
+        row.enabled = not why_unused(settings, "highlights")
         row.operator("isc.mark_highlight", icon="ADD").reject = False
         row.operator("isc.mark_highlight", text="Mark as Print", icon="REMOVE").reject = True
-        column = layout.column()
-        column.use_property_split = True
-        column.prop(settings, "highlights")
-        column.prop(settings, "not_highlights")
+        draw_settings(self.property_column(), settings, "highlights", "not_highlights")
         if settings.highlights or settings.not_highlights:
-            layout.operator("isc.clear_highlights", icon="X")
-        column = self.property_column()
-        column.prop(settings, "refine")
+            self.layout.operator("isc.clear_highlights", icon="X")
+        draw_settings(self.property_column(), settings, "refine")
 
 
 class _Method(_Panel):
@@ -135,12 +127,13 @@ class _Method(_Panel):
     def draw(self, context: Any) -> None:
         """Draw the settings of how the object is recovered."""
         settings, column = context.scene.isc, self.property_column()
-        for name in ("model", "separator", "illumination", "camera"):
-            column.prop(settings, name)
+        draw_settings(column, settings, "model", "separator", "illumination", "light_color")
+        if settings.light_color == "custom" and not why_unused(settings, "light_color"):
+            column.prop(settings, "custom_light_color")
+        column.prop(settings, "camera")
         if settings.camera == "focal_length":
             column.prop(settings, "focal_length")
-        for name in ("max_size", "samples"):
-            column.prop(settings, name)
+        draw_settings(column, settings, "max_size", "samples")
 
 
 class _Output(_Panel):
@@ -150,10 +143,9 @@ class _Output(_Panel):
     def draw(self, context: Any) -> None:
         """Draw what is created, and what of the scene may change."""
         settings, column = context.scene.isc, self.property_column()
-        for name in ("size_metres", "texture_size", "specular_from"):
-            column.prop(settings, name)
-        for name in ("back", "triangles", "shadows", "sun", "displacement", "all_maps"):
-            column.prop(settings, name)
+        draw_settings(column, settings, "size_metres", "texture_size", "specular_from")
+        draw_settings(column, settings, "displacement", "back", "triangles")
+        draw_settings(column, settings, "shadows", "sun", "all_maps")
         column.separator()
         column.prop(settings, "own_scene")
         if not settings.own_scene:
@@ -226,8 +218,9 @@ class _Edit(_Panel):
         for name in ("Roughness", "Gloss Gain"):
             if name in node.inputs:
                 gloss.prop(node.inputs[name], "default_value", text=name)
-        gain = node.inputs["Specular Gain"].default_value
-        column.operator("isc.dichromatic", text=f"Specular Gain {gain:.2f}")
+        gain = column.column()
+        gain.enabled = shown or gloss.enabled
+        gain.prop(node.inputs["Specular Gain"], "default_value", text="Specular Gain")
         if shown:
             column.label(text="Showing the photo's highlights", icon="INFO")
         elif not gloss.enabled:
@@ -235,6 +228,30 @@ class _Edit(_Panel):
         if can_show_highlights(built.material):
             text = f"{'Hide' if shown else 'Show'} Photo Highlights"
             column.operator("isc.photo_highlights", text=text).show = not shown
+
+
+def draw_settings(column: Any, settings: Any, *names: str) -> None:
+    """Draw settings; those without an effect are greyed out, with the reason below.
+
+    Parameters
+    ----------
+    column : bpy.types.UILayout
+        Where to draw.
+    settings : ISC_PG_settings
+        The settings of the scene.
+    *names : str
+        Names of the settings. Those that are unused for one reason stand together.
+    """
+    reason = ""
+    for name in names:
+        previous, reason = reason, why_unused(settings, name)
+        if previous and previous != reason:
+            column.label(text=previous, icon="INFO")
+        row = column.row()
+        row.enabled = not reason
+        row.prop(settings, name)
+    if reason:
+        column.label(text=reason, icon="INFO")
 
 
 def draw_progress(layout: Any, context: Any) -> None:

@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..scene.asset import save_asset
-from ..scene.build import find_built
+from ..scene.build import find_built, why_not_built
 
 
 class ISC_OT_save_asset(bpy.types.Operator):
@@ -51,10 +51,10 @@ class ISC_OT_save_asset(bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        if find_built(context.object) is None:
-            cls.poll_message_set("Select an object created by ISC that is not linked")
-            return False
-        return True
+        reason = why_not_built(context.object)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the library.

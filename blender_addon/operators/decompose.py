@@ -13,7 +13,7 @@ from isc_core.result_files.object_folders import object_folders
 
 from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS
-from ..scene.build import find_built
+from ..scene.build import find_built, why_not_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
@@ -329,8 +329,9 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        if find_built(context.object) is None:
-            cls.poll_message_set("Select an object created by ISC")
+        reason = why_not_built(context.object)
+        if reason:
+            cls.poll_message_set(reason)
             return False
         return _is_idle(cls)
 

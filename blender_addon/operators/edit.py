@@ -15,7 +15,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from isc_core.errors import InputError
 
 from ..datablocks.provenance import KEY
-from ..scene.build import BuiltObject, find_built
+from ..scene.build import BuiltObject, find_built, why_not_built
 from ..scene.copies import find_material, make_material_single_user
 from ..scene.material import set_specular_gain
 from ..scene.material_edits import dichromatic_node
@@ -58,10 +58,10 @@ class EditOperator:
         bool
             Where False, the tooltip gives the reason.
         """
-        if find_built(context.object) is None:
-            cls.poll_message_set("Select an object created by ISC")  # type: ignore[attr-defined]
-            return False
-        return True
+        reason = why_not_built(context.object)
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+        return not reason
 
     def execute(self, context: Any) -> set[str]:
         """Apply the edit.

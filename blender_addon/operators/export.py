@@ -21,7 +21,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
 from ..datablocks.provenance import KEY, ROLE
-from ..scene.build import BuiltObject, find_built
+from ..scene.build import BuiltObject, find_built, why_not_built
 from ..scene.copies import is_copy
 from ..scene.material_edits import specular_level, surface_node
 from .export_material import export_material, temporarily_assigned
@@ -119,10 +119,10 @@ class _FolderOperator:
         bool
             Where False, the tooltip gives the reason.
         """
-        if find_built(context.object) is None:
-            cls.poll_message_set("Select an object created by ISC")  # type: ignore[attr-defined]
-            return False
-        return True
+        reason = why_not_built(context.object)
+        if reason:
+            cls.poll_message_set(reason)  # type: ignore[attr-defined]
+        return not reason
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser.

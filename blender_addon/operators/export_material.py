@@ -93,6 +93,8 @@ def temporarily_assigned(
     replaced = [(slot, slot.material) for slot in slots if slot.material == material] or [
         (slots[0], slots[0].material)
     ]
+    # A library override has slots that cannot be set, but need not be, either.
+    replaced = [(slot, before) for slot, before in replaced if before != replacement]
     try:
         for slot, _ in replaced:
             slot.material = replacement

@@ -1,7 +1,7 @@
 """The sentences that the window shows.
 
-The worker's messages name files and command-line options; the window names images and fields of the
-panels.
+The worker's messages name files and command-line options in British spelling; the window names
+images and fields of the panels, in Blender's own.
 """
 
 import re
@@ -13,6 +13,8 @@ import bpy
 REPORT = "ISC Report"
 NOTE = "note: "  # begins notes that advise something
 _FIELDS = {
+    "--light-colour": "Light Color",
+    "--texture-size": "Texture Size",
     "--max-size": "Size",
     "--illumination": "Light",
     "--camera": "Camera",
@@ -33,6 +35,14 @@ _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
 _PART = re.compile(r"^object (\d+) of (\d+): ")
 _MOST_SECONDS = 90  # more are shown in minutes
 _MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
+_ADVICE = {  # what a command line does otherwise
+    "use --light-colour estimate": "set Light Color to Estimate",
+    "or --camera MM": "or set Camera to Perspective",
+    "or require lower odds": "or set Remove Highlights to Likely",
+    "leave out --transfer": "set Color Space to sRGB",
+    "put --point on it, or --box around it": _MASK_ADVICE,
+}
+_SPELLING = {"colour": "color", "Colour": "Color", "grey": "gray"}
 
 
 def translate_message(message: str, names: Mapping[str, str]) -> str:
@@ -50,14 +60,21 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
     str
         The message with image names and field labels.
     """
-    for path, name in sorted(names.items(), key=lambda item: -len(item[0])):
-        message = message.replace(path, name)
+    known = sorted(names.items(), key=lambda item: -len(item[0]))
+    for number, (path, _) in enumerate(known):  # names keep their spelling
+        message = message.replace(path, f"\0{number}\0")
+    for words, others in _ADVICE.items():
+        message = message.replace(words, others)
     problem, colon, advice = message.rpartition(": ")
     if colon and (_MASK_OPTION.search(advice) or _MASK_COMMAND in advice):
         several = ", or enable Each Object" if "--each" in advice else ""
         message = f"{problem}: {_MASK_ADVICE}{several}"
     for option, field in _FIELDS.items():
         message = re.sub(rf"{option}(?![\w-])=?", field, message)
+    for british, american in _SPELLING.items():
+        message = message.replace(british, american)
+    for number, (_, name) in enumerate(known):
+        message = message.replace(f"\0{number}\0", name)
     return message
 
 

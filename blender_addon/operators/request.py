@@ -47,6 +47,8 @@ class MethodSettings:
         Pixels that are marked, such as "120,80 64,200".
     refine : bool
         Whether the gloss is refined.
+    light_colour : str
+        Value of `--light-colour`.
     """
 
     model: str = "joint"
@@ -60,6 +62,7 @@ class MethodSettings:
     highlights: str = ""
     not_highlights: str = ""
     refine: bool = False
+    light_colour: str = "balanced"
 
 
 @dataclass(frozen=True)
@@ -183,9 +186,10 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
             **{
                 part.name: getattr(settings, part.name)
                 for part in fields(MethodSettings)
-                if part.name != "camera"
+                if part.name not in ("camera", "light_colour")
             },
             camera=_camera(settings),
+            light_colour=_light_colour(settings),
         ),
         build=build_options(settings, object_key(settings.image)),
         scene=scene.name_full,
@@ -196,6 +200,13 @@ def _camera(settings: Any) -> str:
     """Value of `--camera`."""
     by_length = settings.camera == "focal_length"
     return f"{settings.focal_length:g}" if by_length else str(settings.camera)
+
+
+def _light_colour(settings: Any) -> str:
+    """Value of `--light-colour`."""
+    by_color = settings.light_color == "custom"
+    color = (f"{part:.4g}" for part in settings.custom_light_color)
+    return ",".join(color) if by_color else str(settings.light_color)
 
 
 def build_options(settings: Any, name: str) -> BuildOptions:

@@ -24,6 +24,7 @@ from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_descri
 from ..files.result_cache import ResultCache, content_key
 from ..scene.objects import prepare_objects
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
+from ..settings.usage import SIRFS_MODELS
 from ..worker.commands import (
     CERTAIN,
     Box,
@@ -133,6 +134,7 @@ def decompose_steps(
         not_highlights=not_highlights,
         each=place.build.each,
         refine=method.refine,
+        light_colour=method.light_colour if method.model in SIRFS_MODELS else "balanced",
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     if job.each:

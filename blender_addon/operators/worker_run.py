@@ -262,6 +262,12 @@ class WorkerRun:
         except InputError as error:
             expected = True
             self._end(RunState.FAILED, str(error))
+        except MemoryError:
+            expected = True
+            self._end(
+                RunState.FAILED,
+                "there is not enough memory for the object: choose a smaller Texture Size or Size",
+            )
         except WorkerFailed as failure:
             expected = True
             self._end(RunState.FAILED, str(failure), failure.log)

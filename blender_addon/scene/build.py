@@ -337,6 +337,29 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     )
 
 
+def why_not_built(obj: bpy.types.Object | None) -> str:
+    """Return why an object is none that operators of ISC can work on.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object or None
+        Any object.
+
+    Returns
+    -------
+    str
+        What to do; "" where `find_built` finds one.
+    """
+    if find_built(obj) is not None:
+        return ""
+    if obj is not None and obj.library is not None and is_isc_datablock(obj):
+        return (
+            f"{obj.name} is linked from another file: make it local first (Object > Relations > "
+            "Make Local > All)"
+        )
+    return "Select an object created by ISC"
+
+
 def _choose_key(result: ResultArrays, options: BuildOptions, photo: bpy.types.Image | None) -> str:
     """The name, numbered if another photo's object has it: folders may share file names."""
     name = options.name or result.name

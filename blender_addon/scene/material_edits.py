@@ -39,7 +39,7 @@ from .color_bake import (
     edited_file,
     recolour_reflectance,
 )
-from .dichromatic import DICHROMATIC
+from .dichromatic import DICHROMATIC, HIGHLIGHTS
 
 SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Principled BSDF",
@@ -160,6 +160,7 @@ def apply_edits(material: bpy.types.Material) -> bool:
     if surface is None or group is None:
         return False
     _write_numbers(material, surface, group.inputs)
+    _pass_gain(group)
     _choose_base_color(material, group)
     state, shown = _color_state(material, group), material.get(_COLOR)
     if state == shown:
@@ -474,6 +475,14 @@ def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> N
         surface.inputs["Roughness"].default_value = wanted[1]
     if written is None or np.abs(np.subtract(list(written), wanted)).max() > 0:
         material[_NUMBERS] = wanted
+
+
+def _pass_gain(group: bpy.types.Node) -> None:
+    """The layer of the photo's highlights, where it is shown, has the same gain."""
+    layer, gain = group.id_data.nodes.get(HIGHLIGHTS), group.inputs["Specular Gain"].default_value
+    socket = None if layer is None else layer.inputs.get("Specular Gain")
+    if socket is not None and socket.default_value != gain:
+        socket.default_value = gain
 
 
 def _is_ours(target: Any, group: bpy.types.Node) -> bool:

@@ -16,6 +16,7 @@ from bpy.props import (
     BoolProperty,
     EnumProperty,
     FloatProperty,
+    FloatVectorProperty,
     IntProperty,
     IntVectorProperty,
     PointerProperty,
@@ -103,6 +104,22 @@ ILLUMINATIONS = _numbered(
     ("photo", "Photo", "Any light, in a photo with balanced colors"),
     ("natural", "Natural", "Smooth light of any color from all directions"),
     ("laboratory", "Laboratory", "One strong light source in a dark room"),
+)
+LIGHT_COLORS = _numbered(
+    ("balanced", "Balanced", "Nearly white, as the camera's white balance leaves it"),
+    (
+        "estimate",
+        "Estimate",
+        "Estimate the color from the highlights, for warm or cold light; nearly white where they "
+        "do not determine it",
+    ),
+    ("free", "Any", "Highlights are white, but diffuse light may have any color"),
+    (
+        "toned",
+        "Toned",
+        "A gray photo with a tone, such as sepia, which becomes part of the base color",
+    ),
+    ("custom", "Custom", "Use the given color"),
 )
 CAMERAS = _numbered(
     (
@@ -300,6 +317,21 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Kind of light in the photo",
         items=ILLUMINATIONS,
         default="photo",
+    )
+    light_color: EnumProperty(
+        name="Light Color",
+        description="Color of the light in the photo",
+        items=LIGHT_COLORS,
+        default="balanced",
+    )
+    custom_light_color: FloatVectorProperty(
+        name="Color",
+        description="Color of the light; pick it from something white in the photo",
+        subtype="COLOR",
+        size=3,
+        min=0.01,
+        max=1,
+        default=(1, 1, 1),
     )
     camera: EnumProperty(
         name="Camera", description="Projection of the photo", items=CAMERAS, default="auto"

@@ -78,6 +78,8 @@ class DecomposeJob:
         Whether each object is decomposed, into the folders 1, 2 and so on of `output`.
     refine : bool
         Whether the gloss is refined.
+    light_colour : str
+        Value of `--light-colour`.
     """
 
     photo: Path
@@ -96,6 +98,7 @@ class DecomposeJob:
     not_highlights: tuple[tuple[int, int], ...] = ()
     each: bool = False
     refine: bool = False
+    light_colour: str = "balanced"
 
 
 @dataclass(frozen=True)
@@ -170,7 +173,7 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
     """
     words = ["decompose", _absolute(job.photo), "--arrays", "-o", _absolute(job.output)]
     names = ("model", "separator", "illumination", "max_size", "threads", "transfer", "camera")
-    for name in (*names, "texture_size", "highlight_odds"):
+    for name in (*names, "texture_size", "highlight_odds", "light_colour"):
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]

@@ -93,5 +93,5 @@ def test_a_linked_object_says_what_to_do(addon: Any, tmp_path: Path, built: Buil
         wanted.objects = ["bump"]
     addon.context.scene.collection.objects.link(wanted.objects[0])
     addon.context.view_layer.objects.active = wanted.objects[0]
-    with pytest.raises(RuntimeError, match="that is not linked"):
+    with pytest.raises(RuntimeError, match="linked from another file: make it local"):
         addon.ops.isc.save_asset()

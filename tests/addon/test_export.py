@@ -128,6 +128,27 @@ def test_usd_has_a_preview_surface_with_the_index_of_the_level(
     assert shader.GetInput("diffuseColor").HasConnectedSource()
 
 
+@pytest.mark.parametrize("kind", ["GLB", "USD", "FBX", "OBJ"])
+def test_a_linked_object_is_exported_as_an_override(
+    built: BuiltObject, tmp_path: Path, kind: str
+) -> None:
+    """Linked, it has to be made local, which the button says."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(str(tmp_path / "a.blend"), link=True) as (_, wanted):
+        wanted.objects = ["bump"]
+    (linked,) = wanted.objects
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.context.view_layer.objects.active = linked
+    with pytest.raises(RuntimeError, match=r"linked from another file: make it local first"):
+        bpy.ops.isc.export(directory=str(tmp_path))
+    override = linked.override_create(remap_local_usages=True)
+    bpy.context.view_layer.objects.active = override
+    override.select_set(True)
+    assert bpy.ops.isc.export(directory=str(tmp_path), file_format=kind) == {"FINISHED"}
+    assert (tmp_path / "bump" / f"bump.{READERS[kind][0]}").stat().st_size > 1000
+
+
 def test_obj_comes_with_its_textures(built: BuiltObject, tmp_path: Path) -> None:
     export_object(built, tmp_path, "OBJ")
     text = (tmp_path / "bump" / "bump.mtl").read_text()

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 import shutil
 import threading
 import time
@@ -31,6 +32,7 @@ from blender_addon.settings import preferences, presets, properties  # noqa: E40
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.decomposition.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
+from isc_core.result_files import diagnostics_text, reading_notes_text  # noqa: E402
 from isc_core.separation import BEST, METHODS  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 
@@ -577,8 +579,29 @@ def test_messages_name_images_and_panel_fields() -> None:
         assert translate_message(f"/t/a.npy: no object: {advice}", {"/t/a.npy": "cup"}) == (
             "cup: no object: choose a mask image, or make one with Add Point or Select Box"
         )
+    assert translate_message(
+        "no object found there: put --point on it, or --box around it", {}
+    ) == ("no object found there: choose a mask image, or make one with Add Point or Select Box")
     several = "it seems to show several objects: give --mask; --each processes each of them"
     assert translate_message(several, {}).endswith("or Select Box, or enable Each Object")
+
+
+def test_notes_speak_of_the_panel_in_blenders_spelling() -> None:
+    """Every sentence that a result can have: no option of the command line is left in it."""
+    texts = [
+        *(diagnostics_text.STRONG_COLOUR, diagnostics_text.CROPPED, diagnostics_text.COLOURED),
+        *diagnostics_text._COLOURS.values(),
+        *diagnostics_text._WARNINGS.values(),
+        *diagnostics_text._LOBE.values(),
+        *diagnostics_text._LOBE_STATUS.values(),
+        *reading_notes_text._TEXTS.values(),
+    ]
+    for text in texts:
+        shown = translate_message(text, {})
+        assert not re.search(r"--[a-z]|colour|grey|odds", shown), shown
+    assert translate_message(diagnostics_text.COLOURED, {}).endswith("set Light Color to Estimate")
+    named = translate_message("/t/a.png: it is grey", {"/t/a.png": "my grey colour chart"})
+    assert named == "my grey colour chart: it is gray"
 
 
 def test_notes_are_joined_into_one_line() -> None:

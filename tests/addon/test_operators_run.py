@@ -199,6 +199,17 @@ def test_cancelling_after_the_end_changes_nothing(folder: Path) -> None:
     assert run.cancel().state == "done" and folder.is_dir()
 
 
+def test_too_little_memory_is_said_in_one_line(folder: Path) -> None:
+    def hungry() -> Generator[WorkerUpdate, None, RunOutput]:
+        yield WorkerUpdate("reading the result")
+        raise MemoryError("Unable to allocate 40 GiB")
+
+    run = WorkerRun("Create cup", hungry(), take, folder)
+    run.step()
+    assert run.step().state == "failed" and not folder.exists()
+    assert run.status.message.endswith("choose a smaller Texture Size or Size")
+
+
 def test_calls_and_import_are_timed(folder: Path) -> None:
     def slow_script() -> Generator[WorkerUpdate, None, RunOutput]:
         yield WorkerUpdate("quick")

@@ -338,6 +338,7 @@ def test_the_job_reaches_the_command_line(
         highlights=((40, 20), (1, 2)),
         not_highlights=((3, 4),),
         refine=True,
+        light_colour="0.9,0.5,0.2",
     )
     *words, last = ended(start_decompose(asked, environment)).message.split("\n")
     assert last == "--cancel-at-eof"
@@ -358,6 +359,7 @@ def test_the_job_reaches_the_command_line(
         "--camera": "28",
         "--texture-size": "2048",
         "--highlight-odds": "1",
+        "--light-colour": "0.9,0.5,0.2",
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }
