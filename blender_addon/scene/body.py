@@ -12,6 +12,7 @@ from isc_core.result_files.solids.surface import Solid, before_camera, make_soli
 from isc_core.shading.perspective import view_directions
 
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
+from ..datablocks.quads import joined_squares
 from ..files.result_arrays import ResultArrays
 from .camera import camera_of
 
@@ -35,7 +36,7 @@ def body_geometry(
     Returns
     -------
     geometry : MeshGeometry
-        Triangles with a normal per vertex.
+        Squares, and triangles where sizes change and along the outline; a normal per vertex.
     normal_map : (H, W, 3) ndarray of float32
         Tangent space, [0, 1] for [-1, 1].
 
@@ -51,8 +52,7 @@ def body_geometry(
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
         to_blender(vertices),
-        np.ascontiguousarray(body.faces.ravel(), np.int32),
-        np.arange(0, body.faces.size, 3, dtype=np.int32),
+        *joined_squares(body.faces, body.places),
         solid.uv(),
         confidence,
         to_blender(solid.normals(vertices)),

@@ -13,6 +13,7 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 from blender_addon import panels  # noqa: E402 (after the skip)
 from blender_addon.files.image_source import ImageSource  # noqa: E402
 from blender_addon.operators import request, run_steps  # noqa: E402
+from blender_addon.operators.worker_run import WorkerFailed  # noqa: E402
 from blender_addon.scene.build import BuiltObject, find_built  # noqa: E402
 from blender_addon.scene.dichromatic import HIGHLIGHTS  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node  # noqa: E402
@@ -193,7 +194,7 @@ def test_the_color_of_the_light_reaches_the_worker(
 
     def start(job: DecomposeJob, environment: Any) -> Any:
         jobs.append(job)
-        raise run_steps.WorkerFailed("seen")
+        raise WorkerFailed("seen")
 
     monkeypatch.setattr(run_steps, "start_decompose", start)
     (tmp_path / "cup.png").write_text("never read")
@@ -210,7 +211,7 @@ def test_the_color_of_the_light_reaches_the_worker(
             0,
             WorkerEnvironment(Path("python"), (tmp_path,), tmp_path),
         )
-        with pytest.raises(run_steps.WorkerFailed, match="seen"):
+        with pytest.raises(WorkerFailed, match="seen"):
             list(steps)
     sent = [job.light_colour for job in jobs]
     if model == "naive":

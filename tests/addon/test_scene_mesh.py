@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from blender_addon.datablocks.quads import joined_squares
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.result_files.mesh.options import MeshOptions
 from tests.addon.scene_fixture import write_result
@@ -137,6 +138,72 @@ def test_the_body_has_few_triangles_and_a_normal_map(blender: Any, bump_folder: 
     built = build(result, back="open", triangles=many // 2)
     assert len(built.object.data.polygons) < 0.75 * many
     assert any(image.get("isc_role") == "normal_map" for image in blender.data.images)
+
+
+def triangles_of(mesh: Any) -> set[tuple[int, ...]]:
+    mesh.calc_loop_triangles()
+    return set(map(tuple, np.sort(got(mesh.loop_triangles, "vertices", 3, np.int32)).tolist()))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_halves_of_squares_become_quads_and_split_into_them_again(seed: int) -> None:
+    """A grid of squares with any diagonals, on any surface, and triangles that fit none."""
+    rng = np.random.default_rng(seed)
+    rows, columns = 7, 9
+    number = np.arange(rows * columns).reshape(rows, columns)
+    a, b, c, d = (
+        number[r : r + rows - 1, k : k + columns - 1].ravel()
+        for r, k in ((0, 0), (0, 1), (1, 1), (1, 0))
+    )
+    falls = rng.random(len(a)) < 0.5
+    first = np.where(falls, [a, d, c], [a, d, b]).T
+    second = np.where(falls, [a, c, b], [b, d, c]).T
+    beside = np.array([[0, 1, rows * columns], [1, 2, rows * columns]])  # a place above the grid
+    faces = np.concatenate([first, second, beside])
+    faces = np.array([np.roll(face, rng.integers(3)) for face in rng.permutation(faces)])
+    places = np.stack(np.indices((rows, columns)), -1).reshape(-1, 2).astype(float)
+    corners, starts = joined_squares(faces, np.concatenate([places, [[-0.7, 1.2]]]))
+    sizes = np.diff(np.append(starts, len(corners)))
+    assert sizes.tolist() == [4] * len(a) + [3] * 2
+    quads = corners[: 4 * len(a)].reshape(-1, 4)
+    split = np.concatenate(
+        [quads[:, :3], quads[:, [0, 2, 3]], corners[4 * len(a) :].reshape(-1, 3)]
+    )
+
+    def turned(triangles: np.ndarray) -> set[tuple[int, ...]]:
+        return {tuple(np.roll(one, -one.argmin()).tolist()) for one in triangles}
+
+    assert turned(split) == turned(faces), "the same triangles, with the same sides up"
+
+
+@pytest.mark.parametrize("back", ["flat", "rounded", "open"])
+def test_a_full_mesh_is_a_grid_of_quads(blender: Any, bump_folder: Path, back: str) -> None:
+    from blender_addon.scene.body import _solid
+
+    result = read_result(bump_folder)
+    mesh = build(result, back=back, triangles=0).object.data
+    sizes = got(mesh.polygons, "loop_total", 1, np.int32)
+    inside = ndimage.binary_erosion(result.mask, np.ones((3, 3)))
+    assert (sizes == 4).sum() >= (1 if back == "open" else 2) * inside.sum()
+    assert triangles_of(mesh) == set(
+        map(tuple, np.sort(_solid(result, back, 0).body.faces).tolist())
+    )
+
+
+def test_the_body_can_be_subdivided(blender: Any, bump_folder: Path) -> None:
+    built = build(read_result(bump_folder), back="rounded", triangles=0)
+    before = volume(built.object.data)
+    built.object.modifiers.new("finer", "SUBSURF").levels = 1
+    finer = evaluated(built)
+    assert set(got(finer.polygons, "loop_total", 1, np.int32)) == {4} and manifold(finer)
+    assert volume(finer) == pytest.approx(before, rel=0.01)
+
+
+def volume(mesh: Any) -> float:
+    places = got(mesh.vertices, "co", 3).astype(float)
+    mesh.calc_loop_triangles()
+    corner = places[got(mesh.loop_triangles, "vertices", 3, np.int32)]
+    return float(np.linalg.det(corner).sum() / 6)
 
 
 @pytest.mark.slow
