@@ -3,13 +3,16 @@
 Over the 3D view, the photo fills as much of the region as its shape allows, with a margin; the
 scene stays visible around it.
 
-`PhotoOperator` waits for the mouse on it, `ClickOnPhoto` for a click on a pixel.
+`PhotoOperator` waits for the mouse on it, `ClickOnPhoto` for a click on a pixel, `StrokeOnPhoto`
+for a click or a stroke.
 
 Limits: the photo over the 3D view cannot be zoomed: use an image editor for small objects.
 """
 
-from collections.abc import Callable
-from math import floor
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import pairwise
+from math import floor, hypot
 from typing import Any
 
 import bpy
@@ -20,7 +23,10 @@ from .worker_run import active_run
 
 _FILL = 0.9  # of the region, along the side that limits the photo
 _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
+_SPACING, _MOST_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
+_MASK_TINT = (0.8, 0.1, 0.1, 0.5)  # of what the mask excludes
 
+OUTSIDE = "the point lies outside the photo: click on the photo"
 Point = tuple[float, float]
 
 
@@ -57,9 +63,17 @@ class PhotoCanvas:
         The photo.
     draw : callable, optional
         Draws over the photo, in pixels of the region.
+    mask : bpy.types.Image, optional
+        A mask: what it excludes is tinted.
     """
 
-    def __init__(self, context: Any, photo: Any, draw: Callable[[], None] | None = None) -> None:
+    def __init__(
+        self,
+        context: Any,
+        photo: Any,
+        draw: Callable[[], None] | None = None,
+        mask: Any = None,
+    ) -> None:
         # The button may be in the sidebar: the region is that of the view.
         region = next(part for part in context.area.regions if part.type == "WINDOW")
         self._address = region.as_pointer()
@@ -67,6 +81,7 @@ class PhotoCanvas:
         self._size: tuple[int, int] = tuple(photo.size)
         self._draw_over = draw
         self._texture = gpu.texture.from_image(photo) if self._kind == "VIEW_3D" else None
+        self._mask = None if mask is None else gpu.texture.from_image(mask)
         self._space = getattr(bpy.types, _EDITORS[self._kind])
         self._handler = self._space.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
         region.tag_redraw()
@@ -119,7 +134,7 @@ class PhotoCanvas:
         """Stop drawing. Does nothing the second time."""
         if self._handler is not None:
             self._space.draw_handler_remove(self._handler, "WINDOW")
-            self._handler = self._texture = None
+            self._handler = self._texture = self._mask = None
             self.redraw()
 
     def _find(self) -> tuple[Any, Any]:
@@ -135,16 +150,57 @@ class PhotoCanvas:
         area, region = bpy.context.area, bpy.context.region
         if region.as_pointer() != self._address:  # another view of the same kind
             return
+        corners = self._corners(area, region)
         if self._texture is not None:
-            left, bottom, width, height = fitted(self._size, _room(area, region))
-            right, top = left + width, bottom + height
-            corners = ((left, bottom), (right, bottom), (right, top), (left, top))
-            shader = _image_shader()
-            shader.uniform_sampler("image", self._texture)
-            sheet = {"pos": corners, "texCoord": ((0, 0), (1, 0), (1, 1), (0, 1))}
-            batch_for_shader(shader, "TRI_FAN", sheet).draw(shader)
+            _draw_texture(_image_shader(), self._texture, corners)
+        if self._mask is not None:
+            shader = _tint_shader()
+            gpu.state.blend_set("ALPHA")
+            shader.uniform_float("tint", _MASK_TINT)
+            _draw_texture(shader, self._mask, corners)
+            gpu.state.blend_set("NONE")
         if self._draw_over is not None:
             self._draw_over()
+
+    def _corners(self, area: Any, region: Any) -> tuple[Point, Point]:
+        """Lower left and upper right corner of the photo, in pixels of the region."""
+        if self._kind != "VIEW_3D":
+            first, last = (region.view2d.view_to_region(end, end, clip=False) for end in (0.0, 1.0))
+            return first, last
+        left, bottom, width, height = fitted(self._size, _room(area, region))
+        return (left, bottom), (left + width, bottom + height)
+
+
+def _draw_texture(shader: Any, texture: Any, corners: tuple[Point, Point]) -> None:
+    (left, bottom), (right, top) = corners
+    places = ((left, bottom), (right, bottom), (right, top), (left, top))
+    shader.uniform_sampler("image", texture)
+    sheet = {"pos": places, "texCoord": ((0, 0), (1, 0), (1, 1), (0, 1))}
+    batch_for_shader(shader, "TRI_FAN", sheet).draw(shader)
+
+
+@cache
+def _tint_shader() -> Any:
+    """A shader that lays a color over what is black in an image."""
+    info, passed = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("isc_tint")
+    passed.smooth("VEC2", "place")
+    info.push_constant("MAT4", "ModelViewProjectionMatrix")
+    info.push_constant("VEC4", "tint")
+    info.sampler(0, "FLOAT_2D", "image")
+    info.vertex_in(0, "VEC2", "pos")
+    info.vertex_in(1, "VEC2", "texCoord")
+    info.vertex_out(passed)
+    info.fragment_out(0, "VEC4", "color")
+    info.vertex_source(
+        "void main() {"
+        " place = texCoord;"
+        " gl_Position = ModelViewProjectionMatrix * vec4(pos, 0.0, 1.0); }"
+    )
+    info.fragment_source(
+        "void main() {"
+        " color = vec4(tint.rgb, tint.a * (1.0 - clamp(texture(image, place).r, 0.0, 1.0))); }"
+    )
+    return gpu.shader.create_from_info(info)
 
 
 def _room(area: Any, region: Any) -> tuple[int, int]:
@@ -230,7 +286,9 @@ class PhotoOperator:
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(self.advice())
         self._size = tuple(shown.size)
-        self._canvas = PhotoCanvas(context, shown, self.draw_over)
+        mask = self.mask_to_show(settings)
+        fits = mask is not None and tuple(mask.size) == self._size
+        self._canvas = PhotoCanvas(context, shown, self.draw_over, mask if fits else None)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -242,6 +300,20 @@ class PhotoOperator:
         str
         """
         raise NotImplementedError
+
+    def mask_to_show(self, settings: Any) -> Any:
+        """Return the mask that is shown over the photo; none here.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Of the scene.
+
+        Returns
+        -------
+        bpy.types.Image or None
+        """
+        del settings
 
     def draw_over(self) -> None:
         """Draw over the photo, in pixels of the region; nothing here."""
@@ -307,10 +379,122 @@ class ClickOnPhoto(PhotoOperator):
         point = point_at(self._canvas.place(position), self._size)
         self._leave(context, set())
         if point is None:
-            self.report({"WARNING"}, "the point lies outside the photo: click on the photo")
+            self.report({"WARNING"}, OUTSIDE)
             return {"CANCELLED"}
         self.take(context.scene.isc, f"{point[0]},{point[1]}")
         return {"FINISHED"}
+
+
+class StrokeOnPhoto(PhotoOperator):
+    """An operator that waits for a click or a stroke on the photo, over which the mask is shown."""
+
+    color = (1.0, 0.6, 0.1, 1.0)
+    _path: list[tuple[int, int]] | None = None
+
+    def take(self, settings: Any, points: Sequence[str]) -> None:
+        """Use the points of the stroke; the operator's own.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Of the scene.
+        points : sequence of str
+            Columns and rows, such as "120,80"; at least one.
+        """
+        raise NotImplementedError
+
+    def mask_to_show(self, settings: Any) -> Any:
+        """Return the mask of the panel; see `PhotoOperator`.
+
+        Parameters
+        ----------
+        settings : ISC_PG_settings
+            Of the scene.
+
+        Returns
+        -------
+        bpy.types.Image or None
+        """
+        return settings.mask if settings.mask_source == "IMAGE" else None
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Follow press, drag and release of the left mouse button.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard; its position is in pixels of the window.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting; {"FINISHED"} with points;
+            {"CANCELLED"} on Esc, the right mouse button, or beside the photo.
+        """
+        if event.type in {"ESC", "RIGHTMOUSE"} or self._canvas is None:
+            return self._leave(context, {"CANCELLED"})
+        position = self._canvas.position(event)
+        if position is None:
+            return self._leave(context, {"CANCELLED"})
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            self._path = [position]
+        elif self._path is None:
+            return {"PASS_THROUGH"}  # so that the view can still be moved
+        elif event.type == "MOUSEMOVE":
+            self._path.append(position)
+            self._canvas.redraw()
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            return self._finish(context, self._canvas, [*self._path, position])
+        return {"RUNNING_MODAL"}
+
+    def _finish(self, context: Any, canvas: PhotoCanvas, path: list[tuple[int, int]]) -> set[str]:
+        pixels = [point_at(canvas.place(position), self._size) for position in path]
+        self._leave(context, set())
+        points = spread([pixel for pixel in pixels if pixel is not None], self._size)
+        if not points:
+            self.report({"WARNING"}, OUTSIDE)
+            return {"CANCELLED"}
+        self.take(context.scene.isc, [f"{x},{y}" for x, y in points])
+        return {"FINISHED"}
+
+    def draw_over(self) -> None:
+        """Draw the stroke; see `PhotoOperator`."""
+        if self._path is None or len(self._path) < 2:
+            return
+        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+        shader.uniform_float("color", self.color)
+        places = [(x, y, 0.0) for x, y in self._path]
+        gpu.state.line_width_set(3.0)
+        batch_for_shader(shader, "LINE_STRIP", {"pos": places}).draw(shader)
+        gpu.state.line_width_set(1.0)
+
+
+def spread(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple[int, int]]:
+    """Choose points along a stroke.
+
+    Parameters
+    ----------
+    path : sequence of (column, row)
+        Pixels that the stroke passes.
+    size : tuple of int
+        Width and height of the photo.
+
+    Returns
+    -------
+    list of (column, row)
+        Some of them, in order: the first, and others at distances that are about equal.
+    """
+    steps = [hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(path)]
+    spacing = max(_SPACING * max(size), sum(steps) / (_MOST_POINTS - 0.5))
+    chosen, gone = list(path[:1]), 0.0
+    for pixel, step in zip(path[1:], steps, strict=True):
+        gone += step
+        if gone >= spacing:
+            chosen.append(pixel)
+            gone = 0.0
+    return list(dict.fromkeys(chosen))
 
 
 def add_point(settings: Any, name: str, point: str) -> None:

@@ -2,6 +2,7 @@
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+from collections.abc import Sequence
 from typing import Any
 
 import bpy
@@ -9,7 +10,7 @@ from bpy.props import BoolProperty
 
 from .mask import can_cut, mask_run
 from .modal import WorkerOperator
-from .photo_canvas import ClickOnPhoto, add_point
+from .photo_canvas import ClickOnPhoto, StrokeOnPhoto, add_point
 from .request import parse_points, require_photo
 from .run_steps import auto_mask_steps
 from .worker_run import WorkerRun, require_no_active_run
@@ -69,37 +70,41 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         )
 
 
-class ISC_OT_mark_point(ClickOnPhoto, bpy.types.Operator):
-    """Mark a point of the object or of the background with a click, and find the mask again."""
+class ISC_OT_mark_point(StrokeOnPhoto, bpy.types.Operator):
+    """Mark the object or the background with a click or a stroke, and find the mask again."""
 
     bl_idname = "isc.mark_point"
     bl_label = "Add Point"
-    bl_description = "Find the mask again with a clicked point of the object or of the background"
+    bl_description = (
+        "Find the mask again with a click on the object or on the background, or a stroke over it"
+    )
 
     background: BoolProperty(
         name="Background", description="Mark a point that does not belong to the object"
     )
 
     def advice(self) -> str:
-        """Return what to click on; see `ClickOnPhoto`.
+        """Return what to mark; see `StrokeOnPhoto`.
 
         Returns
         -------
         str
         """
-        return "Click on the background" if self.background else "Click on the object"
+        what = "background" if self.background else "object"
+        return f"Click on the {what} or draw a stroke over it, Esc or right mouse button to cancel"
 
-    def take(self, settings: Any, point: str) -> None:
-        """Add the point, and find the mask again; see `ClickOnPhoto`.
+    def take(self, settings: Any, points: Sequence[str]) -> None:
+        """Add the points, and find the mask again; see `StrokeOnPhoto`.
 
         Parameters
         ----------
         settings : ISC_PG_settings
             Changed in place.
-        point : str
-            Column and row.
+        points : sequence of str
+            Columns and rows.
         """
-        add_point(settings, "other_points" if self.background else "points", point)
+        for point in points:
+            add_point(settings, "other_points" if self.background else "points", point)
         bpy.ops.isc.auto_mask("INVOKE_DEFAULT")
 
 
@@ -148,7 +153,8 @@ class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
         -------
         str
         """
-        return "Click on print or paint" if self.reject else "Click on a highlight"
+        what = "print or paint" if self.reject else "a highlight"
+        return f"Click on {what}, Esc or right mouse button to cancel"
 
     def take(self, settings: Any, point: str) -> None:
         """Add the mark; see `ClickOnPhoto`.

@@ -1,0 +1,96 @@
+"""Clicks and strokes on the photo: what they mark, and what ends them."""
+
+from collections.abc import Sequence
+from math import hypot
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+from blender_addon.operators.photo_canvas import (  # noqa: E402 (after the skip)
+    StrokeOnPhoto,
+    spread,
+)
+
+SIZE = (200, 100)
+
+
+class Stroke(StrokeOnPhoto):
+    """On a photo of 200 x 100 pixels that fills its region."""
+
+    def __init__(self) -> None:
+        self.taken: list[str] = []
+        self.reports: list[str] = []
+        self._size = SIZE
+        self._canvas: Any = SimpleNamespace(
+            position=lambda event: event.position,
+            place=lambda position: (position[0] / SIZE[0], position[1] / SIZE[1]),
+            redraw=lambda: None,
+            close=lambda: None,
+        )
+
+    def report(self, kind: set[str], text: str) -> None:
+        self.reports.append(text)
+
+    def take(self, settings: Any, points: Sequence[str]) -> None:
+        self.taken += points
+
+    def follow(self, *events: tuple[str, str, tuple[int, int] | None]) -> list[set[str]]:
+        context = SimpleNamespace(window=None, scene=SimpleNamespace(isc=None))
+        return [
+            self.modal(context, SimpleNamespace(type=kind, value=value, position=position))
+            for kind, value, position in events
+        ]
+
+
+def test_a_click_is_one_point() -> None:
+    stroke = Stroke()
+    ended = stroke.follow(
+        ("MOUSEMOVE", "NOTHING", (3, 3)),
+        ("LEFTMOUSE", "PRESS", (40, 20)),
+        ("LEFTMOUSE", "RELEASE", (40, 20)),
+    )
+    assert ended == [{"PASS_THROUGH"}, {"RUNNING_MODAL"}, {"FINISHED"}]
+    assert stroke.taken == ["40,80"], "row 0 is at the top"
+
+
+def test_a_stroke_is_some_points_along_it_and_none_beside_the_photo() -> None:
+    stroke = Stroke()
+    moves = [("MOUSEMOVE", "NOTHING", (x, 50)) for x in range(20, 300, 3)]
+    ended = stroke.follow(
+        ("LEFTMOUSE", "PRESS", (20, 50)), *moves, ("LEFTMOUSE", "RELEASE", (300, 50))
+    )
+    assert ended[-1] == {"FINISHED"} and set(map(str, ended[:-1])) == {"{'RUNNING_MODAL'}"}
+    columns = [int(point.split(",")[0]) for point in stroke.taken]
+    assert 5 <= len(columns) <= 8 and columns[0] == 20 and 160 < columns[-1] < SIZE[0]
+    assert np.ptp(np.diff(columns)) <= 3
+
+
+@pytest.mark.parametrize(
+    ("events", "reports"),
+    [
+        ([("LEFTMOUSE", "PRESS", (5, 5)), ("ESC", "PRESS", (5, 5))], 0),
+        ([("RIGHTMOUSE", "PRESS", (5, 5))], 0),
+        ([("LEFTMOUSE", "PRESS", None)], 0),  # the region is gone
+        ([("LEFTMOUSE", "PRESS", (-5, 5)), ("LEFTMOUSE", "RELEASE", (-9, 5))], 1),
+    ],
+)
+def test_what_ends_a_stroke_without_points(
+    events: list[tuple[str, str, tuple[int, int] | None]], reports: int
+) -> None:
+    stroke = Stroke()
+    assert stroke.follow(*events)[-1] == {"CANCELLED"}
+    assert not stroke.taken and len(stroke.reports) == reports and stroke._canvas is None
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_points_are_few_apart_and_on_the_path(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    path = [(int(x), int(y)) for x, y in np.cumsum(rng.integers(-1, 4, (300, 2)), 0)]
+    chosen = spread(path, (1000, 1000))
+    assert set(chosen) <= set(path) and chosen[0] == path[0] and 2 <= len(chosen) <= 8
+    assert all(hypot(a[0] - b[0], a[1] - b[1]) > 5 for a in chosen for b in chosen if a != b)
+    assert spread([], SIZE) == [] and spread([(3, 4)] * 5, SIZE) == [(3, 4)]
