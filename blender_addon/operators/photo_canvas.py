@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 import gpu  # type: ignore[import-not-found]
+import numpy as np
 from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from .worker_run import active_run
@@ -24,7 +25,7 @@ from .worker_run import active_run
 _FILL = 0.9  # of the region, along the side that limits the photo
 _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
 _SPACING, _MOST_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
-_MASK_TINT = (0.8, 0.1, 0.1, 0.5)  # of what the mask excludes
+_MASK_TINT = (0.4, 0.0, 0.0, 0.5)  # of what the mask excludes
 
 OUTSIDE = "the point lies outside the photo: click on the photo"
 Point = tuple[float, float]
@@ -477,24 +478,23 @@ def spread(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple
     Parameters
     ----------
     path : sequence of (column, row)
-        Pixels that the stroke passes.
+        Pixels that the stroke passes; they may lie far apart, as of a fast mouse.
     size : tuple of int
         Width and height of the photo.
 
     Returns
     -------
     list of (column, row)
-        Some of them, in order: the first, and others at distances that are about equal.
+        Pixels on the stroke, at equal distances along it.
     """
+    if not path:
+        return []
     steps = [hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(path)]
-    spacing = max(_SPACING * max(size), sum(steps) / (_MOST_POINTS - 0.5))
-    chosen, gone = list(path[:1]), 0.0
-    for pixel, step in zip(path[1:], steps, strict=True):
-        gone += step
-        if gone >= spacing:
-            chosen.append(pixel)
-            gone = 0.0
-    return list(dict.fromkeys(chosen))
+    gone = np.concatenate([[0.0], np.cumsum(steps)])
+    count = min(_MOST_POINTS, 1 + int(gone[-1] / (_SPACING * max(size))))
+    places = np.linspace(0.0, gone[-1], count)
+    columns, rows = (np.interp(places, gone, part) for part in np.array(path, float).T)
+    return list(dict.fromkeys((round(x), round(y)) for x, y in zip(columns, rows, strict=True)))
 
 
 def add_point(settings: Any, name: str, point: str) -> None:

@@ -55,6 +55,7 @@ def first_steps(acc: Any, measured: list[str]) -> Iterator[float]:
     yield from import_result(acc, measured)
     yield from asset(acc)
     yield from box(acc, measured)
+    yield from stroke(acc, measured)
     yield from marked_highlight(acc)
     settings = bpy.context.scene.isc
     chosen = settings.image, settings.mask_source
@@ -153,8 +154,8 @@ def export(acc: Any) -> Iterator[float]:
 def second_run(acc: Any, measured: list[str]) -> Iterator[float]:
     """The same photo with other output: from the cache."""
     bpy.context.scene.isc.back = "flat"
+    yield from begin(acc)  # which looks for the button
     began = time.monotonic()
-    yield from begin(acc)
     yield from ended(100)
     seconds = time.monotonic() - began
     note(acc, measured, f"second run, other output options, in {seconds:.1f} s")
@@ -361,6 +362,27 @@ def box(acc: Any, measured: list[str]) -> Iterator[float]:
     yield from ended(60)
     note(acc, measured, "box")
     acc.check(shown().title == "Cut Out", f"the box is cut out: {shown().message}")
+
+
+def stroke(acc: Any, measured: list[str]) -> Iterator[float]:
+    """A stroke down the photo over the 3D view, over which the mask is shown."""
+    settings = bpy.context.scene.isc
+    left, top, _, height = acc.rect("VIEW_3D", "WINDOW")
+    x, y = int((left + acc.rect("VIEW_3D", "UI")[0]) / 2), int(top + height / 2)
+    with acc.context():
+        bpy.ops.isc.mark_point("INVOKE_DEFAULT")
+    yield 1.5
+    down = " ".join(f"mousemove {x} {y + 12 * step} sleep .2" for step in range(8))
+    yield acc.xdo(f"mousemove {x} {y} sleep 1 mousedown 1 sleep .5 {down}", 6)
+    yield acc.shot("10_stroke")
+    yield acc.xdo("mouseup 1", 1)
+    yield from until(lambda: shown().state == "running", 20)
+    yield from ended(60)
+    note(acc, measured, "stroke")
+    acc.check(len(settings.points.split()) > 2, f"a stroke is points: {settings.points}")
+    acc.check(shown().state == "done", f"the mask follows it: {shown().message}")
+    with acc.context():
+        bpy.ops.isc.clear_points()
 
 
 def marked_highlight(acc: Any) -> Iterator[float]:
