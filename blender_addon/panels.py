@@ -291,12 +291,11 @@ def _draw_outcome(layout: Any, context: Any) -> None:
     icons = {str(state): icon for state, icon in _STATE_ICONS.items()}
     if shown.state not in icons or not shown.message:
         return
-    notes = shown.notes.splitlines()
+    advice, notes = read_notes(shown.notes)
     row = layout.row()
     column = row.column(align=True)
     for number, line in enumerate(wrap_text(shown.message, _LINE_LENGTH)):
         column.label(text=line, icon="BLANK1" if number else icons[shown.state])
-    advice = [note.removeprefix(NOTE) for note in notes if note.startswith(NOTE)]
     if advice:
         row.operator("isc.show_notes", text="", icon="ERROR", emboss=False).notes = "\n".join(
             advice
@@ -313,6 +312,25 @@ def _draw_outcome(layout: Any, context: Any) -> None:
             for note in notes:
                 for line in wrap_text(note, _LINE_LENGTH):
                     lines.label(text=line)
+
+
+def read_notes(text: str) -> tuple[list[str], list[str]]:
+    """Read the notes on a result.
+
+    Parameters
+    ----------
+    text : str
+        One note a line.
+
+    Returns
+    -------
+    advice, notes : list of str
+        Those that advise something, and all.
+    """
+    lines = text.splitlines()
+    notes = [line.removeprefix(NOTE) for line in lines]
+    notes = [f"{note[:1].upper()}{note[1:]}" for note in notes]
+    return [note for note, line in zip(notes, lines, strict=True) if line.startswith(NOTE)], notes
 
 
 def wrap_text(text: str, width: int) -> list[str]:

@@ -63,7 +63,7 @@ def require_color_spaces(*names: str) -> None:
     ].enum_items.keys()
     if missing := [name for name in names if name not in known]:
         raise InputError(
-            f"the colour configuration has no space {missing[0]!r}: "
+            f"the color configuration has no space {missing[0]!r}: "
             "start Blender with its own configuration (without the variable OCIO)"
         )
 

@@ -130,7 +130,7 @@ def inspect_image(image: Any, *, as_pixels: bool = False) -> ImageSource:
     transfer = "linear" if image.is_float else _transfer(image)
     if not transfer:
         raise InputError(
-            f"the image {image.name} has the colour space {image.colorspace_settings.name}: "
+            f"the image {image.name} has the color space {image.colorspace_settings.name}: "
             "choose sRGB, Linear Rec.709 or Non-Color for it"
         )
     uses_alpha = image.alpha_mode in {"STRAIGHT", "PREMUL"}

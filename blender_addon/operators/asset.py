@@ -12,6 +12,7 @@ from isc_core.errors import InputError
 
 from ..scene.asset import save_asset
 from ..scene.build import find_built, why_not_built
+from .messages import sentence
 
 
 class ISC_OT_save_asset(bpy.types.Operator):
@@ -109,7 +110,7 @@ class ISC_OT_save_asset(bpy.types.Operator):
                 raise InputError("no object created by ISC is active: select one")
             path = save_asset(built, library_folder(context, self.library), self.overwrite)
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         self.report({"INFO"}, f"{built.object.name} saved in {path}")
         return {"FINISHED"}

@@ -17,7 +17,7 @@ from ..scene.build import find_built, why_not_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .messages import busy_message
+from .messages import busy_message, sentence
 from .modal import WorkerOperator
 from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
 from .result import build_in_steps
@@ -112,7 +112,7 @@ class _Overwrites(WorkerOperator):
         try:
             edited = None if self.overwrite else _edited_object(self.request(context))
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         if edited is None or bpy.app.background or context.window is None:
             return super().invoke(context, event)

@@ -23,6 +23,7 @@ from ..scene.photo_highlights import can_show_highlights, hide_highlights, show_
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
 from .live_edits import settle_edits
+from .messages import sentence
 
 _LIGHTS = (
     (
@@ -83,7 +84,7 @@ class EditOperator:
             self.edit(built)
             settle_edits(find_material(built.object) or built.material)
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         return {"FINISHED"}
 

@@ -26,6 +26,7 @@ from ..scene.copies import is_copy
 from ..scene.material_edits import specular_level, surface_node
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
+from .messages import sentence
 from .texture_set import PLASTIC, linked_image, write_texture_set
 
 _EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
@@ -162,9 +163,9 @@ class _FolderOperator:
                 raise InputError("nothing to export: select an object created by ISC, and a folder")
             names = self.write(built, Path(bpy.path.abspath(self.directory)))
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
-        self.report({"INFO"}, f"exported {', '.join(names)}")
+        self.report({"INFO"}, f"Exported {', '.join(names)}")
         return {"FINISHED"}
 
     def write(self, built: BuiltObject, parent: Path) -> list[str]:

@@ -20,7 +20,7 @@ from isc_core.errors import InputError
 from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
-from .messages import busy_message
+from .messages import busy_message, sentence
 from .modal import WorkerOperator
 from .photo_canvas import PhotoCanvas, PhotoOperator
 from .request import find_by_full_name, require_photo
@@ -162,7 +162,7 @@ class ISC_OT_take_mask(bpy.types.Operator):
         try:
             mask = bpy.data.images.load(self.filepath)
         except RuntimeError:
-            self.report({"ERROR"}, f"the mask {self.filepath} cannot be read: cut it out again")
+            self.report({"ERROR"}, f"The mask {self.filepath} cannot be read: cut it out again")
             return {"CANCELLED"}
         mask.pack()
         mask.filepath = ""
@@ -201,7 +201,7 @@ class ISC_OT_new_mask(bpy.types.Operator):
         settings = context.scene.isc
         image = settings.image
         if image is None or 0 in tuple(image.size):
-            self.report({"ERROR"}, "no photo is selected: choose one, the mask takes its size")
+            self.report({"ERROR"}, "No photo is selected: choose one, the mask takes its size")
             return {"CANCELLED"}
         mask = bpy.data.images.new(f"{image.name} mask", *image.size, alpha=False)
         mask.colorspace_settings.name = "Non-Color"
@@ -272,7 +272,7 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
         box = box_from_corners(first, second, self._size)
         self._leave(context, set())
         if box is None:
-            self.report({"WARNING"}, _small_box_message())
+            self.report({"WARNING"}, sentence(_small_box_message()))
             return {"CANCELLED"}
         context.scene.isc.box = box
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")

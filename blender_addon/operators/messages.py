@@ -42,6 +42,12 @@ _ADVICE = {  # what a command line does otherwise
     "leave out --transfer": "set Color Space to sRGB",
     "put --point on it, or --box around it": _MASK_ADVICE,
 }
+# A message that begins otherwise begins with the name of something.
+_FIRST_WORDS = frozenset(
+    {"a", "an", "cannot", "exported", "gloss", "hardly", "highlights", "internal", "it", "no"}
+    | {"nothing", "several", "the", "there", "undetermined", "unknown"}
+    | {"expected", "much"}
+)
 _SPELLING = {"colour": "color", "Colour": "Color", "grey": "gray"}
 
 
@@ -76,6 +82,22 @@ def translate_message(message: str, names: Mapping[str, str]) -> str:
     for number, (_, name) in enumerate(known):
         message = message.replace(f"\0{number}\0", name)
     return message
+
+
+def sentence(message: str) -> str:
+    """Return a message as Blender writes its own: with a capital, unless it begins with a name.
+
+    Parameters
+    ----------
+    message : str
+        A message.
+
+    Returns
+    -------
+    str
+    """
+    first = message.partition(" ")[0].rstrip(":,")
+    return message[0].upper() + message[1:] if first in _FIRST_WORDS else message
 
 
 def error_line(error: RuntimeError) -> str:

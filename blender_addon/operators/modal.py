@@ -14,7 +14,7 @@ import bpy
 
 from isc_core.errors import InputError
 
-from .messages import progress_message, stage_text, write_report
+from .messages import progress_message, sentence, stage_text, write_report
 from .worker_run import RunState, WorkerRun, active_run, begin_run, cancel_active_run
 
 POLL_SECONDS = 0.1
@@ -145,7 +145,7 @@ class WorkerOperator:
         try:
             run = begin_run(self.prepare(context))
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return None
         run.record_call(time.perf_counter() - began)
         return run
@@ -160,7 +160,7 @@ class WorkerOperator:
         state, message, log = run.status.state, run.status.message, run.status.log
         if state == RunState.FAILED and log:
             message += f" (see the text {write_report(run.title, message, log).name})"
-        self.report({"ERROR" if state == RunState.FAILED else "INFO"}, message)
+        self.report({"ERROR" if state == RunState.FAILED else "INFO"}, sentence(message))
         return {"FINISHED"} if state == RunState.DONE else {"CANCELLED"}
 
     def _hurry(self, context: Any) -> None:
@@ -224,7 +224,8 @@ def update_display(context: Any, run: WorkerRun, remark: str = "") -> None:
     stage = remark or stage_text(status.stage, status.seconds_left)
     shown.longest_call_ms, shown.import_ms = run.longest_call_ms, run.import_ms
     # Redraw only when something visible has changed, not ten times a second.
-    now = (run.title, str(status.state), stage, round(status.fraction, 2), status.message)
+    message = sentence(status.message)
+    now = (run.title, str(status.state), stage, round(status.fraction, 2), message)
     if now == (shown.title, shown.state, shown.stage, round(shown.fraction, 2), shown.message):
         return
     shown.title, shown.state, shown.stage, shown.fraction, shown.message = now

@@ -27,7 +27,7 @@ _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
 _SPACING, _MOST_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
 _MASK_TINT = (0.4, 0.0, 0.0, 0.5)  # of what the mask excludes
 
-OUTSIDE = "the point lies outside the photo: click on the photo"
+OUTSIDE = "The point lies outside the photo: click on the photo"
 Point = tuple[float, float]
 
 

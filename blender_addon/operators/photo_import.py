@@ -18,7 +18,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from .messages import busy_message
+from .messages import busy_message, sentence
 from .request import find_by_full_name
 from .worker_run import active_run
 
@@ -110,7 +110,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
         try:
             photo = self._photo()
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         settings = context.scene.isc
         settings.image, settings.mask, settings.mask_source = photo, None, "ALPHA"

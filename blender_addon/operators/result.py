@@ -16,7 +16,7 @@ from ..files.result_arrays import DESCRIPTION
 from ..scene.build import BuiltObject, StagedObject, find_built
 from ..scene.objects import discard, place_objects, stage_objects
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .messages import error_line
+from .messages import error_line, sentence
 from .modal import WorkerOperator
 from .request import (
     DecomposeRequest,
@@ -155,7 +155,7 @@ class ISC_OT_build_result(bpy.types.Operator):
                 staged = completed(stage_objects(prepared, photo=photo))
             built = place_objects(staged, scene=scene, photo=photo)
         except InputError as error:
-            self.report({"ERROR"}, str(error))
+            self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         for one in built:
             _complete(one, request, scene)
@@ -222,7 +222,7 @@ class ISC_OT_import_result(bpy.types.Operator):
             how = "INVOKE_DEFAULT" if self._selected else "EXEC_DEFAULT"
             return set(bpy.ops.isc.read_result(how, directory=str(folder)))
         except RuntimeError as error:
-            self.report({"ERROR"}, error_line(error))
+            self.report({"ERROR"}, sentence(error_line(error)))
             return {"CANCELLED"}
 
 

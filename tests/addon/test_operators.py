@@ -20,12 +20,12 @@ from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators import run_steps, worker_run  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
 from blender_addon.operators.mask import box_from_corners  # noqa: E402
-from blender_addon.operators.messages import join_notes, translate_message  # noqa: E402
+from blender_addon.operators.messages import join_notes, sentence, translate_message  # noqa: E402
 from blender_addon.operators.photo_canvas import point_at  # noqa: E402
 from blender_addon.operators.request import parse_points, request_from_settings  # noqa: E402
 from blender_addon.operators.result import ISC_OT_read_result  # noqa: E402
 from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
-from blender_addon.panels import wrap_text  # noqa: E402
+from blender_addon.panels import read_notes, wrap_text  # noqa: E402
 from blender_addon.scene.build import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
@@ -278,14 +278,14 @@ def set_image(settings: Any, values: np.ndarray) -> None:
     [
         (lambda s: None, "Open a photo first"),
         (lambda s: set_image(s, np.ones((1, 1, 3))), "is 1 x 1 pixels: choose a larger one"),
-        (without_mask, "no mask image is selected: choose one"),
+        (without_mask, "No mask image is selected: choose one"),
         (
             lambda s: masked(s, bpy.data.images.new("m", 88, 64)),
-            "the mask m is empty: paint the object white on black",
+            "The mask m is empty: paint the object white on black",
         ),
         (
             lambda s: masked(s, mask_image(size=(20, 30))),
-            "the mask is 30 x 20 pixels, the photo 88 x 64: "
+            "The mask is 30 x 20 pixels, the photo 88 x 64: "
             "choose another mask, or enable Scale Mask",
         ),
         (lambda s: masked(s, None), "is the photo itself"),
@@ -328,7 +328,7 @@ def test_a_mask_of_another_size_is_scaled_if_enabled(addon: Any) -> None:
 def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     addon.context.scene.isc.image = photo()
-    assert "the worker is missing" in error_of(addon.ops.isc.decompose)
+    assert "The worker is missing" in error_of(addon.ops.isc.decompose)
 
 
 @pytest.mark.slow
@@ -392,7 +392,7 @@ def test_points_are_read_from_text() -> None:
 def test_an_empty_box_is_refused(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image = photo()
-    assert "the box is less than 8 pixels wide or high" in error_of(addon.ops.isc.cut_mask)
+    assert "The box is less than 8 pixels wide or high" in error_of(addon.ops.isc.cut_mask)
     settings.box = (0, 0, 88, 64)
     assert "covers the whole image" in error_of(addon.ops.isc.cut_mask)
     assert settings.mask is None and len(addon.data.images) == 1
@@ -400,7 +400,7 @@ def test_an_empty_box_is_refused(addon: Any) -> None:
 
 def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
     settings = addon.context.scene.isc
-    assert "no photo is selected" in error_of(addon.ops.isc.new_mask)
+    assert "No photo is selected" in error_of(addon.ops.isc.new_mask)
     settings.image = photo()
     assert addon.ops.isc.new_mask() == {"FINISHED"}
     assert tuple(settings.mask.size) == (88, 64) and settings.mask_source == "IMAGE"
@@ -609,6 +609,21 @@ def test_notes_are_joined_into_one_line() -> None:
         join_notes(["note: not converged", "gloss: none ", ""])
         == "note: not converged; gloss: none"
     )
+
+
+def test_messages_begin_with_a_capital_unless_it_is_a_name() -> None:
+    assert (
+        sentence("the mask is the photo itself: choose") == "The mask is the photo itself: choose"
+    )
+    assert sentence("no photo is selected") == "No photo is selected"
+    for named in ("cup updated", "a.png: every pixel is black", "therapy created", ""):
+        assert sentence(named) == named
+
+
+def test_notes_are_shown_without_their_mark() -> None:
+    advice, notes = read_notes("note: the light is colored\ngloss: roughness 0.20")
+    assert advice == ["The light is colored"]
+    assert notes == ["The light is colored", "Gloss: roughness 0.20"]
 
 
 def test_text_is_wrapped() -> None:

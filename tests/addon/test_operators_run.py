@@ -440,7 +440,7 @@ def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
         plain = Plain(run)
         plain.modal(addon.context, event("TIMER"))
         assert plain.modal(addon.context, event("TIMER")) == {"CANCELLED"}
-    assert plain.said == [({"ERROR"}, "it died (see the text ISC Report)")]
+    assert plain.said == [({"ERROR"}, "It died (see the text ISC Report)")]
     assert [text.name for text in addon.data.texts] == ["ISC Report"]
     assert addon.data.texts[0].as_string().splitlines() == [
         "Decompose cup",

@@ -326,7 +326,7 @@ def test_movies_sequences_and_tiles_are_refused(source: str, word: str) -> None:
 def test_a_byte_image_in_an_unknown_space_is_refused() -> None:
     image = generated()
     image.colorspace_settings.name = "ACEScg"
-    with pytest.raises(InputError, match="colour space ACEScg: choose sRGB"):
+    with pytest.raises(InputError, match="color space ACEScg: choose sRGB"):
         inspect_image(image)
 
 
