@@ -1,5 +1,8 @@
 """Export by Blender's own exporters: what is read back is the object, edits included."""
 
+import json
+import shutil
+import subprocess
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -91,6 +94,38 @@ def test_blenders_own_exporters_give_the_edited_object(
     wanted, mask = shown(built, 16)
     found, _ = read_back(built, path, 16)
     assert psnr(wanted, found, mask, peak=float(wanted[mask].max())) > 30
+
+
+VALIDATE = """
+const {validateBytes} = require("gltf-validator"), {readFileSync} = require("fs");
+validateBytes(new Uint8Array(readFileSync(process.argv[1]))).then(
+    report => console.log(JSON.stringify(report.issues)));
+"""
+
+
+@pytest.mark.parametrize("edits", EDITS)
+def test_the_validator_of_gltf_finds_no_error(
+    built: BuiltObject, tmp_path: Path, edits: str
+) -> None:
+    """Khronos's own program, where Node.js finds it (`npm install gltf-validator`, NODE_PATH)."""
+    node = shutil.which("node")
+    if (
+        node is None
+        or subprocess.run(
+            [node, "-e", "require('gltf-validator')"], capture_output=True, check=False
+        ).returncode
+    ):
+        pytest.skip("needs Node.js with gltf-validator")
+    edit(built, EDITS[edits])
+    standard_export("GLB", tmp_path / "a.glb")
+    done = subprocess.run(
+        [node, "-e", VALIDATE, tmp_path / "a.glb"], capture_output=True, check=True, text=True
+    )
+    issues = json.loads(done.stdout)
+    assert issues["numErrors"] == 0, issues["messages"]
+    # Tangents are left to the reader; textures are of any size.
+    expected = {"MESH_PRIMITIVE_GENERATED_TANGENT_SPACE", "IMAGE_NPOT_DIMENSIONS"}
+    assert {message["code"] for message in issues["messages"]} <= expected
 
 
 def test_the_layer_of_highlights_is_not_exported_as_light(
