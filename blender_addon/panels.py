@@ -109,7 +109,9 @@ class _Highlights(_Panel):
     def draw(self, context: Any) -> None:
         """Draw which highlights are removed, and the buttons that mark highlights and print."""
         settings = context.scene.isc
-        draw_settings(self.property_column(), settings, "highlight_odds")
+        # Beside its choices, the name would be cut off.
+        self.layout.label(text="Remove Highlights")
+        draw_settings(self.layout.column(), settings, "highlight_odds", text="")
         row = self.layout.row(align=True)
         row.enabled = not why_unused(settings, "highlights")
         row.operator("isc.mark_highlight", icon="ADD").reject = False
@@ -186,12 +188,21 @@ class _Edit(_Panel):
         # Elsewhere than in the world of the photo, all that this can do is to take the sun away.
         recovered = built.world is not None and context.scene.world == built.world
         text = "Recovered Light" if recovered else "Remove Sun"
-        column.operator("isc.relight", text=text).light = "RECOVERED"
+        row = column.row(align=True)
+        sun = find_tagged(bpy.data.objects, built.object[KEY], "sun")
+        row.enabled = recovered or (sun is not None and sun.name in context.view_layer.objects)
+        row.operator("isc.relight", text=text).light = "RECOVERED"
         part = find_tagged(bpy.data.collections, built.object[KEY], LIGHT_AND_CAMERA)
         entry = part and find_layer_collection(context.view_layer.layer_collection, part)
         if entry:
-            self.layout.prop(
-                entry, "exclude", text="Photo's Light and Camera", invert_checkbox=True
+            row = self.layout.row()
+            row.use_property_split = False
+            row.prop(
+                entry,
+                "exclude",
+                text="Photo's Light and Camera",
+                icon="CHECKBOX_DEHLT" if entry.exclude else "CHECKBOX_HLT",
+                invert_checkbox=True,
             )
 
     def _draw_material(self, built: BuiltObject) -> None:
@@ -230,7 +241,7 @@ class _Edit(_Panel):
             column.operator("isc.photo_highlights", text=text).show = not shown
 
 
-def draw_settings(column: Any, settings: Any, *names: str) -> None:
+def draw_settings(column: Any, settings: Any, *names: str, **label: str) -> None:
     """Draw settings; those without an effect are greyed out, with the reason below.
 
     Parameters
@@ -241,6 +252,8 @@ def draw_settings(column: Any, settings: Any, *names: str) -> None:
         The settings of the scene.
     *names : str
         Names of the settings. Those that are unused for one reason stand together.
+    **label : str
+        `text` in place of their own names.
     """
     reason = ""
     for name in names:
@@ -249,7 +262,7 @@ def draw_settings(column: Any, settings: Any, *names: str) -> None:
             column.label(text=previous, icon="INFO")
         row = column.row()
         row.enabled = not reason
-        row.prop(settings, name)
+        row.prop(settings, name, **label)
     if reason:
         column.label(text=reason, icon="INFO")
 

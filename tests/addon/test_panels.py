@@ -41,7 +41,7 @@ class Layout:
 
     row = column
 
-    def prop(self, owner: Any, name: str, text: str = "", **_: Any) -> None:
+    def prop(self, owner: Any, name: str, text: str | None = None, **_: Any) -> None:
         self.drawn[text or name] = owner, self
 
     def operator(self, name: str, text: str = "", **_: Any) -> Any:
@@ -121,7 +121,8 @@ def test_settings_without_an_effect_are_greyed_out_and_say_why(
     for name, value in values.items():
         setattr(addon.context.scene.isc, name, value)
     layout = drawn(panel)
-    assert (layout.greyed(), layout.labels) == (greyed, reasons)
+    labels = [text for text in layout.labels if text != "Remove Highlights"]
+    assert (layout.greyed(), labels) == (greyed, reasons)
     assert all(len(reason) <= panels._LINE_LENGTH for reason in reasons)
     assert "custom_light_color" not in layout.drawn
 
@@ -161,12 +162,19 @@ def test_sliders_of_gloss_are_live_where_they_show_something(
     if shows:
         addon.ops.isc.photo_highlights(show=True)
     layout = drawn(panels._Edit)
-    assert layout.greyed() == greyed
+    assert layout.greyed() == {*greyed, "Remove Sun"}, "there is no sun"
     assert [text for text in layout.labels if text not in ("Diffuse", "Specular", "Light")] == (
         reason
     )
     socket, _ = layout.drawn["Specular Gain"]
     assert socket == node.inputs["Specular Gain"], "a slider, not a button"
+
+
+def test_a_sun_can_be_removed_where_one_shines(addon: Any, built: BuiltObject) -> None:
+    addon.ops.isc.relight(light="OPTIMAL")
+    assert "Remove Sun" not in drawn(panels._Edit).greyed()
+    addon.ops.isc.relight(light="RECOVERED")
+    assert "Remove Sun" in drawn(panels._Edit).greyed()
 
 
 def test_the_slider_of_the_gain_moves_the_photos_highlights_too(
