@@ -197,13 +197,9 @@ class _Edit(_Panel):
         if entry:
             row = self.layout.row()
             row.use_property_split = False
-            row.prop(
-                entry,
-                "exclude",
-                text="Photo's Light and Camera",
-                icon="CHECKBOX_DEHLT" if entry.exclude else "CHECKBOX_HLT",
-                invert_checkbox=True,
-            )
+            row.alignment = "LEFT"
+            # Its icon is the Outliner's checkbox, which shows what is included.
+            row.prop(entry, "exclude", text="Photo's Light and Camera", emboss=False)
 
     def _draw_material(self, built: BuiltObject) -> None:
         node = dichromatic_node(built.material)
