@@ -186,7 +186,7 @@ def test_a_full_mesh_is_a_grid_of_quads(blender: Any, bump_folder: Path, back: s
     inside = ndimage.binary_erosion(result.mask, np.ones((3, 3)))
     assert (sizes == 4).sum() >= (1 if back == "open" else 2) * inside.sum()
     assert triangles_of(mesh) == set(
-        map(tuple, np.sort(_solid(result, back, 0).body.faces).tolist())
+        map(tuple, np.sort(_solid(result, back, 0).mesh.faces).tolist())
     )
 
 
