@@ -13,6 +13,7 @@ from .found_mask import FoundMask, MaskFinder
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
+_LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
 _HARD = 0.02  # of the largest value: closer to it, or to 0, masks of lossy files are, too
 
 
@@ -95,8 +96,11 @@ def find_mask(
     InputError
         If no mask is found.
     """
-    if raster.transparency is not None and not (finder is not None and finder.always):
-        return raster.transparency >= 0.5, "alpha"
+    looked_for = finder is not None and finder.always
+    if raster.transparency is not None and not looked_for:
+        opaque = raster.transparency >= 0.5
+        if float((~opaque).mean()) >= _LEFT_OUT:
+            return opaque, "alpha"
     light = finite_or_zero(largest(linear))
     if not (light > 0).any():
         raise InputError(

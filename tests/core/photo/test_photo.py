@@ -574,6 +574,15 @@ def test_alpha_comes_before_the_black_border(tmp_path: Path) -> None:
     assert photo.box == (12, 10, 26, 18) and photo.original.mask_from == "alpha"
 
 
+def test_an_alpha_channel_with_stray_pixels_is_no_mask(tmp_path: Path) -> None:
+    alpha = np.full((H, W), 255, np.uint8)
+    alpha[3, 4], alpha[:, 0] = 0, 250
+    path = saved(tmp_path / "a.png", Image.fromarray(np.dstack([codes() // 2 + 50, alpha])))
+    assert read_photo(path, whole_frame=True).original.mask_from == "whole frame"
+    with pytest.raises(InputError, match="there is no mask"):
+        read_photo(path)
+
+
 def test_black_border_fills_holes_and_drops_specks(tmp_path: Path) -> None:
     stored = np.zeros((200, 200, 3), np.uint8)
     stored[20:120, 20:120] = np.random.default_rng(0).integers(50, 90, (100, 100, 3))
