@@ -16,7 +16,7 @@ from ..photo.reading import photo_from_raster
 from .hints import Hints
 from .search import find_mask, find_masks, separate_parts
 
-LEAST_CONFIDENCE = 0.2  # least confidence of a mask that is used without being asked for
+LEAST_CONFIDENCE = 0.3  # least confidence of a mask that is used without being asked for
 _LIKELY = 0.5  # the same where the whole photo would do as well
 _SEVERAL = 0.3  # of the largest part: a second one as large is another object
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"

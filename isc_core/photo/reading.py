@@ -52,8 +52,8 @@ def read_photo(
 
     The mask is `mask_path` (inside: above half of its largest value, or its alpha channel where
     that is not opaque); else the photo's alpha channel (>= 0.5) where that leaves out a thousandth
-    of the photo or more; else, on a black border (at most 2/255 in sRGB), the pixels that are not black, with holes filled and
-    parts smaller than 1 % of the largest dropped.
+    of the photo or more; else, on a black border (at most 2/255 in sRGB), the pixels that are not
+    black, with holes filled and parts smaller than 1 % of the largest dropped.
 
     Parameters
     ----------
