@@ -7,11 +7,12 @@ lights.
 Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
 2015, doi:10.1109/TPAMI.2014.2377712.
 
-The way of an image: `recover` cuts out the object and brings it to one size (`problem.Problem`);
-`solver` minimises the objective over a `pyramid` of heights and a whitened light. The terms are in
+Pipeline: `recover` crops the object and resamples it to one size (`problem.Problem`); `solver`
+minimises the objective over a `pyramid` of heights and a whitened light. The terms are in
 `surface`, `reflectance`, `illumination` and `silhouette`; `numpy_engine` evaluates them in plain
-NumPy, `numba_engine` by compiled `kernels`, and tests compare the two. `settings` holds the weights
-and the starts, `priors` the statistics, `normal_prior` the expectation of predicted normals.
+NumPy, `numba_engine` by compiled `kernels`, and tests compare the two. `settings` contains the
+weights and the starting points, `priors` the statistics, `normal_prior` the term of predicted
+normals.
 
 Nothing is re-exported here: the function `recover.recover` would hide its module.
 """

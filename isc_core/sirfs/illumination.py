@@ -1,7 +1,7 @@
 """Light as second-order spherical harmonics of the normal in log shading, and its Gaussian prior.
 
 Equation: log shading_c = sum_k b_k(N) L_kc with N = (down, right, toward the viewer) and the nine
-functions b of the SIRFS reference. A logarithm may take any sign, so nothing is clamped.
+functions b of the SIRFS reference. A logarithm may have any sign, so nothing is clamped.
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712; the constants are those of R.
 Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317.
@@ -29,10 +29,10 @@ def light_cost(light: np.ndarray, prior: LightPrior, weight: float) -> tuple[flo
     cost : float
     gradient : (9, C) ndarray
     """
-    away = stack(light) - prior.mean
-    pull = np.einsum("ij,j->i", prior.precision, away)
-    scale = weight / away.size
-    return 0.5 * scale * float(away @ pull), unstack(scale * pull, light.shape[1])
+    difference = stack(light) - prior.mean
+    gradient = np.einsum("ij,j->i", prior.precision, difference)
+    scale = weight / difference.size
+    return 0.5 * scale * float(difference @ gradient), unstack(scale * gradient, light.shape[1])
 
 
 def stack(light: np.ndarray) -> np.ndarray:

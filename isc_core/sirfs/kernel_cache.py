@@ -1,14 +1,14 @@
-"""Whether the next solve has to compile its kernels first, and loading them ahead of it.
+"""Detects whether the next solve has to compile its kernels, and loads compiled ones in advance.
 
 Problem: Numba takes a quarter of a second to import, and as long again to load two dozen compiled
 kernels. None of it depends on the photo.
 
-Equation: a ball of a few pixels is solved for two steps, which call each kernel that a colour photo
-needs, with arrays of the same types. It is enlarged for that, as photos are made to fit: resampled
-masks are stored by columns.
+Method: a ball of a few pixels is solved for two steps, which call every kernel that a colour photo
+needs, with arrays of the same types. The ball is enlarged first, as small photos are: resampled
+masks are stored in column order.
 
-Limits: other kernels, those of grey photos, of depth, and of photos that fit already, are loaded
-when they are called.
+Limits: other kernels (for grey photos, depth, and photos that need no resampling) are loaded at
+their first call.
 """
 
 import sys
@@ -35,7 +35,7 @@ _TWO_STEPS = LbfgsOptions(iterations=2)
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
-    """Report a stage of its own if the next solve will compile its kernels first.
+    """Report compilation as a separate stage if the next solve has to compile its kernels.
 
     Compilation takes about 20 s, during which the solver would seem to hang. Call this before the
     first solve: it also makes sure that the kernels work where no cache folder can be written.
@@ -69,12 +69,12 @@ def kernels_compiled() -> bool:
 
 @cache
 def load_kernels(illumination: str) -> None:
-    """Load what a solve of a colour photo needs; once a process, and only what was compiled before.
+    """Load the tables and compiled kernels that a colour photo needs, once per process.
 
     Parameters
     ----------
     illumination : str
-        One of `priors.prior_set.ILLUMINATIONS`: its tables are made, too.
+        One of `priors.prior_set.ILLUMINATIONS`, whose tables are built, too.
     """
     priors, weights = shipped_priors(illumination, 3), isc_weights(illumination, 3)
     if shipped_library() is not None or not numba_available() or not kernels_compiled():

@@ -1,15 +1,15 @@
 """Predicted normals as a soft term of SIRFS' shape.
 
-Problem: shading alone leaves many shapes; a network predicts the mean and the deviation of each
-normal from the whole photo, and SIRFS can expect them.
+Problem: shading alone is ambiguous; a network predicts the mean and the deviation of each normal
+from the whole photo, and this term draws the shape toward them.
 
 Equation: with the normal's part in the image plane t = (N1, N2), the predicted mean m and the
 deviation s of each component,
   cost = w/n_v * sum over valid pixels of |t - m|^2 / (2 s^2).
-The term of the `silhouette` stays beside it.
+The term of the `silhouette` is kept.
 
-The solver can start from the shape that the normals add up to: m is averaged over blocks of pixels,
-as the network is coarser than the solver, and the slopes of the blocks are integrated in least
+The solver can start from the integrated normals: m is averaged over blocks of pixels, since the
+network's resolution is below the solver's, and the slopes of the blocks are integrated by least
 squares. Where normals are uncertain, m is short and the shape is flat.
 
 Citation: the quadratic term of a Gaussian likelihood; integration: B. K. P. Horn, M. J. Brooks,
@@ -17,7 +17,7 @@ Citation: the quadratic term of a Gaussian likelihood; integration: B. K. P. Hor
 doi:10.1016/0734-189X(86)90114-3.
 
 Limits: s is the deviation of one pixel, while errors of neighbours are correlated; w compensates
-for that on average. The shape is one sheet: jumps of depth become slopes.
+for that on average. The surface is continuous: depth discontinuities become slopes.
 """
 
 import numpy as np
@@ -29,8 +29,8 @@ from ..imaging.framing import continued_height
 from ..scene.normal_estimate import NormalEstimate
 from .silhouette import ExpectedNormals
 
-_STEEPEST = 0.95  # largest in-plane part of a block's normal
-_TOLERANCE = 1e-3  # of the integration: the solver goes on from there
+_MAX_IN_PLANE = 0.95  # largest in-plane part of a block's normal
+_TOLERANCE = 1e-3  # of the integration: the solver refines its result
 
 
 def normals_from_prediction(
@@ -43,7 +43,7 @@ def normals_from_prediction(
     predicted : NormalEstimate or None
         Camera frame, (H, W).
     mask : (H, W) bool ndarray
-        The object; where it reaches beyond the prediction, the nearest predicted normal continues.
+        The object; outside the prediction, the nearest predicted normal is used.
 
     Returns
     -------
@@ -64,12 +64,12 @@ def normals_from_prediction(
 
 
 def predicted_height(predicted: ExpectedNormals, mask: np.ndarray, block: int) -> np.ndarray:
-    """Return the height that predicted normals add up to, in blocks of pixels.
+    """Integrate predicted normals over blocks of pixels.
 
     Parameters
     ----------
     predicted : ExpectedNormals
-        Of `normals_from_prediction`.
+        From `normals_from_prediction`.
     mask : (H, W) bool ndarray
         The object, not empty.
     block : int
@@ -78,13 +78,14 @@ def predicted_height(predicted: ExpectedNormals, mask: np.ndarray, block: int) -
     Returns
     -------
     (ceil(H / block), ceil(W / block)) ndarray
-        Toward the viewer, in blocks, of mean 0 on each part of the object; continued beyond it.
+        Height toward the viewer, in blocks, with mean 0 on each connected part of the object;
+        extrapolated outside it.
     """
     normal = np.stack([predicted.down, predicted.right], axis=2)
     means, cover = padded_means_inside(normal, mask, block)
     inside = cover >= min(0.5, float(cover.max()))
     down, right = means[..., 0], means[..., 1]
-    shrink = np.minimum(1, _STEEPEST / np.maximum(np.hypot(down, right), 1e-6))
+    shrink = np.minimum(1, _MAX_IN_PLANE / np.maximum(np.hypot(down, right), 1e-6))
     toward = np.sqrt(1 - shrink**2 * (down**2 + right**2))
     slope_down, slope_right = -shrink * down / toward, -shrink * right / toward
     step_down, step_right = np.zeros((2, *cover.shape))

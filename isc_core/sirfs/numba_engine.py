@@ -1,7 +1,7 @@
-"""The SIRFS objective on compiled kernels and a few threads: the engine for production.
+"""The SIRFS objective with compiled kernels on several threads: the production engine.
 
 Determinism: rows are split into blocks whose number depends on the image alone, and every sum is
-taken in a fixed order, so the result is the same to the byte on one thread or many.
+taken in a fixed order, so the result is the same to the byte on any number of threads.
 """
 
 from collections.abc import Callable
@@ -24,14 +24,14 @@ from .kernels import (
     height_rows,
     pixel_pairs,
 )
-from .precision import strength_of
+from .precision import scaled_precision
 from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
-from .shading_term import ExpectedShading, best_offsets
+from .shading_term import ExpectedShading, optimal_offsets
 from .silhouette import ExpectedNormals
 
-_ROWS_A_BLOCK = 16
-_MOST_BLOCKS = 16
+_ROWS_PER_BLOCK = 16
+_MAX_BLOCKS = 16
 _MONOMIAL_SCALES = np.array([C4, 2 * C2, 2 * C2, 2 * C2, 2 * C1, 2 * C1, C3, 2 * C1, C1])
 
 
@@ -50,15 +50,15 @@ def _unfold_light_gradient(sums: np.ndarray) -> np.ndarray:
 
 
 def _from_zero(table: TabulatedPotential) -> tuple[float, np.ndarray]:
-    """The part of `table` that arguments above 0 need: its first node, and its costs."""
+    """The part of `table` for arguments above 0: its first node, and its costs."""
     first = min(max(int(np.floor(-table.low / table.step)), 0), len(table.values) - 2)
     return table.low + first * table.step, table.values[first:]
 
 
 def _pairs(low: float, step: float, costs: np.ndarray, dtype: np.dtype[Any]) -> pixel_pairs.Pairs:
     """The pairs with a tabulated potential, in `dtype`."""
-    # differences are taken before rounding: two large float32 costs would leave nothing of a small
-    # slope
+    # Differences are taken before rounding: between two large float32 costs, a small slope would
+    # be lost.
     return pixel_pairs.Pairs(
         np.array(PAIR_OFFSETS, np.int64),
         costs.astype(dtype),
@@ -92,7 +92,9 @@ class _NormalsTerm:
         self, valid: np.ndarray, field: ExpectedNormals, weight: float, dtype: np.dtype[Any]
     ) -> None:
         self._expected = np.ascontiguousarray([field.down, field.right], dtype)
-        self._strength = np.ascontiguousarray(strength_of(field.precision, valid, weight), dtype)
+        self._strength = np.ascontiguousarray(
+            scaled_precision(field.precision, valid, weight), dtype
+        )
         self._sums = np.zeros(len(valid))
 
     def rows(self, geometry: np.ndarray, gradient: np.ndarray, first: int, last: int) -> None:
@@ -105,7 +107,7 @@ class _NormalsTerm:
 
 
 class _ShadingTerm:
-    """The term of the expected shading, and its gradient joined with that of the palette.
+    """The term of the expected shading, and its gradient added to that of the palette.
 
     Parameters
     ----------
@@ -117,16 +119,16 @@ class _ShadingTerm:
     def __init__(self, problem: Problem, expected: ExpectedShading, dtype: np.dtype[Any]) -> None:
         valid, weights = problem.valid, problem.weights
         channels = expected.mean.shape[2]
-        strength = strength_of(expected.precision, valid, weights.predicted_shading, channels)
+        strength = scaled_precision(expected.precision, valid, weights.predicted_shading, channels)
         self._total, self._strength = float(strength.sum()), strength.astype(dtype, order="C")
         self._balanced = weights.balanced_colour
         self._mean = np.ascontiguousarray(expected.mean.transpose(0, 2, 1), dtype)
         self._spans = _spans(valid)
         whiten = np.eye(channels) if problem.shading_only else problem.priors.parsimony_whiten
-        # reflectance is image less shading, hence the sign
+        # log reflectance = log image - log shading, hence the sign
         self._back = np.ascontiguousarray(-solve_linear(whiten, np.eye(channels)).T, dtype)
         self._residual, self.joined = np.zeros((2, *self._mean.shape), dtype)
-        self._away, self._sums = np.zeros((len(valid), channels)), np.zeros(len(valid))
+        self._residual_sums, self._sums = np.zeros((len(valid), channels)), np.zeros(len(valid))
 
     def residuals(self, geometry: np.ndarray, light: np.ndarray, first: int, last: int) -> None:
         expected_shading.residual_rows(
@@ -138,14 +140,14 @@ class _ShadingTerm:
             self._mean,
             self._strength,
             self._residual,
-            self._away,
+            self._residual_sums,
         )
 
     def offsets(self) -> np.ndarray:
-        found = best_offsets(self._away.sum(axis=0), self._total, self._balanced)
+        found = optimal_offsets(self._residual_sums.sum(axis=0), self._total, self._balanced)
         return found.astype(self._mean.dtype)
 
-    def pulls(self, offsets: np.ndarray, palette: np.ndarray, first: int, last: int) -> None:
+    def gradients(self, offsets: np.ndarray, palette: np.ndarray, first: int, last: int) -> None:
         expected_shading.pull_rows(
             first,
             last,
@@ -206,13 +208,13 @@ class NumbaEngine:
             else (p.priors.smoothness_whiten, p.priors.parsimony_whiten)
         )
         self._whiten = arrays.Reflectance(*(np.ascontiguousarray(m, t) for m in whiten))
-        # the softened difference is positive: float32 finds its cell more exactly when the table
-        # starts at 0
+        # The softened difference is positive: in float32, its cell is more exact if the table
+        # starts at 0.
         low, costs = _from_zero(p.priors.curvature)
         self._curvature_pairs = _pairs(low, p.priors.curvature.step, costs, t)
         smoothness = p.priors.smoothness
         self._smooth_pairs = _pairs(smoothness.low, smoothness.step, smoothness.values, t)
-        count = min(_MOST_BLOCKS, max(1, height // _ROWS_A_BLOCK))
+        count = min(_MAX_BLOCKS, max(1, height // _ROWS_PER_BLOCK))
         edges = [height * k // count for k in range(count + 1)]
         self._blocks = list(zip(edges[:-1], edges[1:], strict=True))
 
@@ -220,7 +222,7 @@ class NumbaEngine:
         t = self.dtype
         height, width = self.problem.valid.shape
         channels, blocks = self.problem.log_image.shape[2], len(self._blocks)
-        # float64: in float32 the rounding of heights would drown their curvature
+        # float64: in float32, rounding of the heights would dominate their curvature
         self._padded = np.empty((height + 2, width + 2))
         self._surface = arrays.Surface(
             np.zeros((height, 9, width), t), np.zeros((height, width), t), np.empty(height)
@@ -276,9 +278,9 @@ class NumbaEngine:
         p = self.problem
         self._pad(height)
         folded = _fold_light(np.asarray(light, float)).astype(self.dtype, order="C")
-        self._each_share(partial(self._forward, folded))
+        self._for_row_ranges(partial(self._forward, folded))
         if not (np.isfinite(self._surface.slant).all() and np.isfinite(folded).all()):
-            # a step too far: kernels that look up tables must not see NaN or infinity
+            # The step was too long; NaN or infinity must not reach the table look-ups.
             return Evaluation(
                 Terms(slant=float("inf")), np.zeros(height.shape, self.dtype), np.zeros(light.shape)
             )
@@ -287,25 +289,25 @@ class NumbaEngine:
         self._workers.run(tasks)
         self._add_spills()
         offsets = None if self._shading is None else self._shading.offsets()
-        self._each_share(partial(self._backward, folded, offsets))
+        self._for_row_ranges(partial(self._backward, folded, offsets))
         self._workers.run(
             [
                 partial(height_rows.adjoint_rows, a, b, self._backward_out.derivatives, self._wide)
-                for a, b in self._shares(len(self._wide))
+                for a, b in self._row_ranges(len(self._wide))
             ]
         )
         gradient = fold_border(self._wide)
         light_gradient = _unfold_light_gradient(self._backward_out.light.sum(axis=0))
-        cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
+        cost, prior_gradient = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
         terms = self._palette_terms | {"contour": self._contour, "light": cost}
         terms |= self._pair_terms()
         terms |= {name: term.cost() for name, term in self._normals.items()}
         if self._shading is not None:
             terms["predicted_shading"] = self._shading.cost()
         if p.observation is not None:
-            terms["observation"], pull_height = surface.observation_cost(height, p.observation)
-            gradient += pull_height.astype(self.dtype)
-        return Evaluation(Terms(**terms), gradient, light_gradient + pull)
+            terms["observation"], d_height = surface.observation_cost(height, p.observation)
+            gradient += d_height.astype(self.dtype)
+        return Evaluation(Terms(**terms), gradient, light_gradient + prior_gradient)
 
     def _pad(self, height: np.ndarray) -> None:
         z = self._padded
@@ -313,18 +315,18 @@ class NumbaEngine:
         z[0], z[-1] = z[1], z[-2]
         z[:, 0], z[:, -1] = z[:, 1], z[:, -2]
 
-    def _each_share(self, task: Callable[[int, int], None]) -> None:
+    def _for_row_ranges(self, task: Callable[[int, int], None]) -> None:
         self._workers.run(
-            [partial(task, a, b) for a, b in self._shares(self.problem.valid.shape[0])]
+            [partial(task, a, b) for a, b in self._row_ranges(self.problem.valid.shape[0])]
         )
 
-    def _shares(self, rows: int) -> list[tuple[int, int]]:
-        """Rows for kernels whose result does not depend on the split: one share a thread."""
+    def _row_ranges(self, rows: int) -> list[tuple[int, int]]:
+        """Rows for kernels whose result does not depend on the split: one range per thread."""
         n = self._workers.threads
         return [(rows * k // n, rows * (k + 1) // n) for k in range(n)]
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
-        """All that a row needs of its neighbours' heights alone."""
+        """Quantities of a row that depend only on the heights of neighbouring rows."""
         height_rows.forward_rows(
             first,
             last,
@@ -403,7 +405,7 @@ class NumbaEngine:
         )
 
     def _palette_in_numpy(self) -> None:
-        """Grey photos and shape-from-shading mode, where these terms cost next to nothing."""
+        """Grey photos and shape-from-shading mode, where these terms take hardly any time."""
         p, w = self.problem, self.problem.weights
         values = self._reflectance.palette.transpose(0, 2, 1)
         if p.shading_only:
@@ -459,7 +461,7 @@ class NumbaEngine:
     ) -> None:
         pulls = self._pulls
         if self._shading is not None and offsets is not None:
-            self._shading.pulls(offsets, pulls.palette, first, last)
+            self._shading.gradients(offsets, pulls.palette, first, last)
             pulls = pulls._replace(palette=self._shading.joined)
         height_rows.backward_rows(
             first,

@@ -1,4 +1,4 @@
-"""The SIRFS objective in plain NumPy: always available, and the reference of the compiled
+"""The SIRFS objective in plain NumPy: always available, and the reference for the compiled
 engine.
 """
 
@@ -53,22 +53,22 @@ class NumpyEngine:
         d_shading = -d_reflectance
         if p.predicted_shading is not None:
             w = p.weights
-            reflectance_terms["predicted_shading"], pull_shading = shading_cost(
+            reflectance_terms["predicted_shading"], shading_gradient = shading_cost(
                 log_shading,
                 p.predicted_shading,
                 p.valid,
                 w.predicted_shading,
                 balanced=w.balanced_colour,
             )
-            d_shading = d_shading + pull_shading
+            d_shading = d_shading + shading_gradient
         light_gradient = np.einsum("khw,hwc->kc", functions, d_shading, dtype=float)
         d1, d2, d3 = basis_adjoint(
             g.n1, g.n2, g.n3, np.einsum("hwc,kc->khw", d_shading, light.astype(self.dtype))
         )
         shape_terms, height_gradient = self._shape(height, g, d1, d2, d3)
-        cost, pull = light_cost(light.astype(float), p.priors.light, p.weights.light)
+        cost, prior_gradient = light_cost(light.astype(float), p.priors.light, p.weights.light)
         terms = Terms(**reflectance_terms, **shape_terms, light=cost)
-        return Evaluation(terms, height_gradient, light_gradient + pull)
+        return Evaluation(terms, height_gradient, light_gradient + prior_gradient)
 
     def _reflectance(self, log_reflectance: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
         p, w = self.problem, self.problem.weights
@@ -121,6 +121,6 @@ class NumpyEngine:
             d1, d2 = d1 + e1, d2 + e2
         gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
         if p.observation is not None:
-            terms["observation"], pull = surface.observation_cost(height, p.observation)
-            gradient = gradient + pull
+            terms["observation"], d_height = surface.observation_cost(height, p.observation)
+            gradient = gradient + d_height
         return terms, gradient

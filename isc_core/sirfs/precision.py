@@ -1,12 +1,12 @@
-"""Precisions of expected values as factors of a term's half squares."""
+"""Precisions of expected values, scaled by the weight of their term."""
 
 import numpy as np
 
 
-def strength_of(
+def scaled_precision(
     precision: np.ndarray, valid: np.ndarray, weight: float, channels: int = 1
 ) -> np.ndarray:
-    """Return the factor of each pixel's half squares in a mean over valid pixels and channels.
+    """Scale precisions by a term's weight over the number of valid pixels and channels.
 
     Parameters
     ----------

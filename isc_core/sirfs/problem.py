@@ -37,7 +37,7 @@ class Problem:
     log_image : (H, W, C) ndarray
         Natural logarithm of linear intensities, 0 where not `valid`.
     valid : (H, W) bool ndarray
-        Pixels whose values count.
+        Pixels whose values are used.
     mask : (H, W) bool ndarray
         The object.
     contour : Contour
@@ -49,7 +49,7 @@ class Problem:
     shading_only : bool
         Shape-from-shading mode: the reflectance is one unknown colour.
     silhouette : SilhouetteNormals or None
-        Normals that the silhouette suggests.
+        Normals expected from the silhouette.
     pixel_weight : (H, W) ndarray or None
         Weight of a valid pixel in the reflectance terms, in [0, 1] and not 0 everywhere; a pair
         counts with the product. None: 1.
@@ -78,7 +78,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Terms:
-    """Weighted terms of the objective at one state, one attribute a term."""
+    """Weighted terms of the objective at one point, one attribute per term."""
 
     curvature: float = 0.0
     contour: float = 0.0

@@ -1,9 +1,10 @@
-"""Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser moves all
-scales at once.
+"""Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser updates
+all scales at once.
 
-Equation: Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8)
-along each axis with replicated edges, then every second sample. The gradient of y_1 is dZ, that of
-y_{k+1} is D dy_k. A step up doubles heights, since pixels are half as large.
+Equation: Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D the downsampling by one level: the filter
+(1,3,3,1)/sqrt(8) along each axis with replicated edges, then decimation by two. The gradient of y_1
+is dZ, that of y_{k+1} is D dy_k. Upsampling by one level doubles heights, since pixels are half as
+large.
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 
@@ -41,7 +42,7 @@ def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tupl
 
 
 def down(fine: np.ndarray) -> np.ndarray:
-    """Take one step down.
+    """Downsample by one level.
 
     Parameters
     ----------

@@ -1,18 +1,18 @@
 """Shape and illumination of one masked diffuse image: sets up the SIRFS problem, solves it, and
-brings the result back to the image's scale.
+resamples the result to the image's scale.
 
-Problem: the priors are statistics per pixel, so the answer would depend on the photo's scale and on
+Problem: the priors are statistics per pixel, so the result would depend on the photo's scale and on
 the empty space around the object. The object is therefore resampled to one size
 (`RecoverOptions.solve_size`), and a window around its bounding box with a fixed margin is solved.
-Where that enlarges it, the averages over its pixels stay (`imaging.area_enlarge`): interpolation
-that blurs would change the differences between neighbours.
-Where priors were fitted at the size given, a larger object is then solved at that size, too, from
-what was found (`RecoverOptions.to_own_size`).
+If this enlarges it, the average over each pixel is preserved (`imaging.area_enlarge`): a blurring
+interpolation would change the differences between neighbours. Where the priors were fitted at the
+size of the image, a larger object is then solved again at that size, starting from the first result
+(`RecoverOptions.refine_at_full_size`).
 
 Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: one object; detail finer than the size that is solved allows is not in the height.
+Limits: one object; the height lacks detail finer than a pixel of the size that is solved.
 """
 
 from dataclasses import dataclass, field, replace
@@ -41,18 +41,19 @@ SOLVE_SIZE = 256
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """How the problem is cut out of the image, and how it is solved.
+    """Options of the window, the scale and the solver.
 
     Attributes
     ----------
     solve_size : int
-        Long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
+        Long side of the object's bounding box, in pixels, at which SIRFS is solved; 0 for the
+        image's own.
     margin : int
         Pixels of empty space around the box at that size.
-    to_own_size : bool
-        Solve a larger object at the size given, too, from what is found at `solve_size`.
+    refine_at_full_size : bool
+        Solve a larger object again at its own size, starting from the result at `solve_size`.
     whole_frame : bool
-        Solve the frame as given instead of a window around the object. The height then is returned
+        Solve the frame as given instead of a window around the object. The height is then returned
         as solved, not shifted to a mean of 0.
     drop_near_edge : bool
         Ignore occluding-contour points near the frame, see `occluding_contour`.
@@ -64,7 +65,7 @@ class RecoverOptions:
 
     solve_size: int = SOLVE_SIZE
     margin: int = MARGIN
-    to_own_size: bool = False
+    refine_at_full_size: bool = False
     whole_frame: bool = False
     drop_near_edge: bool = False
     shading_only: bool = False
@@ -89,7 +90,7 @@ class Recovered:
     reason : str
         Why the optimiser stopped, see `LbfgsResult`.
     converged : bool
-        Whether it stopped because there was no more to gain.
+        Whether it stopped because the loss no longer decreased.
     solved_shape : tuple of int
         Shape of the window that was solved.
     """
@@ -126,7 +127,7 @@ def recover(
     image : (H, W, C) ndarray
         Linear diffuse image, C = `priors.channels`.
     mask : (H, W) bool ndarray
-        Pixels whose values count.
+        Pixels whose values are used.
     floor : float
         Smallest intensity; lower ones are raised to it, in the logarithm only.
     priors : Priors
@@ -138,9 +139,9 @@ def recover(
     pixel_weight : (H, W) ndarray, optional
         In [0, 1], see `Problem`.
     predicted_normals : NormalEstimate, optional
-        Expected normals; by default, those that the silhouette suggests.
+        Predicted normals.
     predicted_shading : ShadingEstimate, optional
-        Expected log shading.
+        Predicted log shading.
     silhouette : (H, W) bool ndarray, optional
         The object's silhouette, if it differs from `mask`.
     known : SceneConstraints, optional
@@ -158,7 +159,7 @@ def recover(
         If the user asked to stop.
     """
     options, monitor = options or RecoverOptions(), monitor or Monitor()
-    known, base = _levelled(known or SceneConstraints(), mask)
+    known, base = _with_centred_depth(known or SceneConstraints(), mask)
     window, factor = _window(mask, options)
     inputs = SolveInputs(
         image,
@@ -174,17 +175,17 @@ def recover(
     fixed = None
     if known.height is not None:
         fixed = _scaled_height(window.cut_replicated(known.height), factor)
-    again = options.to_own_size and factor < 1 and fixed is None
+    refine = options.refine_at_full_size and factor < 1 and fixed is None
     result = solve(
         problem,
         options.solver,
         known_height=fixed,
         known_light=known.light,
-        monitor=monitor.part(0, 0.5 if again else 1),
+        monitor=monitor.part(0, 0.5 if refine else 1),
     )
-    if again:
+    if refine:
         problem = _problem(inputs, floor, priors, weights, options)
-        result = _solved_again(problem, result, options.solver, known.light, monitor.part(0.5, 1))
+        result = _solve_finer(problem, result, options.solver, known.light, monitor.part(0.5, 1))
     if known.height is not None:
         height = window.cut_replicated(known.height)
     else:
@@ -194,14 +195,14 @@ def recover(
     return _recovered(result, window.put(height, mask.shape), problem.valid.shape)
 
 
-def _solved_again(
+def _solve_finer(
     problem: Problem,
     before: SirfsResult,
     options: SolverOptions,
     known_light: np.ndarray | None,
     monitor: Monitor,
 ) -> SirfsResult:
-    """Solve a finer problem from the result of a coarser one; evaluations are of both."""
+    """Solve a finer problem from the result of a coarser one; evaluations are summed."""
     start = resample_height(before.height, problem.valid.shape), before.light
     found = solve(problem, options, known_light=known_light, start=start, monitor=monitor)
     return replace(
@@ -224,10 +225,12 @@ def _recovered(result: SirfsResult, height: np.ndarray, solved_shape: tuple[int,
     )
 
 
-def _levelled(known: SceneConstraints, mask: np.ndarray) -> tuple[SceneConstraints, float]:
-    """The constraints with the depth inside the mask alone and less its median, and the median.
+def _with_centred_depth(
+    known: SceneConstraints, mask: np.ndarray
+) -> tuple[SceneConstraints, float]:
+    """The constraints with depth inside the mask only, minus its median; and the median.
 
-    A sensor's distances are large, and float32 is short.
+    The distances of a sensor are large compared with the precision of float32.
     """
     if known.depth is None:
         return known, 0.0
@@ -272,7 +275,7 @@ def _problem(
 
 
 def _inside_photo(contour: Contour, photo: np.ndarray) -> Contour:
-    """The contour points in the photo: those of an object continued beyond it are invented."""
+    """The contour points inside the photo; beyond it, the contour is extrapolated."""
     keep = photo[contour.rows, contour.columns]
     return Contour(
         contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep]

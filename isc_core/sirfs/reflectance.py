@@ -65,15 +65,15 @@ def smoothness_cost(
         )
         if priors.channels == 1:
             cost, slope = priors.smoothness.evaluate(difference[:, 0])
-            pull = (counts * slope)[:, None]
+            pair_gradient = (counts * slope)[:, None]
         else:
             m = np.einsum("kc,kc->k", difference, difference) / 2
             soft = np.sqrt(m * m + t(SOFT_SQUARE))
             cost, slope = priors.smoothness.evaluate(soft)
-            pull = (counts * slope * m / soft)[:, None] * difference
+            pair_gradient = (counts * slope * m / soft)[:, None] * difference
         total += float((counts * cost).sum(dtype=float))
-        gradient[p][both] += pull
-        gradient[q][both] -= pull
+        gradient[p][both] += pair_gradient
+        gradient[q][both] -= pair_gradient
     n = pixel_weight.size
     scale = weight * 3 / (25 * n * priors.channels)
     return scale * total, (gradient @ priors.smoothness_whiten.T.astype(gradient.dtype)) * t(scale)
@@ -234,10 +234,10 @@ def palette_cost(
     whiten, valid = priors.parsimony_whiten, pixel_weight > 0
     samples = log_reflectance[valid].astype(float) @ whiten.T
     where = splat(samples, priors.absolute)
-    share = pixel_weight[valid].astype(float)
-    count = float(share.sum())
+    sample_weight = pixel_weight[valid].astype(float)
+    count = float(sample_weight.sum())
     size = int(np.prod(where.shape))
-    counts = np.bincount(where.index.ravel(), (where.weight * share).ravel(), size).reshape(
+    counts = np.bincount(where.index.ravel(), (where.weight * sample_weight).ravel(), size).reshape(
         where.shape
     )
     taps = parzen_taps(weights.parsimony_sigma / SIGMA_UNIT, where.step, count, priors.channels)
@@ -248,7 +248,7 @@ def palette_cost(
     scale = weights.absolute / (ABSOLUTE_DIVISOR * count)
     node_gradient = (-2 * weights.parsimony / overlap) * blurred + scale * costs
     gradient = np.zeros_like(log_reflectance)
-    gradient[valid] = (share[:, None] * gather_gradient(where, node_gradient)) @ whiten
+    gradient[valid] = (sample_weight[:, None] * gather_gradient(where, node_gradient)) @ whiten
     return (
         -weights.parsimony * float(np.log(overlap)),
         scale * float((costs * counts).sum()),
@@ -274,8 +274,11 @@ def one_color_cost(
     gradient : (H, W, C) ndarray
     """
     valid = pixel_weight > 0
-    away, share = log_reflectance[valid].astype(float), pixel_weight[valid].astype(float)[:, None]
-    away = away - (share * away).sum(axis=0) / share.sum()
+    residual = log_reflectance[valid].astype(float)
+    sample_weight = pixel_weight[valid].astype(float)[:, None]
+    residual = residual - (sample_weight * residual).sum(axis=0) / sample_weight.sum()
     gradient = np.zeros_like(log_reflectance)
-    gradient[valid] = share * away * (weight / share.sum())
-    return weight / (2 * float(share.sum())) * float((share * away * away).sum()), gradient
+    gradient[valid] = sample_weight * residual * (weight / sample_weight.sum())
+    return weight / (2 * float(sample_weight.sum())) * float(
+        (sample_weight * residual * residual).sum()
+    ), gradient

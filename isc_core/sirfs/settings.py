@@ -1,4 +1,4 @@
-"""Weights of the terms of the SIRFS objective, and where the solver starts.
+"""Weights of the terms of the SIRFS objective, and the solver's starting points.
 
 The three published weight sets are those of the SIRFS release 1.5 (Barron & Malik 2015,
 doi:10.1109/TPAMI.2014.2377712), as printed with it. Grey photos in natural light have no published
@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Start:
-    """Where the solver starts (ours; published: a flat shape and no light).
+    """Starting point of the solver (ours; the published one is a flat shape without light).
 
     Attributes
     ----------
@@ -19,10 +19,10 @@ class Start:
         Factor on the dome of the expected normals (`silhouette.ExpectedNormals`), if the problem
         has one and no depth was observed.
     light : float
-        Factor on the log light that the priors expect.
+        Factor on the mean log light of the priors.
     predicted : bool
-        In place of the dome, the shape that the predicted normals add up to, if the problem has any
-        and no depth was observed.
+        Use the height integrated from the predicted normals instead of the dome, if the problem has
+        any and no depth was observed.
     """
 
     dome: float = 0.0
@@ -55,15 +55,15 @@ class Weights:
     contour_power : float
         Power of the contour term's penalty.
     silhouette : float
-        Normals are as the silhouette suggests (ours; not in the published sets).
+        Normals are near those expected from the silhouette (ours; not in the published sets).
     shading_only : float
         In shape-from-shading mode, the reflectance is one colour.
     predicted_normals, predicted_shading : float
         Normals and shading are near the predicted ones (ours).
     balanced_colour : bool
-        Whether the predicted shading also says the colour of the light, see `shading_term`.
+        Whether the predicted shading also determines the colour of the light, see `shading_term`.
     starts : tuple of Start
-        At least one; each is tried, and the one with the lowest loss goes on.
+        At least one; each is tried, and the one with the lowest loss is continued.
     """
 
     smoothness: float
@@ -132,7 +132,7 @@ ISC_GREY_PHOTO = ISC_GREY_NATURAL
 
 @dataclass(frozen=True)
 class PredictionWeights:
-    """How far SIRFS trusts what was predicted from the photo.
+    """Weights of the quantities that are predicted from the photo.
 
     Attributes
     ----------
@@ -143,9 +143,9 @@ class PredictionWeights:
     light_temperature : float
         Factor of the predicted light's covariance (`priors.light_posterior`).
     starts : tuple of Start
-        Where normals are predicted, the solver starts here.
+        Starting points where normals are predicted.
     loss_tolerance : float
-        The optimiser's where both normals and light are predicted, see `LbfgsOptions`.
+        Of the optimiser where both normals and light are predicted, see `LbfgsOptions`.
     """
 
     normals: float
@@ -173,7 +173,7 @@ class PredictionWeights:
         weights : Weights
             The changed set.
         loss_tolerance : float or None
-            The optimiser's; None for its own.
+            Of the optimiser; None for its default.
         """
         if shading:
             weights = replace(
@@ -191,14 +191,14 @@ class PredictionWeights:
         return weights, self.loss_tolerance if light else None
 
 
-# Chosen on half of the held-out bodies and reported on the other (`benchmarks.sirfs.
-# prediction_weights`), MIT-Berkeley being only looked at afterwards; docs/methods/scene_network.md
-# has both. They belong to the network. This start and tolerance take a quarter of the evaluations
-# of the usual ones, see "Fewer evaluations" in the research log.
+# Chosen on half of the held-out bodies and reported on the other half (`benchmarks.sirfs.
+# prediction_weights`), with MIT-Berkeley evaluated only afterwards; docs/methods/scene_network.md
+# has both. They are specific to the shipped network. This start and tolerance need a quarter of the
+# evaluations of the default ones, see "Fewer evaluations" in the research log.
 PHOTO_PREDICTIONS = PredictionWeights(
     2.0, 4.0, True, 1.0, (Start(light=1, predicted=True),), loss_tolerance=2e-3
 )
-# Of the data set's objects the priors know shapes and lights; little is left to predict.
+# The priors are fitted to the data set's shapes and lights; predictions add little.
 DATASET_PREDICTIONS = PredictionWeights(0.2, 0.2, False, 4.0, ISC_NATURAL.starts)
 
 
@@ -218,7 +218,7 @@ class LightColourWeight:
     weight: float
 
     def variance(self, weights: Weights, channels: int) -> float:
-        """Return the variance that gives this cost within the light's own term.
+        """Return the variance that gives this cost within the term of the light.
 
         Parameters
         ----------
@@ -233,13 +233,13 @@ class LightColourWeight:
         return self.deviation**2 * weights.light / (9 * channels) / self.weight
 
 
-# The deviation is what white balance leaves, and the light's change of colour over the sphere; the
-# weight was chosen on held-out bodies. docs/methods/light_colour.md has both.
+# The deviation comprises errors of white balance and the light's change of colour over the sphere;
+# the weight was chosen on held-out bodies. docs/methods/light_colour.md has both.
 BALANCED_LIGHT = LightColourWeight(0.12, 3.0)
 
 
 def prediction_weights(illumination: str) -> PredictionWeights:
-    """Return how far predictions are trusted.
+    """Return the weights of predictions.
 
     Parameters
     ----------

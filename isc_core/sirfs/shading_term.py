@@ -1,14 +1,14 @@
 """Predicted log shading as a soft term of the SIRFS objective.
 
-Problem: a network sees in the whole photo what is shading and what is print, which the priors of
+Problem: from the whole photo, a network can distinguish shading from printed patterns; priors on
 neighbouring pixels cannot.
 
 Equation: with the log shading S_c of the current normals and light, the predicted mean m_c and the
 deviation s of each of n valid pixels and C channels,
   cost = w/(n C) * sum over pixels and channels of (S_c - m_c - k_c)^2 / (2 s^2).
-Brightness cannot be told from albedo, so k is free: one constant for photos of balanced colours,
-one for each channel where the light may have any colour. At its optimum, the mean of S - m weighted
-by 1 / s^2, the derivative by k is 0, so
+Brightness and albedo are ambiguous, so k is free: one constant for white-balanced photos, one for
+each channel where the light may have any colour. At its optimum, the mean of S - m weighted by 1 /
+s^2, the derivative with respect to k is 0, so
   d cost / d S_c = w/(n C) * (S_c - m_c - k_c) / s^2.
 
 Citation: none; the quadratic term of a Gaussian likelihood with unknown constants profiled out.
@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..scene.shading_estimate import ShadingEstimate
-from .precision import strength_of
+from .precision import scaled_precision
 
-_LEAST_DEVIATION = 0.03  # of log shading: nobody knows it better, and 1 / s^2 stays bounded
+_MIN_DEVIATION = 0.03  # of log shading: predictions are not more accurate; bounds 1 / s^2
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class ExpectedShading:
 
 
 def expected_shading(estimate: ShadingEstimate | None, channels: int) -> ExpectedShading | None:
-    """Return what a prediction lets the solver expect.
+    """Convert a prediction to an expectation of the solver.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def expected_shading(estimate: ShadingEstimate | None, channels: int) -> Expecte
     if estimate is None:
         return None
     known = estimate.deviation > 0
-    deviation = np.maximum(np.where(known, estimate.deviation, 1.0), _LEAST_DEVIATION)
+    deviation = np.maximum(np.where(known, estimate.deviation, 1.0), _MIN_DEVIATION)
     mean = np.where(known[..., None], estimate.log_shading, 0.0)
     return ExpectedShading(
         mean if channels == 3 else mean.mean(axis=2, keepdims=True),
@@ -96,23 +96,25 @@ def shading_cost(
         With respect to the log shading.
     """
     t = log_shading.dtype
-    strength = strength_of(expected.precision, valid, weight, log_shading.shape[2])
-    away = log_shading - expected.mean.astype(t)
-    sums = (strength[..., None] * away).sum(axis=(0, 1), dtype=float)
-    away = away - best_offsets(sums, float(strength.sum(dtype=float)), balanced).astype(t)
-    pull = strength.astype(t)[..., None] * away
-    return 0.5 * float((pull * away).sum(dtype=float)), pull
+    precision = scaled_precision(expected.precision, valid, weight, log_shading.shape[2])
+    residual = log_shading - expected.mean.astype(t)
+    sums = (precision[..., None] * residual).sum(axis=(0, 1), dtype=float)
+    residual = residual - optimal_offsets(sums, float(precision.sum(dtype=float)), balanced).astype(
+        t
+    )
+    gradient = precision.astype(t)[..., None] * residual
+    return 0.5 * float((gradient * residual).sum(dtype=float)), gradient
 
 
-def best_offsets(sums: np.ndarray, total: float, balanced: bool) -> np.ndarray:
-    """Return the constants k at which the term is least.
+def optimal_offsets(sums: np.ndarray, total: float, balanced: bool) -> np.ndarray:
+    """Return the constants k that minimise the term.
 
     Parameters
     ----------
     sums : (C,) ndarray
-        Sums over pixels of strength times S - m.
+        Sums over pixels of the scaled precision times S - m.
     total : float
-        Sum of the strengths.
+        Sum of the scaled precisions.
     balanced : bool
         Whether k is one constant for all channels.
 

@@ -1,20 +1,20 @@
-"""What the silhouette suggests of the normals inside: near it surfaces lean outward, far from it
+"""A prior of the normals from the silhouette: near it, surfaces are slanted outward; far from it,
 they face the viewer.
 
-Problem: the occluding contour constrains the silhouette itself only, and inside it convex and
-concave are equally likely. This term carries the constraint inward.
+Problem: the term of the occluding contour constrains the silhouette only, and inside it convex and
+concave shapes are equally likely. This term extends the constraint inward.
 
 Equation: for a pixel at distance d from the silhouette, u = d / max d, let c be the outward
 direction (minus the gradient of the smoothed distance) and t = (N1, N2) the normal's part in the
 image plane. Over real objects t has mean m(u) c and a spread s(u) of each component:
   cost = w/n_v * sum over valid pixels of |t - m(u) c|^2 / (2 s(u)^2).
-The profile m, s is fitted to objects of known shape (`prior_fitting`). The dome whose normals are
-the means is where the solver starts.
+The profile m, s is fitted to objects of known shape (`prior_fitting`). The solver starts at the
+dome whose normals are the means.
 
 Citation: ours; in the spirit of inflation from contours (D. Terzopoulos, A. Witkin, M. Kass 1988,
 doi:10.1016/0004-3702(88)90080-X).
 
-Limits: one object, wholly inside the frame; hollow forms disagree with it.
+Limits: one object, wholly inside the frame; hollow shapes violate the prior.
 """
 
 from dataclasses import dataclass
@@ -23,12 +23,12 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.row_blocks import row_blocks
-from .precision import strength_of
+from .precision import scaled_precision
 from .priors.priors import SilhouetteProfile
 
 _STEPS = 257
-_STEEPEST = 0.99  # largest in-plane part of a normal
-# Share of the largest distance: the outward direction ignores finer detail of the silhouette.
+_MAX_IN_PLANE = 0.99  # largest in-plane part of a normal
+# Fraction of the largest distance: the outward direction ignores finer detail of the silhouette.
 _SMOOTHING = 0.05
 
 
@@ -51,7 +51,7 @@ class ExpectedNormals:
 
 @dataclass(frozen=True)
 class SilhouetteNormals(ExpectedNormals):
-    """Normals that a silhouette suggests, and the height map they add up to.
+    """Normals expected from a silhouette, and the height map that they integrate to.
 
     Attributes
     ----------
@@ -66,8 +66,8 @@ class SilhouetteNormals(ExpectedNormals):
 def silhouette_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute the relative depth and the outward direction of every pixel.
 
-    A mask that reaches the border continues beyond it: there is no silhouette. A mask without any
-    silhouette is deep everywhere, u = 1.
+    A mask that reaches the border of the image is assumed to continue beyond it; its border there
+    is no silhouette. In a mask without any silhouette, u = 1 everywhere.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def silhouette_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np
 
 
 def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
-    """Compute unit normals that lean outward as a profile does on average.
+    """Compute unit normals from the mean of a profile.
 
     Parameters
     ----------
@@ -102,10 +102,10 @@ def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarr
     normal = np.empty((*mask.shape, 3))
     for block in row_blocks(mask.shape, halo=1):
         rows = block.rows
-        down, right = (part[block.own] for part in _downhill(smooth[block.wide]))
+        down, right = (part[block.own] for part in _descent(smooth[block.wide]))
         mean = profile.at(distance[rows] / deepest)[0]
-        lean = np.where(mask[rows], np.clip(mean, -_STEEPEST, _STEEPEST), 0)
-        part = np.dstack([lean * right, -lean * down, np.sqrt(1 - lean**2)])
+        in_plane = np.where(mask[rows], np.clip(mean, -_MAX_IN_PLANE, _MAX_IN_PLANE), 0)
+        part = np.dstack([in_plane * right, -in_plane * down, np.sqrt(1 - in_plane**2)])
         normal[rows] = part / np.linalg.norm(part, axis=-1, keepdims=True)
     return normal
 
@@ -123,15 +123,15 @@ def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarray]:
-    return _downhill(_smoothed(distance, deepest))
+    return _descent(_smoothed(distance, deepest))
 
 
 def _smoothed(distance: np.ndarray, deepest: float) -> np.ndarray:
     return np.asarray(ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest)))
 
 
-def _downhill(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The direction in which a map falls, down and right, each (H, W)."""
+def _descent(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The unit direction of steepest descent of a map, down and right, each (H, W)."""
     down, right = np.gradient(height)
     length = np.maximum(np.hypot(down, right), 1e-6)
     return -down / length, -right / length
@@ -159,15 +159,15 @@ def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> Sil
 def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
     """Heights at relative depths `u`, in units of the largest distance."""
     steps = np.linspace(0, 1, _STEPS)
-    lean = np.clip(profile.at(steps)[0], -_STEEPEST, _STEEPEST)
-    slope = lean / np.sqrt(1 - lean**2)
+    in_plane = np.clip(profile.at(steps)[0], -_MAX_IN_PLANE, _MAX_IN_PLANE)
+    slope = in_plane / np.sqrt(1 - in_plane**2)
     return np.interp(
         u, steps, np.concatenate([[0], np.cumsum((slope[1:] + slope[:-1]) / 2 * np.diff(steps))])
     )
 
 
 def normals_cost(
-    n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, field: ExpectedNormals, weight: float
+    n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, expected: ExpectedNormals, weight: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Compute the term of expected normals.
 
@@ -176,7 +176,7 @@ def normals_cost(
     n1, n2 : (H, W) ndarray
         Components of the unit normal, down and right.
     valid : (H, W) bool ndarray
-    field : ExpectedNormals
+    expected : ExpectedNormals
     weight : float
 
     Returns
@@ -184,7 +184,11 @@ def normals_cost(
     cost : float
     gradient_n1, gradient_n2 : (H, W) ndarray
     """
-    strength = strength_of(field.precision, valid, weight).astype(n1.dtype)
-    away1, away2 = n1 - field.down.astype(n1.dtype), n2 - field.right.astype(n1.dtype)
-    pull1, pull2 = strength * away1, strength * away2
-    return 0.5 * float((pull1 * away1 + pull2 * away2).sum(dtype=float)), pull1, pull2
+    precision = scaled_precision(expected.precision, valid, weight).astype(n1.dtype)
+    residual1, residual2 = n1 - expected.down.astype(n1.dtype), n2 - expected.right.astype(n1.dtype)
+    gradient1, gradient2 = precision * residual1, precision * residual2
+    return (
+        0.5 * float((gradient1 * residual1 + gradient2 * residual2).sum(dtype=float)),
+        gradient1,
+        gradient2,
+    )

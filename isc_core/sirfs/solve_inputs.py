@@ -1,6 +1,6 @@
-"""The maps a SIRFS problem is made of: cut out of the image, and resampled to the size solved.
+"""The input maps of a SIRFS problem: cropped from the image, and resampled to the size solved.
 
-Limits: pixels that are mostly outside the mask after resampling do not count.
+Limits: pixels that are mostly outside the mask after resampling are ignored.
 """
 
 from dataclasses import dataclass, replace
@@ -17,14 +17,14 @@ from ..scene.shading_estimate import ShadingEstimate
 
 @dataclass(frozen=True)
 class SolveInputs:
-    """The maps a problem is made of, all at one scale.
+    """The input maps of a problem, all at one scale.
 
     Attributes
     ----------
     image : (h, w, C) ndarray
         Linear diffuse image.
     valid : (h, w) bool ndarray
-        Pixels whose values count.
+        Pixels whose values are used.
     silhouette : (h, w) bool ndarray
         The object, continued beyond the photo.
     photo : (h, w) bool ndarray
@@ -49,7 +49,7 @@ class SolveInputs:
     shading: ShadingEstimate | None = None
 
     def cut(self, window: Window) -> "SolveInputs":
-        """Cut the window out of all maps.
+        """Crop all maps to a window.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class SolveInputs:
         )
         return SolveInputs(
             image,
-            share >= 0.5 * share.max(),  # an object thinner than a pixel fills none by half
+            share >= 0.5 * share.max(),  # no pixel of a very thin object is half covered
             silhouette,
             photo,
             None if weight is None else inside(weight),

@@ -1,15 +1,15 @@
 """Shape and illumination from one image: the minimiser of the SIRFS objective.
 
-Problem: one L-BFGS run moves the levels of the height's pyramid and the whitened light together.
+Problem: one L-BFGS run optimises the levels of the height's pyramid and the whitened light jointly.
 Reflectance is not an unknown: log A = log I - log shading reproduces the image exactly. The solver
-starts at `settings.Start`; of several starts, the one with the lowest loss after a number
-of evaluations goes on.
+starts at `settings.Start`; of several starts, the one with the lowest loss after a number of
+evaluations is continued.
 
 Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the objective has many minima; this finds one of them. Solving halved problems first finds
-others, as often worse as better, and saved no time.
+Limits: the objective has many minima; this finds one of them. Coarse-to-fine solving finds others,
+as often worse as better, and saved no time.
 """
 
 import os
@@ -32,20 +32,20 @@ from .pyramid import analyse, down, level_shapes, synthesise
 from .settings import Start
 
 STAGE = "shape and light"
-MOST_THREADS = 64  # more only wait for each other
-# Level of the pyramid: finer detail of the start belongs to the silhouette, not to the shape.
+MAX_THREADS = 64  # more do not make a solve faster
+# Level of the pyramid: finer detail of the dome follows the silhouette, not the shape.
 _START_LEVEL = 2
 _PREDICTED_LEVEL = 1  # about as fine as the network that predicts the normals
-# Evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
+# Evaluations per start, out of the hundreds of a solve: by then, the losses of good and bad minima
 # differ.
 _TRIAL = 80
-# `down` multiplies heights by 8, and a step up doubles them.
+# `down` multiplies heights by 8, and upsampling by one level doubles them.
 _COARSER = 16
 
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """How a problem is solved; the options do not change what is solved.
+    """Options of the solver; they do not change the objective.
 
     Attributes
     ----------
@@ -56,10 +56,10 @@ class SolverOptions:
     threads : int
         Number of threads; 0 for all cores.
     levels : int or None
-        Levels of the height's pyramid; None for as many as make sense.
+        Levels of the height's pyramid; None for all, see `pyramid.level_shapes`.
     lbfgs : LbfgsOptions
-        The optimiser's. It stops at twice the published tolerance: what the last evaluations gain
-        in loss, they do not gain in accuracy.
+        Options of the optimiser. It stops at twice the published tolerance: further evaluations
+        lower the loss, but do not improve the accuracy.
     """
 
     engine: str = "auto"
@@ -86,7 +86,7 @@ class SirfsResult:
     reason : str
         Why the optimiser stopped, see `LbfgsResult`.
     converged : bool
-        Whether it stopped because there was no more to gain.
+        Whether it stopped because the loss no longer decreased.
     """
 
     height: np.ndarray
@@ -128,12 +128,12 @@ def thread_count(options: SolverOptions) -> int:
     Returns
     -------
     int
-        At most `MOST_THREADS`; for 0 threads, the number of cores that this process may use.
+        At most `MAX_THREADS`; for 0 threads, the number of cores that this process may use.
     """
     allowed = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
-    return min(options.threads or allowed, MOST_THREADS)
+    return min(options.threads or allowed, MAX_THREADS)
 
 
 class Backend:
@@ -189,7 +189,7 @@ class Backend:
         return CompiledAlgebra(self._workers)
 
     def synthesise(self, levels: list[np.ndarray]) -> np.ndarray:
-        """Return the height in float64, whatever the levels are stored in.
+        """Return the height in float64, regardless of the type of the levels.
 
         A rounded coarse level still gives a smooth height.
 
@@ -235,8 +235,8 @@ class Backend:
 class ParameterVector:
     """All unknowns of a problem in one vector, and the objective as a function of it.
 
-    The vector holds the pyramid levels of the height and the whitened light, without what is known.
-    Calling the object with ``(x, gradient_out)`` returns the loss at `x`.
+    The vector contains the pyramid levels of the height and the whitened light, unless they are
+    known. Calling the object with ``(x, gradient_out)`` returns the loss at `x`.
 
     Attributes
     ----------
@@ -330,7 +330,7 @@ class ParameterVector:
         return x
 
     def _place_shape(self, start: Start, levels: list[np.ndarray]) -> None:
-        """Write the shape of a start into one of the levels, which are 0."""
+        """Write the shape of a start into one of the levels, all 0 before."""
         p = self._problem
         if start.predicted and p.predicted_normals is not None:
             level = min(_PREDICTED_LEVEL, len(levels) - 1)
@@ -361,11 +361,11 @@ class ParameterVector:
             self.levels(x)[0][...] = height
         return x
 
-    def _set_light(self, x: np.ndarray, away: np.ndarray) -> None:
-        """Set a light in a vector by its difference (9 C,) from the expected one, which is at 0."""
+    def _set_light(self, x: np.ndarray, difference: np.ndarray) -> None:
+        """Set the light in a vector from its difference (9 C,) to the mean of the prior."""
         if self._known_light is None:
             unwhiten = self._problem.priors.light.unwhiten
-            x[self._edges[-1] :] = solve_linear(unwhiten, away[:, None])[:, 0]
+            x[self._edges[-1] :] = solve_linear(unwhiten, difference[:, None])[:, 0]
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x
@@ -438,7 +438,7 @@ def solve(
             outcome = run.run(_reporter(monitor, options.lbfgs.iterations))
             if unknowns.x is not run.x:  # it had converged before another start was tried
                 unknowns(run.x, np.empty_like(run.x))
-        else:  # all is known: only the loss is needed
+        else:  # everything is known: only the loss is needed
             outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")
         return SirfsResult(
             np.array(unknowns.height(), float),
@@ -458,13 +458,13 @@ def multi_start(
     algebra: Algebra,
     monitor: Monitor,
 ) -> Minimisation:
-    """Return the minimisation that goes on.
+    """Choose the minimisation to continue.
 
     Parameters
     ----------
     unknowns : ParameterVector
     starts : sequence of Start
-        Equal ones count once.
+        Duplicates are ignored.
     options : LbfgsOptions
     algebra : Algebra
     monitor : Monitor
@@ -491,7 +491,7 @@ def multi_start(
 
 
 def _lowest_reporter(monitor: Monitor) -> Callable[[int, float], None]:
-    """Report the lowest loss of all starts so far, which is that of the run that will go on."""
+    """Report the lowest loss of all starts so far, which is that of the run to be continued."""
     lowest = np.inf
 
     def each(_: int, loss: float) -> None:
@@ -502,9 +502,9 @@ def _lowest_reporter(monitor: Monitor) -> Callable[[int, float], None]:
     return each
 
 
-def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
+def _reporter(monitor: Monitor, iterations: int) -> Callable[[int, float], None]:
     def each(iteration: int, loss: float) -> None:
-        fraction = 1 - 0.99**iteration if iteration < most else 1.0
+        fraction = 1 - 0.99**iteration if iteration < iterations else 1.0
         monitor.report(STAGE, fraction, f"loss {loss:.3f}")
 
     return each

@@ -1,4 +1,4 @@
-"""SIRFS' priors on shape: smooth mean curvature, isotropic normals, a contour that turns away.
+"""SIRFS' priors on shape: smooth mean curvature, isotropic normals, outward normals on the contour.
 
 Equation: with heights Z in pixels, first derivatives Zi (down) and Zj (right) and second ones Zii,
 Zjj, Zij:
@@ -9,7 +9,7 @@ Zjj, Zij:
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: orthographic, one smooth sheet, no holes.
+Limits: orthographic, one smooth surface, no holes.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from .problem import PAIR_OFFSETS
 SOFT_DIFFERENCE = 1e-8
 SLANT_SOFTNESS = 0.01
 CONTOUR_FACTOR = 60.0
-# nearer than this to pointing exactly outward (or inward) the contour term has no gradient
+# The gradient of the contour term is 0 where 1 - |N . c| is smaller.
 CONTOUR_CLOSE = 1e-3
 
 
@@ -158,9 +158,9 @@ def curvature_cost(
         x = np.sqrt(difference * difference + curvature.dtype.type(SOFT_DIFFERENCE))
         cost, slope = table.evaluate(x)
         total += float(cost.sum(dtype=float))
-        pull = slope * difference / x
-        gradient[p][both] += pull
-        gradient[q][both] -= pull
+        pair_gradient = slope * difference / x
+        gradient[p][both] += pair_gradient
+        gradient[q][both] -= pair_gradient
     scale = weight / (25 * curvature.size)
     return scale * total, gradient * curvature.dtype.type(scale)
 
@@ -210,16 +210,16 @@ def contour_cost(
     x = n1[at].astype(float) * contour.down + n2[at].astype(float) * contour.right
     gap = np.maximum(0.0, 1 - x)
     scale = CONTOUR_FACTOR * weight / pixels
-    pull = np.where(
+    slope = np.where(
         np.abs(x) < 1 - CONTOUR_CLOSE,
         -scale * power * np.maximum(gap, CONTOUR_CLOSE) ** (power - 1),
         0.0,
     )
-    return scale * float(np.sum(gap**power)), pull * contour.down, pull * contour.right
+    return scale * float(np.sum(gap**power)), slope * contour.down, slope * contour.right
 
 
 def observation_cost(height: np.ndarray, observed: DepthObservation) -> tuple[float, np.ndarray]:
-    """Compute the depth term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1).
+    """Compute the depth term, weight/n_known * sum of (sqrt(1 + (difference/sigma)^2) - 1).
 
     Parameters
     ----------

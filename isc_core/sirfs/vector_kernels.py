@@ -1,4 +1,4 @@
-"""Compiled passes over many vectors, with the formulas of `pyramid` and `NumpyAlgebra`."""
+"""Compiled operations on many vectors, with the formulas of `pyramid` and `NumpyAlgebra`."""
 
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
@@ -102,7 +102,7 @@ def _parts(length: int) -> list[tuple[int, int]]:
 
 @jit(types="r[2] r[2]", math=ACCUMULATED)
 def down(fine, out):
-    """Take one pyramid step down, see `pyramid.down`.
+    """Downsample by one level, see `pyramid.down`.
 
     Parameters
     ----------

@@ -23,8 +23,8 @@ def small_solves(
     def small(**values: Any) -> RecoverOptions:
         given = RecoverOptions(**values)
         solver = given.solver if steps is None else replace(given.solver, lbfgs=steps)
-        own = own_size and given.to_own_size
-        return replace(given, solve_size=side, margin=4, to_own_size=own, solver=solver)
+        own = own_size and given.refine_at_full_size
+        return replace(given, solve_size=side, margin=4, refine_at_full_size=own, solver=solver)
 
     with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
         yield

@@ -1,4 +1,4 @@
-"""The palette terms, few and likely colours: histogram of the colours, its blur, and the gradient.
+"""The palette terms (parsimony, absolute): histogram of the colours, its blur, and the gradient.
 
 Only the occupied part of the grid of colours is stored.
 """
@@ -191,7 +191,7 @@ def gather_color(palette, photo, grid, cells, node_gradient, gradient):
 
 @jit(types="f8[3] f8[1] f8[3]", math=REASSOCIATED)
 def blur_color(counts, taps, blurred):
-    """Blur the node counts along each axis, zero padded, only where it can matter.
+    """Blur the node counts along each axis, zero padded, computed at occupied nodes only.
 
     Parameters
     ----------

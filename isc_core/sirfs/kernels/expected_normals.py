@@ -19,9 +19,9 @@ def normals_rows(first, last, geometry, expected, strength, gradient, sums):
     expected : (2, H, W) ndarray
         Expected n1 and n2.
     strength : (H, W) ndarray
-        See `precision.strength_of`.
+        See `precision.scaled_precision`.
     gradient : (2, H, W) ndarray
-        Gradients with respect to n1 and n2, which grow by those of this term.
+        Gradients with respect to n1 and n2; those of this term are added.
     sums : (H,) ndarray
         Output: the term of each row.
     """

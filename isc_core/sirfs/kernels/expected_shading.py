@@ -1,8 +1,9 @@
 """The term of the expected shading, with the formula of `shading_term`.
 
-Its gradient with respect to the log shading joins that of the palette terms, which
-`height_rows.backward_rows` carries on to normals and light; hence it is brought to their whitened
-space. Rows are independent of each other, and their sums are added in the order of the rows.
+Its gradient with respect to the log shading is added to that of the palette terms, which
+`height_rows.backward_rows` propagates to normals and light; it is therefore transformed to their
+whitened space. Rows are independent of each other, and their sums are added in the order of the
+rows.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -13,7 +14,7 @@ from ...numerics.jit import REASSOCIATED, jit
 
 @jit(types="i8 i8 r[3] i8[2] r[2] r[3] r[2] r[3] f8[2]", math=REASSOCIATED)
 def residual_rows(first, last, geometry, spans, light, mean, strength, residual, sums):
-    """Compute the log shading less the expected one in rows [first, last).
+    """Compute the log shading minus the expected one in rows [first, last).
 
     Parameters
     ----------
@@ -28,7 +29,7 @@ def residual_rows(first, last, geometry, spans, light, mean, strength, residual,
     mean : (H, C, W) ndarray
         Expected log shading.
     strength : (H, W) ndarray
-        See `precision.strength_of`.
+        See `precision.scaled_precision`.
     residual : (H, C, W) ndarray
         Output, written within the spans.
     sums : (H, C) float64 ndarray
@@ -71,9 +72,9 @@ def pull_rows(first, last, spans, residual, offsets, strength, back, palette, jo
     offsets : (C,) ndarray
         The free constants.
     strength : (H, W) ndarray
-        See `precision.strength_of`.
+        See `precision.scaled_precision`.
     back : (C, C) ndarray
-        Takes that gradient to the whitened space of the palette terms.
+        Transforms that gradient to the whitened space of the palette terms.
     palette : (H, C, W) ndarray
         Gradient of the palette terms with respect to the whitened log reflectances.
     joined : (H, C, W) ndarray

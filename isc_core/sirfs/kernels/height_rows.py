@@ -1,4 +1,4 @@
-"""From the height to the residuals of its terms, and their gradients back to it, by rows.
+"""Forward and backward pass between the height and the terms of the objective, by rows.
 
 `forward_rows` computes geometry and whitened log reflectance, `backward_rows` the gradients with
 respect to the derivatives of the height and to the light, `adjoint_rows` that with respect to the
@@ -17,7 +17,7 @@ from . import arrays
 
 
 class Pulls(NamedTuple):
-    """Gradients that `backward_rows` carries on to the height and the light; unscaled.
+    """Gradients that `backward_rows` propagates to the height and the light; unscaled.
 
     Attributes
     ----------
@@ -33,7 +33,7 @@ class Pulls(NamedTuple):
 
 
 class Backward(NamedTuple):
-    """What `backward_rows` writes.
+    """Output of `backward_rows`.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class Backward(NamedTuple):
 def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance):
     """Compute the geometry, the whitened log reflectance and the slant term of rows [first, last).
 
-    Differences of neighbouring heights are exact; reordering them would lose in float32 what the
-    curvature needs, hence the mode `IN_ORDER`.
+    Differences of neighbouring heights are exact; if they were reordered, float32 would lose the
+    digits that the curvature needs. Hence the mode `IN_ORDER`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The terms of pairs of near pixels: smoothness of the reflectance, and of the curvature.
+"""Terms over pairs of nearby pixels: smoothness of the reflectance, and of the curvature.
 
 Pairs reach two rows below a block of rows. These contributions go to buffers of the block and are
 added later, in a fixed order.
@@ -39,14 +39,14 @@ class Pairs(NamedTuple):
 
 
 class PairSums(NamedTuple):
-    """What the blocks of a smoothness term write.
+    """Output of the blocks of a smoothness term.
 
     Attributes
     ----------
     gradient : (H, ..., W) ndarray
         Gradient with respect to the differenced quantity, unscaled.
     spill : (B, 2, ..., W) ndarray
-        What each block adds to the two rows below it.
+        Contributions of each block to the two rows below it.
     cost : (B,) ndarray
         Sum of each block, unscaled.
     """

@@ -1,6 +1,6 @@
-"""The cost of an absolute (whitened, log) reflectance as a table that stays small in a file.
+"""The cost of an absolute (whitened, log) reflectance as a table, stored compactly.
 
-Equation: the full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros,
+Equation: the full table of n nodes per axis is an upsampling by two of a coarse one: insert zeros,
 then filter with (1, 4, 6, 4, 1) / 8 along each axis, zero padded. Only the coarse one is stored.
 
 Citation: P. J. Burt, E. H. Adelson 1983, doi:10.1109/TCOM.1983.1095851 (upsampling); J. T. Barron,
@@ -20,9 +20,9 @@ LOW, HIGH = -7.0, 4.0
 
 @dataclass(frozen=True)
 class CoarseTable:
-    """A table as the upsampling of `base + coarse`, less its minimum.
+    """A table as the upsampling of `base + coarse`, minus its minimum.
 
-    A short float type then keeps its digits where the cost is low, that is, where reflectances are.
+    A short float type is then most precise where the cost is low, that is, at likely reflectances.
 
     Attributes
     ----------
@@ -101,10 +101,10 @@ def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
     (n, ..., n) ndarray
     """
     for _ in range(values.ndim):
-        # Each turn treats the first axis and puts it last, so that after all turns the axes are in
-        # order again.
-        turned = matrix @ values.reshape(values.shape[0], -1)
-        values = np.ascontiguousarray(np.moveaxis(turned.reshape(-1, *values.shape[1:]), 0, -1))
+        # Each pass processes the first axis and moves it to the end, so that after all passes the
+        # axes are in order again.
+        product = matrix @ values.reshape(values.shape[0], -1)
+        values = np.ascontiguousarray(np.moveaxis(product.reshape(-1, *values.shape[1:]), 0, -1))
     return values
 
 
@@ -119,7 +119,7 @@ def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
     nodes : int
         On each axis.
     weights : (n,) ndarray
-        What each point adds in total.
+        Total weight of each point.
 
     Returns
     -------
@@ -142,8 +142,8 @@ def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
 def log_likelihood(table: np.ndarray, histogram: np.ndarray) -> float:
     """Return the mean log probability of a histogram under a table.
 
-    The distribution is exp(-table) / sum exp(-table) over the nodes. On objects that the table was
-    not fitted to, this criterion selects its smoothness.
+    The distribution is exp(-table) / sum exp(-table) over the nodes. Evaluated on held-out objects,
+    this criterion selects the smoothness of the table.
 
     Parameters
     ----------

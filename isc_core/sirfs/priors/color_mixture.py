@@ -4,7 +4,7 @@ Equation: p(x) = sum_k w_k N(x; 0, v_k S), x in R^3, det S = 1. With fixed log-s
 both the weights and the shared covariance S have closed-form steps of expectation maximisation: S ~
 sum_i (sum_k r_ik / v_k) x_i x_i^T with responsibilities r. The samples enter as cells of
 (direction, log length), each with its count and the sum of x x^T: m = x^T S^-1 x / 2 of a cell is
-exactly the mean of its members for every S, and the loss is of second order in the cell's size.
+exactly the mean of its samples for every S, and the error is of second order in the cell's size.
 
 Citation: A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x; the
 model: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scale_mixture import decaying, refine_weights
+from .scale_mixture import exp_or_zero, refine_weights
 from .tabulated_potential import TabulatedPotential
 
 TABLE_NODES = 100_000
@@ -33,9 +33,9 @@ class ColorCells:
     Attributes
     ----------
     counts : (n,) ndarray
-        Members of each cell.
+        Number of samples in each cell.
     moments : (n, 3, 3) ndarray
-        Sum of x x^T over the members of each cell.
+        Sum of x x^T over the samples in each cell.
     """
 
     counts: np.ndarray
@@ -188,7 +188,7 @@ def fit_color_mixture(
 def _distance_histogram(
     cells: ColorCells, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Merge cells of like m: the bin of each cell, and of each bin its count and its mean m."""
+    """Merge cells of similar m: the bin of each cell; the count and the mean m of each bin."""
     m = _half_distance(cells, covariance)
     with np.errstate(divide="ignore"):
         fine = np.maximum(_PER_DECADE_OF_M * (np.log10(m) + 12), 0).astype(np.int64)
@@ -208,4 +208,4 @@ def _unit_determinant(matrix: np.ndarray) -> np.ndarray:
 
 def _densities(m: np.ndarray, variances: np.ndarray) -> np.ndarray:
     """N(x; 0, v_k S) as a function of m, of shape (..., K)."""
-    return decaying(-m[..., None] / variances) * (2 * np.pi * variances) ** -1.5
+    return exp_or_zero(-m[..., None] / variances) * (2 * np.pi * variances) ** -1.5

@@ -1,17 +1,17 @@
 """The prior of the light, multiplied by a predicted Gaussian.
 
-Problem: a data set knows which lights are usual, a network what this photo's light looks like; the
-solver needs one Gaussian over the light's coefficients.
+Problem: a data set gives the distribution of natural lights, a network an estimate of this photo's
+light; the solver needs one Gaussian over the light's coefficients.
 
 Equation: the product of the prior N(m0, S0) and the prediction N(m1, t S1), which is the prior
 weighted by the prediction's likelihood, is the Gaussian of the summed precisions; without inverses,
     K = S0 (S0 + t S1)^-1,    mean = m0 + K (m1 - m0),    S = S0 - K S0.
-The temperature t, 1 for calibrated predictions, is above 1 for those that are too sure. Brightness
-that all channels share cannot be seen in a photo: S1 is given a large variance along it.
+The temperature t, 1 for calibrated predictions, is above 1 for overconfident ones. A photo does not
+determine a brightness common to all channels: S1 is given a large variance along it.
 
 Citation: R. E. Kalman 1960, doi:10.1115/1.3662552 (the update of a Gaussian).
 
-Limits: both are Gaussian, and independent of each other.
+Limits: both are assumed to be Gaussian, and independent of each other.
 """
 
 import numpy as np
@@ -22,7 +22,7 @@ from ...shading.irradiance_basis import C4
 from ...shading.spherical_harmonics import light_to_reference
 from .priors import LightPrior
 
-_BRIGHTNESS = 10.0  # deviation of the log brightness: nothing is known
+_BRIGHTNESS = 10.0  # deviation of the log brightness: uninformative
 
 
 def light_posterior(
@@ -35,23 +35,23 @@ def light_posterior(
     prior : LightPrior
         For C channels.
     estimate : LightCoefficientsEstimate
-        Prediction; a prior for grey is told the mean of its channels.
+        Prediction; a prior for grey uses the mean of its channels.
     temperature : float
         Factor of the prediction's covariance, > 0.
 
     Returns
     -------
     LightPrior
-        Its mean is where a `Start` of light 1 starts.
+        Its mean is the initial light of `Start(light=1)`.
     """
     mean, covariance = _in_reference(estimate, len(prior.mean) // 9)
     bright = np.zeros((len(mean), 1))
     bright[::9] = _BRIGHTNESS / C4  # log shading 1 in the reference's first function
-    spread = prior.covariance + temperature * covariance + bright * bright.T
-    gain = solve_linear(spread, prior.covariance).T
-    found = prior.mean + np.einsum("ij,j->i", gain, mean - prior.mean)
-    left = prior.covariance - np.einsum("ij,jk->ik", gain, prior.covariance)
-    return LightPrior(found, (left + left.T) / 2, prior.unwhiten, found)
+    innovation_covariance = prior.covariance + temperature * covariance + bright * bright.T
+    gain = solve_linear(innovation_covariance, prior.covariance).T
+    posterior_mean = prior.mean + np.einsum("ij,j->i", gain, mean - prior.mean)
+    remaining = prior.covariance - np.einsum("ij,jk->ik", gain, prior.covariance)
+    return LightPrior(posterior_mean, (remaining + remaining.T) / 2, prior.unwhiten, posterior_mean)
 
 
 def _in_reference(

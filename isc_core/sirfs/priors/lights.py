@@ -1,10 +1,10 @@
-"""Which light is likely: a Gaussian over the coefficients of the log shading, fitted to known
+"""The prior of the light: a Gaussian over the coefficients of the log shading, fitted to known
 lights.
 
 Equation: a light of C channels is the vector of its 9 C coefficients, channel by channel, in the
 reference's convention (`sirfs.priors.priors`): l ~ N(mean, covariance). Left and right are equally
-likely, so every light also counts mirrored; a laboratory's lights have no preferred colour, so they
-may count in every order of channels.
+likely, so the mirror image of every light is a sample, too; the lights of a laboratory have no
+preferred colour, so their channels may be permuted.
 
 Published environment maps have less contrast than the light on real objects. Factors on their
 coefficients (of log shading, so a factor is contrast) are fitted by the likelihood of the known
@@ -209,14 +209,14 @@ def scaled(lights: GaussianLight, contrast: Contrast) -> GaussianLight:
 
 
 def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = True) -> Contrast:
-    """Fit the factors on environments under which known lights are likeliest.
+    """Fit the factors on environments that maximise the likelihood of known lights.
 
     Parameters
     ----------
     environments : GaussianLight
     lights : (count, 9, C) ndarray
     split : bool
-        Whether brightness and colour have a factor each.
+        Whether brightness and colour have separate factors.
 
     Returns
     -------
@@ -243,7 +243,7 @@ def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = 
 
 
 def _brightness(size: int) -> np.ndarray:
-    """Projection (size, size) of stacked coefficients on what the channels have in common."""
+    """Projection (size, size) of stacked coefficients onto the mean of the channels."""
     channels = size // COEFFICIENTS
     return np.kron(np.full((channels, channels), 1 / channels), np.eye(COEFFICIENTS))
 

@@ -1,5 +1,6 @@
 """Prior sets as files: NumPy archives without pickles, and the sets that ship with the package:
-`data/photo.npz`, fitted to the project's own world, and `data/priors.npz`, fitted to MIT-Berkeley.
+`data/photo.npz`, fitted to the project's training objects and lights, and `data/priors.npz`, fitted
+to MIT-Berkeley.
 """
 
 import dataclasses
@@ -73,7 +74,7 @@ def load_prior_set(path: str | Path) -> PriorSet:
 
 @cache
 def shipped_priors(illumination: str, channels: int) -> Priors:
-    """Return the tables of the shipped set, made once.
+    """Return the tables of the shipped set, built once.
 
     Parameters
     ----------
@@ -207,12 +208,12 @@ class _Reader:
             record=self.record(),
         )
 
-    def wrong(self, what: str) -> InputError:
+    def error(self, what: str) -> InputError:
         return InputError(f"{self.source}: {what}: fit the priors again with 'isc fit-priors'")
 
     def array(self, name: str) -> np.ndarray:
         if name not in self.arrays:
-            raise self.wrong(f"'{name}' is missing")
+            raise self.error(f"'{name}' is missing")
         return self.arrays[name]
 
     def numbers(
@@ -221,25 +222,25 @@ class _Reader:
         """A finite array; None in `shape` stands for any length above 0."""
         array = self.array(name)
         if array.dtype.kind not in "fiu" or array.ndim != len(shape) or array.size == 0:
-            raise self.wrong(f"'{name}' has the wrong type or shape")
+            raise self.error(f"'{name}' has the wrong type or shape")
         if any(
             want is not None and want != got for want, got in zip(shape, array.shape, strict=True)
         ):
-            raise self.wrong(f"'{name}' has shape {array.shape} instead of {shape}")
+            raise self.error(f"'{name}' has shape {array.shape} instead of {shape}")
         if not np.isfinite(array).all() or (positive and not (array > 0).all()):
-            raise self.wrong(f"'{name}' holds values that no fit gives")
+            raise self.error(f"'{name}' contains invalid values")
         return array
 
     def covariance(self, name: str, size: int) -> np.ndarray:
         matrix = self.numbers(name, (size, size))
         if not np.array_equal(matrix, matrix.T) or np.linalg.eigvalsh(matrix)[0] <= 0:
-            raise self.wrong(f"'{name}' is not a covariance")
+            raise self.error(f"'{name}' is not a covariance")
         return matrix
 
     def weights(self, name: str, count: int) -> np.ndarray:
         weights = self.numbers(name, (count,))
         if weights.min() < 0 or abs(weights.sum() - 1) > 1e-9:
-            raise self.wrong(f"'{name}' are not weights that add up to 1")
+            raise self.error(f"'{name}' are not weights that add up to 1")
         return weights
 
     def mixture(self, name: str) -> ScaleMixture:
@@ -270,7 +271,7 @@ class _Reader:
     def lights(self) -> LightPriors:
         found = [name for name in ILLUMINATIONS if f"lights.{name}.mean" in self.arrays]
         if not found:
-            raise self.wrong("it has no prior of light")
+            raise self.error("it has no prior of light")
         return LightPriors(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in found})
 
     def light(self, name: str, size: int) -> GaussianLight:
@@ -291,4 +292,4 @@ class _Reader:
                 dict(record["options"]),
             )
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            raise self.wrong("its record of the fit is damaged") from error
+            raise self.error("its record of the fit is damaged") from error

@@ -38,7 +38,8 @@ class LightPriors:
         Parameters
         ----------
         illumination : str
-            One of `ILLUMINATIONS`; "photo" takes natural light where the set has nothing better.
+            One of `ILLUMINATIONS`; "photo" falls back to natural light if the set has no light of
+            photos.
 
         Returns
         -------

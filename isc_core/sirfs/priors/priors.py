@@ -54,7 +54,7 @@ class LightPrior:
     def precision(self) -> np.ndarray:
         """Inverse covariance, computed once.
 
-        Not by LAPACK, whose threads would wake at every evaluation.
+        Without LAPACK, whose threads would be started at every evaluation.
         """
         inverse = solve_linear(self.covariance, np.eye(len(self.covariance)))
         return (inverse + inverse.T) / 2
@@ -62,12 +62,12 @@ class LightPrior:
 
 @dataclass(frozen=True)
 class SilhouetteProfile:
-    """How far surfaces lean outward at relative depth u = (k + 0.5) / K behind the silhouette.
+    """Outward in-plane part of normals at relative depth u = (k + 0.5) / K from the silhouette.
 
     Attributes
     ----------
     mean, spread : (K,) ndarray
-        Mean and standard deviation of the normal's in-plane part.
+        Its mean and standard deviation.
     """
 
     mean: np.ndarray
@@ -104,11 +104,11 @@ class Priors:
         Cost of m = 0.5 |smoothness_whiten (A_p - A_q)|^2 in colour, of A_p - A_q itself in grey.
     smoothness_whiten : (C, C) ndarray
     parsimony_whiten : (C, C) ndarray
-        Takes log reflectance to the space of the parsimony and absolute terms.
+        Transforms log reflectance to the space of the parsimony and absolute terms.
     absolute : AbsoluteTable
     light : LightPrior
     silhouette : SilhouetteProfile or None
-        See `silhouette`; None if nothing is known of it.
+        See `silhouette`; None to omit its term.
     """
 
     channels: int

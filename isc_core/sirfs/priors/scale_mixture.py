@@ -1,10 +1,10 @@
-"""Zero-mean Gaussian scale mixtures of one number, for differences of curvature and of grey log
+"""Zero-mean Gaussian scale mixtures of a scalar, for differences of curvature and of grey log
 reflectance.
 
 Equation: p(x) = sum_k w_k N(x; 0, s_k^2) with fixed, log-spaced s_k; the weights are fitted by
 expectation maximisation. The samples (millions of pairs) enter as a histogram of |x| on a
 logarithmic grid with each bin's own mean of x^2, which is all that a Gaussian depends on; bins are
-1/300 of a decade wide, so the loss is of second order in 0.8 %.
+1/300 of a decade wide, so the error is of second order in 0.8 %.
 
 Citation: A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x; the
 use for shape and reflectance: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
@@ -20,7 +20,7 @@ from .tabulated_potential import TabulatedPotential
 
 TABLE_NODES = 20_000
 LOG_DENSITY_FLOOR = -300.0
-_UNDERFLOW = -746.0  # exp of this and less is 0 in float64
+_UNDERFLOW = -746.0  # exp of this or less is 0 in float64
 _DECADES = (-9, 3)
 _PER_DECADE = 300
 
@@ -204,13 +204,14 @@ def refine_weights(
 def _densities(squares: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """N(x; 0, s_k^2) for `squares` x^2, of shape (..., K)."""
     exponent = -squares[..., None] / (2 * deviations**2)
-    return decaying(exponent) / (np.sqrt(2 * np.pi) * deviations)
+    return exp_or_zero(exponent) / (np.sqrt(2 * np.pi) * deviations)
 
 
-def decaying(exponent: np.ndarray) -> np.ndarray:
-    """Return exp(exponent), which most narrow components are too far away to have.
+def exp_or_zero(exponent: np.ndarray) -> np.ndarray:
+    """Return exp(exponent), without calling `exp` where it underflows, as for most narrow
+    components.
 
-    The C library's `exp` takes many times as long for a result of 0 as for another.
+    The C library's `exp` takes many times as long where it underflows.
 
     Parameters
     ----------

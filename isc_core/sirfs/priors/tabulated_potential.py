@@ -1,8 +1,7 @@
 """Costs tabulated on a uniform grid: the negative log densities of the priors.
 
 Between nodes the cost is interpolated linearly, and the derivative is the slope of the cell. Beyond
-either end the slope of the end cell continues, so that a cost is never flat where an optimiser
-could get lost.
+either end the slope of the end cell continues, so that the gradient does not vanish there.
 """
 
 from dataclasses import dataclass

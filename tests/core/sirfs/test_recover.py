@@ -179,7 +179,7 @@ def test_solving_at_another_size_keeps_the_shape() -> None:
 def test_a_coarse_solution_is_continued_at_the_size_given() -> None:
     scene = blob((96, 104))
     coarse = replace(OPTIONS, solve_size=50)
-    fine = replace(coarse, to_own_size=True)
+    fine = replace(coarse, refine_at_full_size=True)
     small, both = run(scene, coarse), run(scene, fine)
     assert both.evaluations > small.evaluations
     rows, columns = box(scene.mask, 0)
@@ -197,7 +197,7 @@ def test_a_coarse_solution_is_continued_at_the_size_given() -> None:
 def test_an_object_that_is_not_larger_is_solved_once() -> None:
     scene = blob()
     options = replace(OPTIONS, solve_size=90)
-    once, asked = run(scene, options), run(scene, replace(options, to_own_size=True))
+    once, asked = run(scene, options), run(scene, replace(options, refine_at_full_size=True))
     np.testing.assert_array_equal(once.height, asked.height)
 
 

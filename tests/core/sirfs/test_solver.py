@@ -20,7 +20,7 @@ from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.settings import Start
 from isc_core.sirfs.silhouette import normals_from_silhouette
-from isc_core.sirfs.solver import MOST_THREADS, SirfsResult, SolverOptions, solve, thread_count
+from isc_core.sirfs.solver import MAX_THREADS, SirfsResult, SolverOptions, solve, thread_count
 
 from .small_problems import Scene, blob, make_problem, weights
 
@@ -236,7 +236,7 @@ def test_unknown_engine_is_one_clear_line() -> None:
 def test_any_number_of_threads_may_be_asked_for() -> None:
     assert thread_count(SolverOptions(threads=3)) == 3
     assert thread_count(SolverOptions()) >= 1
-    assert thread_count(SolverOptions(threads=10**9)) == MOST_THREADS
+    assert thread_count(SolverOptions(threads=10**9)) == MAX_THREADS
 
 
 def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
