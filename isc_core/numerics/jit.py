@@ -1,19 +1,19 @@
-"""Loops over pixels that NumPy cannot express, as machine code.
+"""Machine code for loops over pixels that NumPy cannot express.
 
-It comes from the library of kernels that were compiled ahead of time (`kernel_library`), where
-there is one for this machine and these sources; else from Numba, where it is installed. Without
-both, the same functions run as plain Python: slower, with equal results.
+It is taken from a library of kernels compiled ahead of time (`kernel_library`) if there is one for
+this machine and these sources; otherwise Numba compiles it, if installed. Without either, the same
+functions run as plain Python: slower, with equal results.
 
-Code that Numba compiled is cached between runs: beside the source if that folder is writable, else
-in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary
-folder serves until the process ends.
+Code compiled by Numba is cached between runs: beside the source if that folder is writable,
+otherwise in the user's cache folder, or in NUMBA_CACHE_DIR. If none of these is writable, a
+temporary folder is used until the process ends.
 
-Numba is imported, and a function compiled, when one is first called: its import takes longer than
-many a command.
+Numba is imported, and a function compiled, at the first call: the import takes longer than many
+commands.
 
-Determinism: a compiled sum has the order that the compiler gave it, whatever the number of threads,
-because one call is one thread's work. `REASSOCIATED` lets the compiler choose that order once, so
-the sum may use vector instructions; it stays the same for every call of the same machine code.
+Determinism: the compiler fixes the order of a sum regardless of the number of threads, because each
+call runs on a single thread. `REASSOCIATED` lets the compiler choose that order once, so the sum
+may use vector instructions; it stays the same for every call of the same machine code.
 """
 
 import atexit
@@ -36,7 +36,7 @@ EXACT: frozenset[str] = frozenset()
 IN_ORDER = frozenset({"contract", "nsz"})
 """Sums and differences in the order of the source; a product and a sum may round once."""
 ACCUMULATED = frozenset({"reassoc", "contract", "nsz"})
-"""Sums may be reordered, as inner products need to become vector instructions."""
+"""Sums may be reordered, which vectorised inner products require."""
 REASSOCIATED = ACCUMULATED | {"arcp", "afn"}
 """As `ACCUMULATED`; also reciprocals for divisions, and faster approximate functions."""
 
@@ -55,7 +55,7 @@ def jit(
     Parameters
     ----------
     types : str
-        The types of a call, see `kernel_types`; "" for what only other kernels call.
+        Types of the arguments, see `kernel_types`; "" for functions that only other kernels call.
     math : frozenset of str
         Floating-point freedom of the compiler, see the constants of this module.
     inline : bool
@@ -86,15 +86,16 @@ def jit(
     loop : callable, optional
         The function, when used without arguments.
     types : str
-        The types of a call, see `kernel_types`: those that the function is compiled for ahead of
-        time. "" for what only other kernels call.
+        Types of the arguments for which the function is compiled ahead of time, see `kernel_types`;
+        "" for functions that only other kernels call.
     math : frozenset of str
         Floating-point freedom of the compiler: `EXACT`, `IN_ORDER`, `ACCUMULATED` or
         `REASSOCIATED`.
     inline : bool
-        Make the function part of each kernel that calls it. A called function must be inlined if
-        bytes matter: linked separately, it would round differently in the process that compiles it
-        than in one that reads it from the cache, because the two link different copies.
+        Inline the function in each kernel that calls it. A called function must be inlined if
+        results must be equal to the byte: linked separately, it would round differently in the
+        process that compiles it than in one that reads it from the cache, because the two link
+        different copies.
 
     Returns
     -------
@@ -122,7 +123,7 @@ class Kernel:
     Attributes
     ----------
     function : callable
-        As it was written.
+        The Python function.
     types : str
     inline : bool
     """
@@ -139,12 +140,12 @@ class Kernel:
 
     @property
     def signatures(self) -> tuple[Signature, ...]:
-        """What the function is compiled for ahead of time."""
+        """Signatures for which the function is compiled ahead of time."""
         return signatures(self.types)
 
     @cached_property
     def compiled(self) -> Callable[..., Any]:
-        """What a call runs: shipped code, Numba's dispatcher, or the function itself."""
+        """The implementation: shipped code, Numba's dispatcher, or the Python function."""
         library = shipped_library()
         if library is not None and self.function in library:
             return library.kernel(self.function, self.signatures)
@@ -152,7 +153,7 @@ class Kernel:
 
     @cached_property
     def _dispatcher(self) -> Any:
-        """Numba's dispatcher, which keeps what it compiles."""
+        """Numba's dispatcher, which caches compiled code."""
         ensure_cache_folder()
         dispatcher = self.dispatcher(lambda kernel: kernel._dispatcher, cache=True)
         drop_broken(Path(str(dispatcher.stats.cache_path)))
@@ -165,9 +166,10 @@ class Kernel:
         Parameters
         ----------
         of_called : callable
-            Gives the dispatcher of a kernel that the function calls: compiled code knows no others.
+            Returns the dispatcher of a kernel that the function calls; compiled code can call only
+            dispatchers.
         cache : bool, optional
-            Whether to keep what it compiles on disk.
+            Whether to cache compiled code on disk.
 
         Returns
         -------
@@ -191,15 +193,15 @@ class Kernel:
 
 
 def _load_alone(dispatcher: Any) -> None:
-    """Let a dispatcher load compiled code without what only the compiler needs.
+    """Let a dispatcher load compiled code without importing the compiler.
 
-    Before it looks into its cache, Numba imports all that it can compile (a fifth of a second, with
-    `scipy.linalg`), and compiling does so again. Code that is compiled needs Numba's runtime alone.
+    Before Numba reads its cache, it imports everything that it can compile (a fifth of a second,
+    with `scipy.linalg`); compilation does so anyway. Compiled code needs only Numba's runtime.
     """
     try:
         from numba.core.caching import FunctionCache
         from numba.core.runtime.nrt import rtsys
-    except ImportError:  # a version that has them elsewhere: as it is
+    except ImportError:  # a version with another layout: Numba's own cache
         return
 
     class LoadingCache(FunctionCache):
@@ -235,17 +237,17 @@ def drop_broken(folder: Path) -> None:
     Parameters
     ----------
     folder : Path
-        Cache folder; each is checked once a process.
+        Cache folder; each is checked once per process.
     """
     for kept in folder.glob("*.nb[ic]"):
         with contextlib.suppress(OSError):  # another process replaced it, or it cannot be removed
-            if not kept.read_bytes().endswith(b"."):  # as all that `pickle` writes does
+            if not kept.read_bytes().endswith(b"."):  # the last byte of every pickle
                 kept.unlink()
 
 
 @cache
 def ensure_cache_folder() -> None:
-    """Give Numba a temporary cache folder if it can write to no other; it would refuse to work."""
+    """Give Numba a temporary cache folder if no other is writable; otherwise Numba would fail."""
     try:
         import numba
     except ImportError:
@@ -259,4 +261,4 @@ def ensure_cache_folder() -> None:
 
 
 def _probe() -> None:
-    """Lie among the package's modules, so that Numba looks for a cache where theirs would be."""
+    """Numba looks for a writable cache folder for this function, hence for this package."""

@@ -1,10 +1,10 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Whether a library of kernels computes what Python does, before anything depends on it.
+"""Checks that a library of kernels gives the results of Python before it is used.
 
-A library may have been made for a system that nobody ran it on, or for another layout of NumPy's
-arrays. One small kernel reads and writes arrays of several types, with and without gaps, takes
-numbers of each type, more than fit into registers, and returns one. Its arithmetic is exact, so
-that all must be equal to the last bit.
+A library may have been built for a system on which it was never tested, or for another layout of
+NumPy's arrays. One small kernel reads and writes arrays of several types, contiguous and strided,
+takes scalars of each type, more than fit into registers, and returns a scalar. Its arithmetic is
+exact, so that all results must agree to the last bit.
 """
 
 from collections.abc import Callable
@@ -44,7 +44,7 @@ def outcome(run: Callable[..., float]) -> tuple[float, bytes, bytes]:
     Returns
     -------
     tuple
-        All that it computed.
+        All results.
     """
     values = np.arange(12, dtype=np.float32).reshape(3, 4) / 8
     order = np.array([2, 9, 0, 9, 1])[::2]
@@ -60,20 +60,20 @@ def mix(values, order, sums, factor, first, end, step, column, negate, weight):
     Parameters
     ----------
     values : (H, W) float32 ndarray
-        Gets them in a column.
+        The sums are written into one of its columns.
     order : (n,) int64 ndarray
-        Which rows.
+        Indices of the rows.
     sums : (n,) float64 ndarray
     factor : float
     first, end, step, column : int
     negate : bool
-        Whether the column gets -sums.
+        Whether -sums are written into the column.
     weight : int
 
     Returns
     -------
     float
-        The sum of all, times the weight.
+        The total of the sums, times the weight.
     """
     total = 0.0
     for i in range(len(order)):

@@ -1,21 +1,21 @@
 """Kernels that were compiled ahead of time, called through ctypes.
 
-Problem: a program that compiles its kernels carries a compiler, with Numba and LLVM 200 MB of it,
-and compiles for 20 s when it is first used; the result depends on the processor. The extension for
-Blender, wheels, and the trees of developers carry a shared library of half a megabyte instead.
+Problem: a program that compiles its kernels has to include a compiler (200 MB for Numba and LLVM),
+and compiles for 20 s at its first use; the result depends on the processor. The Blender extension,
+wheels, and developers' trees contain a shared library of half a megabyte instead.
 
-The library has one function for each kernel and version of its types. It takes arrays as the
-objects that they are, and reads address, shape and strides from the fields that are part of NumPy's
-binary interface, after it has compared the type. A call releases the interpreter lock.
+The library has one function for each kernel and version of its types. It receives arrays as Python
+objects, checks their type, and reads address, shape and strides from the fields that are part of
+NumPy's binary interface. A call releases the interpreter lock.
 
-Arrays of other types or strides than the declared ones are copied for the call, and what the kernel
-wrote is copied back: slower, with the same result.
+Arrays whose types or strides differ from the declared ones are copied before the call, and copied
+back afterwards: slower, with the same result.
 
-A library knows the digest of the files that its kernels are written in. It is used only while these
-have that digest, so that nobody runs the code of another version.
+A library contains a digest of the source files of its kernels. It is used only if the digest
+matches, so that code of another version is never run.
 
-Limits: a library is for one system and one kind of processor. For Intel's and AMD's there are two:
-one uses the instructions of x86-64-v3, those of processors since 2013, the other is for older ones.
+Limits: a library is for one system and one kind of processor. For x86-64 there are two: one uses
+the x86-64-v3 instructions of processors since 2013, the other is for older ones.
 """
 
 import ctypes
@@ -32,19 +32,19 @@ import numpy as np
 from .kernel_types import Array, Group, Scalar, Signature
 
 FOLDER = Path(__file__).with_name("compiled")
-"""Where libraries lie, also those for other machines; the preferred one is the last by name."""
+"""Folder of the libraries for all machines; the preferred one is the last by name."""
 _PROCESSORS = {"x86_64": "x86-64", "amd64": "x86-64", "arm64": "arm64", "aarch64": "arm64"}
 _SUFFIXES = {"win32": "dll", "darwin": "dylib"}
 _CORE = FOLDER.parents[1]
-_FITS, _MISFIT = 0, -1  # as in runtime.c
+_MATCH, _MISMATCH = 0, -1  # as in runtime.c
 
 
 @cache
 def shipped_library() -> "KernelLibrary | None":
-    """Return the library for this machine; None if none was shipped that works on it."""
-    from .kernel_check import passes  # imports kernels, which look for this library
+    """Return the library for this machine; None if none was shipped or works on it."""
+    from .kernel_check import passes  # imports kernels, which use this library
 
-    # Windows may show a dialog when it is to load a file that is not for it.
+    # Windows may show a dialog when it loads a library for another system.
     processor = _PROCESSORS.get(platform.machine().lower(), "none")
     pattern = f"kernels-{processor}*.{_SUFFIXES.get(sys.platform, 'so')}"
     opened = map(open_library, sorted(FOLDER.glob(pattern), reverse=True))
@@ -61,7 +61,7 @@ def open_library(path: Path) -> "KernelLibrary | None":
     Returns
     -------
     KernelLibrary or None
-        None if it is for another system or processor, or for other sources than these.
+        None if it is for another system, another processor, or other sources.
     """
     try:
         loaded = ctypes.CDLL(str(path))
@@ -105,9 +105,9 @@ def symbol(function: Callable[..., Any], version: int) -> str:
     Parameters
     ----------
     function : callable
-        The kernel as it was written.
+        The kernel's Python function.
     version : int
-        Which of its signatures.
+        Index of its signature.
 
     Returns
     -------
@@ -118,7 +118,7 @@ def symbol(function: Callable[..., Any], version: int) -> str:
     return f"isc_{module.replace('.', '_')}_{function.__name__}_{version}"
 
 
-class _Truth:
+class _Boolean:
     """Converts a Boolean, also NumPy's."""
 
     @staticmethod
@@ -126,8 +126,8 @@ class _Truth:
         return ctypes.c_uint8(bool(value))
 
 
-# (ctypes takes what counts as an integer, also NumPy's, and no fractions)
-_SCALARS = {"i8": ctypes.c_int64, "f4": ctypes.c_float, "f8": ctypes.c_double, "b1": _Truth}
+# (ctypes accepts Python's and NumPy's integers, and rejects fractions)
+_SCALARS = {"i8": ctypes.c_int64, "f4": ctypes.c_float, "f8": ctypes.c_double, "b1": _Boolean}
 _RESULTS: dict[str, Any] = {"i8": ctypes.c_int64, "f8": ctypes.c_double}
 
 
@@ -143,7 +143,7 @@ class KernelLibrary:
         self._loaded = loaded
 
     def __contains__(self, function: Callable[..., Any]) -> bool:
-        """Whether the library has a kernel: one that was written later may lie in a new file."""
+        """Whether the library contains a kernel; newer kernels may be in new files."""
         return hasattr(self._loaded, symbol(function, 0))
 
     def kernel(
@@ -154,15 +154,15 @@ class KernelLibrary:
         Parameters
         ----------
         function : callable
-            As it was written.
+            The Python function.
         signatures : sequence of Signature
-            Its versions.
+            One for each version.
 
         Returns
         -------
         callable
-            Takes what the function takes. Raises MemoryError if its scratch memory is not to be
-            had.
+            Takes the arguments of the function. Raises MemoryError if its scratch memory cannot be
+            allocated.
         """
         entries = self.entries(function, signatures)
         grouped = any(isinstance(one, Group) for one in signatures[0].arguments)
@@ -185,15 +185,15 @@ class KernelLibrary:
         Parameters
         ----------
         function : callable
-            As it was written.
+            The Python function.
         signatures : sequence of Signature
-            Its versions.
+            One for each version.
 
         Returns
         -------
         list
-            Each takes the list of `flattened` arguments, and returns whether they have its types,
-            and the result.
+            Each takes the `flattened` arguments, and returns whether their types match, and the
+            result.
         """
         return [
             _Entry(self._loaded[symbol(function, version)], signature)
@@ -202,7 +202,7 @@ class KernelLibrary:
 
 
 def flattened(values: Sequence[Any]) -> list[Any]:
-    """Put the fields of tuples in place of these.
+    """Replace tuples by their fields.
 
     Parameters
     ----------
@@ -241,18 +241,18 @@ class _Entry:
         )
 
     def __call__(self, flat: Sequence[Any]) -> tuple[bool, Any]:
-        """Whether the types fit, and the result."""
+        """Whether the types match, and the result."""
         if self._result is None:
             status, result = self._native(None, *flat), None
         else:
             written = self._result()
             status, result = self._native(ctypes.byref(written), *flat), written.value
-        if status not in (_FITS, _MISFIT):
+        if status not in (_MATCH, _MISMATCH):
             raise MemoryError("no memory for a compiled kernel")
-        return status == _FITS, result
+        return status == _MATCH, result
 
     def on_copies(self, flat: Sequence[Any]) -> Any:
-        """The result of a call with copies of all arrays, which are copied back."""
+        """Call with copies of all arrays, copy these back, and return the result."""
         copies = [
             np.array(value, kind.code, order="C") if isinstance(kind, Array) else value
             for value, kind in zip(flat, self._types, strict=True)

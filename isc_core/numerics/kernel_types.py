@@ -1,7 +1,7 @@
-"""The types of a compiled kernel's arguments, as they are declared where the kernel is written.
+"""The argument types of a compiled kernel, as declared in its decorator.
 
-A kernel that is compiled ahead of time is compiled before anything calls it. A declaration lists
-its types in the order of the parameters, with NumPy's names of numbers:
+Compilation ahead of time needs the types of a kernel before any call. A declaration lists them in
+the order of the parameters, with NumPy's type codes:
 
     i8 r[2] Photo(r[3] i8[2:]) (b1 b1) -> f8
 
@@ -36,7 +36,7 @@ class Array:
         Type of its elements in NumPy's notation, for example f4.
     axes : int
     contiguous : bool
-        Whether it must lie in row-major order without gaps.
+        Whether it must be contiguous in row-major order.
     """
 
     code: str
@@ -51,8 +51,8 @@ class Group:
     Attributes
     ----------
     name : str
-        Class of a named tuple, as the module of the kernel writes it, for example "arrays.Photo";
-        else "".
+        Class of a named tuple, as referenced in the kernel's module, for example "arrays.Photo";
+        otherwise "".
     fields : tuple of Scalar or Array
     """
 
@@ -62,7 +62,7 @@ class Group:
 
 @dataclass(frozen=True)
 class Signature:
-    """What a kernel takes and returns.
+    """Arguments and result of a kernel.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class Signature:
 
     @property
     def flat(self) -> tuple[Scalar | Array, ...]:
-        """The arguments, with the fields of named tuples in place of these."""
+        """The arguments, with tuples replaced by their fields."""
         return tuple(
             field
             for one in self.arguments

@@ -1,8 +1,8 @@
 """Limited-memory BFGS with a strong Wolfe line search, in place and in the storage type of the
 unknowns.
 
-Equation: the direction comes from the two-loop recursion on the inner products of the stored
-vectors alone, so each iteration reads the memory twice: once for the products, once for the
+Equation: the direction is computed by the two-loop recursion from the inner products of the stored
+vectors only, so each iteration reads these vectors twice: once for the products, once for the
 direction. Products are float64 sums in a fixed order (see `numerics`).
 
 Citation: J. Nocedal 1980, doi:10.1090/S0025-5718-1980-0572855-7 (two-loop recursion); W. Chen, Z.
@@ -10,7 +10,8 @@ Wang, J. Zhou, "Large-scale L-BFGS using MapReduce", NIPS 2014 (on inner product
 J. Wright, "Numerical Optimization" (2006), section 3.5, doi:10.1007/978-0-387-40065-5 (line
 search).
 
-Limits: smooth unconstrained functions; small kinks are tolerated, not resolved.
+Limits: smooth unconstrained functions; small discontinuities of the gradient are tolerated, but not
+resolved.
 """
 
 from collections.abc import Callable
@@ -22,26 +23,27 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LbfgsOptions:
-    """Memory, limits and tolerances of a minimisation.
+    """History size, limits and tolerances of a minimisation.
 
     Attributes
     ----------
     memory : int
-        Pairs of step and gradient change kept.
+        Number of stored pairs of step and gradient change.
     iterations, evaluations : int
-        Largest number of each.
+        Maximum number of each.
     loss_tolerance : float
-        Stop once `loss_window` previous losses lie within this relative distance of the current.
+        Stop once `loss_window` previous losses are within this relative distance of the current
+        one.
     loss_window : int
         Number of previous losses compared.
     gradient_tolerance : float
-        Stop at a largest gradient component this small.
+        Stop if the largest gradient component is at most this.
     step_tolerance : float
-        Stop at a largest step component, or a change of the loss, this small.
+        Stop if the largest step component, or the change of the loss, is below this.
     armijo, wolfe : float
         Constants of the strong Wolfe conditions.
     trials : int
-        Evaluations of one line search.
+        Maximum number of evaluations of one line search.
     """
 
     memory: int = 10
@@ -77,12 +79,12 @@ class LbfgsResult:
 
     @property
     def converged(self) -> bool:
-        """Whether it stopped because there was no more to gain."""
+        """Whether it stopped because a tolerance was met."""
         return self.reason in ("loss", "gradient", "step")
 
 
 class Algebra(Protocol):
-    """The two passes over the stored vectors."""
+    """The two operations on the stored vectors."""
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
         """Return all inner products.
@@ -143,8 +145,8 @@ class NumpyAlgebra:
 Function = Callable[[np.ndarray, np.ndarray], float]
 
 
-# Cosine between a step and the change of the gradient; below it the pair carries no curvature.
-_LEAST_COSINE = 1e-10
+# Cosine between a step and the change of the gradient; below it, the pair has no usable curvature.
+_MIN_COSINE = 1e-10
 
 
 class PairMemory:
@@ -155,7 +157,7 @@ class PairMemory:
     vectors : (2 m + 1, N) ndarray
         Rows: m steps, m changes, the gradient.
     order : list of int
-        Slots that hold a pair, oldest first.
+        Slots that contain a pair, oldest first.
 
     Parameters
     ----------
@@ -180,9 +182,9 @@ class PairMemory:
         return self.vectors[-1]
 
     def next_slot(self) -> int:
-        """Return a slot without a pair, else that of the oldest pair.
+        """Return a free slot, or otherwise that of the oldest pair.
 
-        (A skipped pair can leave a gap anywhere.)
+        (After a skipped pair, any slot may be free.)
         """
         return next(
             (k for k in range(self.size) if k not in self.order),
@@ -190,7 +192,7 @@ class PairMemory:
         )
 
     def refresh(self, slot: int | None) -> None:
-        """Take the rows of a slot as the newest pair.
+        """Add the rows of a slot as the newest pair, and update the inner products.
 
         A pair without positive curvature is skipped.
 
@@ -207,7 +209,7 @@ class PairMemory:
             return
         self.order = [k for k in self.order if k != slot]
         change = self.size + slot
-        if self._gram[slot, change] > _LEAST_COSINE * np.sqrt(
+        if self._gram[slot, change] > _MIN_COSINE * np.sqrt(
             self._gram[slot, slot] * self._gram[change, change]
         ):
             self.order.append(slot)
@@ -259,7 +261,7 @@ def minimise(
     function : callable
         ``function(x, gradient_out) -> loss``.
     x : (N,) ndarray
-        Start; the minimum on return.
+        Starting point; the minimum on return.
     options : LbfgsOptions
     algebra : Algebra
     each : callable, optional
@@ -273,7 +275,7 @@ def minimise(
 
 
 class Minimisation:
-    """A minimisation that can be suspended and resumed without changing its course.
+    """A minimisation that can be suspended and resumed without changing its result.
 
     Attributes
     ----------
@@ -300,7 +302,7 @@ class Minimisation:
         self._direction = np.empty_like(x)
         self.loss = function(x, self._memory.gradient)
         self._losses, self._evaluations = [self.loss], 1
-        self._settled = ""  # reason to stop, once there is one
+        self._converged = ""  # reason to stop, once converged
         self._memory.refresh(None)
 
     def run(
@@ -308,7 +310,7 @@ class Minimisation:
         each: Callable[[int, float], None] = lambda iteration, loss: None,
         evaluations: int | None = None,
     ) -> LbfgsResult:
-        """Continue until there is no more to gain, or until a number of evaluations.
+        """Continue until convergence, or until a number of evaluations.
 
         Parameters
         ----------
@@ -321,12 +323,12 @@ class Minimisation:
         -------
         LbfgsResult
         """
-        most = (
+        limit = (
             self._options.evaluations
             if evaluations is None
             else min(evaluations, self._options.evaluations)
         )
-        while not (reason := self._stop(most)):
+        while not (reason := self._stop(limit)):
             self._step()
             each(self._iterations, self.loss)
         return LbfgsResult(self.loss, self._iterations, self._evaluations, reason)
@@ -336,9 +338,9 @@ class Minimisation:
         return len(self._losses) - 1
 
     def _stop(self, evaluations: int) -> str:
-        """Return why not to take another step, "" for no reason."""
-        if self._settled:
-            return self._settled
+        """Return the reason to stop, or "" to continue."""
+        if self._converged:
+            return self._converged
         if _largest(self._memory.gradient) <= self._options.gradient_tolerance:
             return "gradient"
         if self._iterations >= self._options.iterations:
@@ -358,7 +360,7 @@ class Minimisation:
         )
         slot = memory.next_slot()
         step_row, change = memory.vectors[slot], memory.vectors[memory.size + slot]
-        np.copyto(step_row, self.x)  # where the search starts; the step after it
+        np.copyto(step_row, self.x)  # start of the line search; afterwards the step
         np.copyto(change, memory.gradient)
         search = _Search(
             self._function, self.x, step_row, self._direction, memory.gradient, options
@@ -369,14 +371,16 @@ class Minimisation:
         np.subtract(memory.gradient, change, out=change)
         memory.refresh(slot)
         recent = self._losses[-options.loss_window :]
-        settled = all(abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent)
-        if len(recent) == options.loss_window and settled:
-            self._settled = "loss"
+        converged = all(
+            abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent
+        )
+        if len(recent) == options.loss_window and converged:
+            self._converged = "loss"
         elif (
             step * _largest(self._direction) < options.step_tolerance
             or abs(recent[-1] - self.loss) < options.step_tolerance
         ):
-            self._settled = "step"
+            self._converged = "step"
         self._losses.append(self.loss)
 
 
@@ -436,7 +440,7 @@ class _Search:
                 )
             )
             previous = trial
-        return self._settle(previous)
+        return self._return_to(previous)
 
     def _zoom(self, origin: _Trial, low: _Trial, high: _Trial) -> tuple[float, float]:
         o = self._options
@@ -444,8 +448,8 @@ class _Search:
         while self.evaluations < o.trials:
             width = abs(high.step - low.step)
             step = _cubic_minimum(low, high)
-            least, most = min(low.step, high.step), max(low.step, high.step)
-            step = float(np.clip(step, least + 0.1 * width, most - 0.1 * width))
+            left, right = min(low.step, high.step), max(low.step, high.step)
+            step = float(np.clip(step, left + 0.1 * width, right - 0.1 * width))
             trial = self._try(step)
             if (
                 not np.isfinite(trial.loss)
@@ -461,7 +465,7 @@ class _Search:
                 low = trial
             if width * _largest(self._direction) < o.step_tolerance:
                 break
-        return (trial.step, trial.loss) if trial is low else self._settle(low)
+        return (trial.step, trial.loss) if trial is low else self._return_to(low)
 
     def _try(self, step: float) -> _Trial:
         np.multiply(self._direction, self._x.dtype.type(step), out=self._x)
@@ -472,19 +476,19 @@ class _Search:
             step, loss, float(np.einsum("n,n->", self._gradient, self._direction, dtype=float))
         )
 
-    def _settle(self, best: _Trial) -> tuple[float, float]:
-        """Return to the best point so far, which need not be the last one evaluated."""
+    def _return_to(self, best: _Trial) -> tuple[float, float]:
+        """Return to the best point so far, which is not necessarily the last one evaluated."""
         trial = self._try(best.step)
         return trial.step, trial.loss
 
 
 def _largest(vector: np.ndarray) -> float:
-    """The largest component, whatever its sign."""
+    """The largest absolute component."""
     return max(float(vector.max()), -float(vector.min()))
 
 
 def _cubic_minimum(a: _Trial, b: _Trial) -> float:
-    """Return the minimum of the cubic through two losses and slopes; without one, the middle."""
+    """Return the minimum of the cubic through two losses and slopes; without one, the midpoint."""
     if a.step == b.step:
         return a.step
     d1 = a.slope + b.slope - 3 * (a.loss - b.loss) / (a.step - b.step)

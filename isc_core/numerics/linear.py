@@ -1,16 +1,17 @@
 """Small systems of linear equations, solved with the same bytes on any number of threads.
 
-Problem: a library's solver splits its sums among its threads, so it rounds differently on one than
-on two; a solve with many minima turns that into another shape.
+Problem: LAPACK splits its sums among its threads, so it rounds differently on one thread than on
+two; with an objective of many minima, the difference leads to another shape.
 
 Equation: A X = B by Gauss-Jordan elimination with partial pivoting, row by row. Least squares of
-two unknowns >= 0: where the free solution has a negative one, the best solution has a 0.
+two unknowns >= 0: where the unconstrained solution has a negative one, one unknown is 0 in the
+constrained solution.
 
 Citation: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), section 3.4; C. L. Lawson,
 R. J. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
 
-Limits: n^3 operations in NumPy; meant for tens of unknowns. Normal equations of two columns lose
-half of the digits where these are nearly alike.
+Limits: n^3 operations in NumPy; meant for tens of unknowns. Normal equations lose half of the
+digits where the two columns are nearly parallel.
 """
 
 import numpy as np
@@ -48,7 +49,7 @@ def solve_linear(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def nonnegative_pair(first: np.ndarray, second: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Find a, b >= 0 for which a first + b second is nearest to the values, in least squares.
+    """Find a, b >= 0 that minimise |a first + b second - values|^2.
 
     SciPy's `nnls` does it for any number of columns, but takes a quarter of a second to import.
 

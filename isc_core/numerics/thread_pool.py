@@ -1,6 +1,6 @@
-"""A few threads for kernels that release the interpreter lock.
+"""A thread pool for kernels that release the interpreter lock.
 
-Determinism: which thread runs which task never changes a result. Tasks write to their own places,
+Determinism: which thread runs which task never changes a result. Tasks write to disjoint memory,
 and sums over tasks are taken in the order of the tasks.
 """
 
@@ -41,11 +41,11 @@ class ThreadPool:
             for task in tasks:
                 task()
             return
-        waiting = iter(tasks)
+        pending = iter(tasks)
         others = [
-            self._pool.submit(_drain, waiting) for _ in range(min(self.threads, len(tasks)) - 1)
+            self._pool.submit(_drain, pending) for _ in range(min(self.threads, len(tasks)) - 1)
         ]
-        _drain(waiting)
+        _drain(pending)
         for other in others:
             other.result()
 
@@ -66,6 +66,6 @@ class ThreadPool:
         self.close()
 
 
-def _drain(waiting: Iterator[Callable[[], None]]) -> None:
-    for task in waiting:  # a list's iterator hands each task to one thread only
+def _drain(pending: Iterator[Callable[[], None]]) -> None:
+    for task in pending:  # a list's iterator yields each task to one thread only
         task()
