@@ -1,13 +1,13 @@
 """Lobes from specular images: the roughness of an object, the strength of its highlights, and the
 direction of its lights, with intervals.
 
-Four modules estimate directions of light, for different inputs: `starts` proposes directions from
-the peaks of a specular image, as starts of the least squares in `lamps`; `recovered` takes one
-direction from a highlight on blurred recovered normals; `light_direction` explains a finished
+Four modules estimate light directions from different inputs: `starts` derives initial directions
+for the least squares in `lamps` from the peaks of a specular image; `recovered` derives one
+direction from a highlight on blurred recovered normals; `light_direction` approximates a finished
 decomposition by one distant light, for editing; `baselines.light_direction` is the published
 estimate of the shape-from-shading baselines, from the gradients of a photo without normals.
-`networks.scene_network` predicts the direction from the photo alone. The half-vector geometry that
-they share is `starts.light_of_half_vector`.
+`networks.scene_network` predicts the direction from the photo alone. They share the half-vector
+geometry of `starts.light_of_half_vector`.
 """
 
 from typing import TYPE_CHECKING

@@ -1,14 +1,14 @@
 """The lobe under a known environment map: its strength and its alpha.
 
-Equation: s(n) = strength * y(n; alpha), y of `environment_response`: alpha is searched on a ladder,
-then between rungs; its strength follows from re-weighted least squares (Charbonnier's loss, as in
-`lamps`).
+Equation: s(n) = strength * y(n; alpha), y of `environment_response`: alpha is searched on a
+logarithmic grid and refined between its nodes; the strength follows from re-weighted least squares
+(Charbonnier's loss, as in `lamps`).
 
 Citation: A. Ngan, F. Durand, W. Matusik, EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126 (fits of lobes
 under known light).
 
-Limits: where the environment map is smooth, all alphas on the ladder explain the image alike:
-undetermined.
+Limits: where the environment map is smooth, all alphas of the grid explain the image equally well:
+alpha is undetermined.
 """
 
 from dataclasses import dataclass
@@ -23,26 +23,30 @@ from ..scene.lobe_fit import (
     LobeFitOptions,
     LobeFitOutcome,
 )
-from .environment_response import SplitEnvironment, respond_to, split_environment, table_of
+from .environment_response import (
+    SplitEnvironment,
+    interpolated_response,
+    respond_to,
+    split_environment,
+)
 from .lamps import ALPHAS
 from .observed import Observed
 from .pixels import Pixels
 from .uncertainty import covariance, naive_variance
 
-_RUNGS = 11
+_NODES = 11
 _STEPS = 6  # of re-weighting
-_SLOPE = 0.01  # of log alpha, for the derivative
-# an alpha that many times larger or smaller that explains the picture as well leaves it
-# undetermined
-_FLAT = 2.5
-_ALIKE = 0.05  # of the specular light, RMS: predictions that are nearer to each other are the same
-_LEAST_EXPLAINED = 0.25
-_NARROWEST_PIXELS = 6
+_LOG_ALPHA_STEP = 0.01  # of log alpha, for the finite difference
+# alpha is undetermined if one larger or smaller by this factor explains the image as well
+_UNDETERMINED_FACTOR = 2.5
+_EQUAL = 0.05  # of the specular light, RMS: closer predictions count as equal
+_MIN_EXPLAINED = 0.25
+_MIN_PEAK_PIXELS = 6
 
 
 @dataclass(frozen=True)
-class _Try:
-    """An alpha with its strength, mean of the channels, its loss, residual and weights (N,)."""
+class _Candidate:
+    """An alpha with its strength (mean of the channels), loss, residual and weights (N,)."""
 
     log_alpha: float
     strength: float
@@ -51,8 +55,8 @@ class _Try:
     weight: np.ndarray
 
 
-def fit_under(
-    radiance: np.ndarray, seen: Observed, pixels: Pixels, options: LobeFitOptions
+def fit_under_environment(
+    radiance: np.ndarray, observed: Observed, pixels: Pixels, options: LobeFitOptions
 ) -> LobeFit:
     """Fit a lobe under an environment map.
 
@@ -60,7 +64,7 @@ def fit_under(
     ----------
     radiance : (rows, 2 rows, 3) ndarray
         The environment map.
-    seen : Observed
+    observed : Observed
         The specular image.
     pixels : Pixels
         The fitted pixels.
@@ -79,38 +83,42 @@ def fit_under(
     """
     from scipy.optimize import minimize_scalar
 
-    mask = seen.mask
+    mask = observed.mask
     environment = _checked(radiance)
     convention = CONVENTION[options.model]
     if not radiance.any():
-        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
-    least = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
-    rungs = np.linspace(np.log(least), np.log(ALPHAS[1]), _RUNGS)
-    tried = [_try(environment, pixels, options, rung) for rung in rungs]
-    best = int(np.argmin([t.loss for t in tried]))
-    low, high = rungs[max(best - 1, 0)], rungs[min(best + 1, _RUNGS - 1)]
+        return LobeFit.without_lobe(
+            options.model, LobeFitOutcome.NO_SPECULAR, observed.specular.shape
+        )
+    smallest = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
+    nodes = np.linspace(np.log(smallest), np.log(ALPHAS[1]), _NODES)
+    candidates = [_candidate(environment, pixels, options, node) for node in nodes]
+    best = int(np.argmin([t.loss for t in candidates]))
+    low, high = nodes[max(best - 1, 0)], nodes[min(best + 1, _NODES - 1)]
     found = minimize_scalar(
-        lambda rung: _try(environment, pixels, options, rung).loss,
+        lambda node: _candidate(environment, pixels, options, node).loss,
         bounds=(low, high),
         method="bounded",
         options={"xatol": 1e-3, "maxiter": 14},
     )
-    chosen = _try(environment, pixels, options, float(found.x))
+    chosen = _candidate(environment, pixels, options, float(found.x))
     alpha = float(np.exp(chosen.log_alpha))
-    strength, image = _coloured(environment, pixels, chosen, seen, options)
-    given = seen.specular_at(mask)
-    left, total = np.square(given - image[mask]).sum(), float(np.square(given).sum())
-    explained = float(np.clip(1 - left / max(total, 1e-300), 0, 1))
+    strength, image = _coloured(environment, pixels, chosen, observed, options)
+    given = observed.specular_at(mask)
+    remaining, total = np.square(given - image[mask]).sum(), float(np.square(given).sum())
+    explained = float(np.clip(1 - remaining / max(total, 1e-300), 0, 1))
     sd_alpha, sd_strength, allowed = _deviations(environment, pixels, chosen, options)
-    far = [t for t in tried if abs(t.log_alpha - chosen.log_alpha) > np.log(_FLAT)]
-    flat = any(t.loss - chosen.loss < allowed or _alike(t, chosen, pixels) for t in far)
+    far = [
+        t for t in candidates if abs(t.log_alpha - chosen.log_alpha) > np.log(_UNDETERMINED_FACTOR)
+    ]
+    undetermined = any(t.loss - chosen.loss < allowed or _equal(t, chosen, pixels) for t in far)
     outcome = (
         LobeFitOutcome.UNEXPLAINED
-        if explained < _LEAST_EXPLAINED
+        if explained < _MIN_EXPLAINED
         else LobeFitOutcome.SMOOTH_LIGHT
-        if flat
+        if undetermined
         else LobeFitOutcome.NARROW
-        if pixels.bright < _NARROWEST_PIXELS
+        if pixels.bright < _MIN_PEAK_PIXELS
         else LobeFitOutcome.DETERMINED
     )
     factor = float(np.exp(min(sd_strength, 20)))
@@ -133,10 +141,10 @@ def fit_under(
     )
 
 
-def _alike(one: _Try, other: _Try, pixels: Pixels) -> bool:
+def _equal(one: _Candidate, other: _Candidate, pixels: Pixels) -> bool:
     """Whether two predictions differ by less than the models' accuracy."""
-    apart = pixels.weight @ np.square((one.residual - other.residual) * pixels.sigma)
-    return bool(apart < _ALIKE**2 * (pixels.weight @ np.square(pixels.value)))
+    difference = pixels.weight @ np.square((one.residual - other.residual) * pixels.sigma)
+    return bool(difference < _EQUAL**2 * (pixels.weight @ np.square(pixels.value)))
 
 
 def _checked(radiance: np.ndarray) -> SplitEnvironment:
@@ -153,9 +161,9 @@ def _checked(radiance: np.ndarray) -> SplitEnvironment:
     return split_environment(radiance)
 
 
-def _try(
+def _candidate(
     environment: SplitEnvironment, pixels: Pixels, options: LobeFitOptions, log_alpha: float
-) -> _Try:
+) -> _Candidate:
     shape = respond_to(environment, options.model, pixels.normal, float(np.exp(log_alpha))).mean(
         axis=1
     )
@@ -164,41 +172,48 @@ def _try(
     for _ in range(_STEPS):
         scaled = weight * shape / pixels.sigma**2
         strength = max(float(scaled @ pixels.value) / max(float(scaled @ shape), 1e-300), 1e-12)
-        left = (strength * shape - pixels.value) / pixels.sigma
-        left = np.where(pixels.clipped & (left > 0), 0, left)
-        weight = np.where(pixels.clipped & (left == 0), 0, pixels.weight / np.sqrt(1 + left**2))
-    return _Try(
-        log_alpha, strength, float(pixels.weight @ (2 * (np.sqrt(1 + left**2) - 1))), left, weight
+        residual = (strength * shape - pixels.value) / pixels.sigma
+        residual = np.where(pixels.clipped & (residual > 0), 0, residual)
+        weight = np.where(
+            pixels.clipped & (residual == 0), 0, pixels.weight / np.sqrt(1 + residual**2)
+        )
+    return _Candidate(
+        log_alpha,
+        strength,
+        float(pixels.weight @ (2 * (np.sqrt(1 + residual**2) - 1))),
+        residual,
+        weight,
     )
 
 
 def _deviations(
-    environment: SplitEnvironment, pixels: Pixels, best: _Try, options: LobeFitOptions
+    environment: SplitEnvironment, pixels: Pixels, best: _Candidate, options: LobeFitOptions
 ) -> tuple[float, float, float]:
-    """Deviations of log alpha and of log strength, and the rise of the loss within one of the
-    first.
+    """Deviations of log alpha and of log strength, and the increase of the loss within one
+    deviation of log alpha.
     """
     here, there = (
         respond_to(
             environment, options.model, pixels.normal, float(np.exp(best.log_alpha + d))
         ).mean(axis=1)
-        for d in (0, -_SLOPE)
+        for d in (0, -_LOG_ALPHA_STEP)
     )
     jacobian = (
-        np.stack([here, (here - there) / _SLOPE], axis=1) * (best.strength / pixels.sigma)[:, None]
+        np.stack([here, (here - there) / _LOG_ALPHA_STEP], axis=1)
+        * (best.strength / pixels.sigma)[:, None]
     )
-    spread = covariance(jacobian, best.residual, best.weight, pixels)
+    variances = covariance(jacobian, best.residual, best.weight, pixels)
     systematic = np.radians(options.normal_error)
-    sd_alpha = float(np.sqrt(spread[1, 1] + systematic**2))
+    sd_alpha = float(np.sqrt(variances[1, 1] + systematic**2))
     allowed = max(1.0, sd_alpha**2 / max(naive_variance(jacobian, best.weight, 1), 1e-300))
-    return sd_alpha, float(np.sqrt(spread[0, 0] + (2 * systematic) ** 2)), allowed
+    return sd_alpha, float(np.sqrt(variances[0, 0] + (2 * systematic) ** 2)), allowed
 
 
 def _coloured(
     environment: SplitEnvironment,
     pixels: Pixels,
-    best: _Try,
-    seen: Observed,
+    best: _Candidate,
+    observed: Observed,
     options: LobeFitOptions,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The strength (3,) of each channel and the predicted image (H, W, 3)."""
@@ -208,6 +223,8 @@ def _coloured(
     strength = (scaled * pixels.colour).sum(axis=0) / np.maximum(
         (scaled * shape).sum(axis=0), 1e-300
     )
-    image, inside = np.zeros(seen.normal.shape, np.float32), seen.normal_at(seen.mask)
-    image[seen.mask] = table_of(environment, options.model, alpha, inside) * strength
+    image, inside = np.zeros(observed.normal.shape, np.float32), observed.normal_at(observed.mask)
+    image[observed.mask] = (
+        interpolated_response(environment, options.model, alpha, inside) * strength
+    )
     return strength, image

@@ -1,14 +1,14 @@
 """The response of a lobe to a whole environment map.
 
 Equation: integral of L(l) f_r(n, v, l) (n . l) dl with v = (0, 0, 1). The map is split at a
-radiance. Brighter pixels are small far lights. The rest is smooth: it is sampled in directions
-whose half vectors are distributed like the lobe, for GGX tan^2 t = alpha^2 u / (1 - u) with the
-weight F G (v . h) / ((n . v) (n . h)), for Blinn-Phong cos t = u^(1 / (p + 1)) with the weight (p +
-8) / (p + 1) (v . h) (n . l), u at even steps.
+radiance threshold. Brighter pixels are treated as small distant lights. The rest is smooth: it is
+sampled in directions whose half vectors are distributed like the lobe, for GGX tan^2 t = alpha^2 u
+/ (1 - u) with the weight F G (v . h) / ((n . v) (n . h)), for Blinn-Phong cos t = u^(1 / (p + 1))
+with the weight (p + 8) / (p + 1) (v . h) (n . l), u at even steps.
 
-Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206 (sampling of facets).
+Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206 (sampling of microfacets).
 
-Limits: no shadows. A lobe much narrower than the map's pixels shows them.
+Limits: no shadows. A lobe much narrower than the map's pixels resolves these pixels.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ from ..shading.brdf.ggx import F0, visible
 from ..shading.environment_map import directions, solid_angles
 from .response import respond
 
-_MOST_BRIGHT = 160
+_MAX_BRIGHT = 160
 _RINGS, _SPOKES = 7, 9
 _GRID = 81  # table of normals on a disc
 
@@ -59,7 +59,7 @@ def split_environment(radiance: np.ndarray) -> SplitEnvironment:
     """
     rows = len(radiance)
     mean = radiance.mean(axis=2).ravel()
-    level = np.sort(mean)[-min(_MOST_BRIGHT, mean.size)]
+    level = np.sort(mean)[-min(_MAX_BRIGHT, mean.size)]
     gain = np.minimum(1, level / np.maximum(mean, 1e-300)).reshape(rows, 2 * rows, 1)
     over = (radiance * (1 - gain)).reshape(-1, 3)
     kept = over.max(axis=1) > 1e-6 * float(over.max(initial=0))
@@ -96,10 +96,10 @@ def respond_to(
     return total
 
 
-def table_of(
+def interpolated_response(
     environment: SplitEnvironment, model: LobeModel, alpha: float, normal: np.ndarray
 ) -> np.ndarray:
-    """Compute `respond_to` for many normals, by interpolation on the equal-area disc of normals.
+    """Interpolate `respond_to` for many normals from a table on the equal-area disc of normals.
 
     Parameters
     ----------
@@ -139,16 +139,18 @@ def _smooth(radiance: np.ndarray, model: LobeModel, normal: np.ndarray, alpha: f
         )
         sin_half = np.sqrt(1 - cos_half**2)
         for spoke in range(_SPOKES):
-            turn = 2 * np.pi * (spoke + 0.5 * (ring % 2)) / _SPOKES
-            half = cos_half * normal + sin_half * (np.cos(turn) * first + np.sin(turn) * second)
-            deviation = half[:, 2]
-            light = 2 * deviation[:, None] * half - (0, 0, 1)
-            light_cos = (light * normal).sum(axis=1)
-            usable = (deviation > 0) & (light_cos > 0) & (normal[:, 2] > 0)
-            weight = _weight(
-                model, normal[:, 2], np.where(usable, light_cos, 1), cos_half, deviation, alpha
+            azimuth = 2 * np.pi * (spoke + 0.5 * (ring % 2)) / _SPOKES
+            half = cos_half * normal + sin_half * (
+                np.cos(azimuth) * first + np.sin(azimuth) * second
             )
-            total += np.where(usable, weight, 0)[:, None] * _seen(radiance, light)
+            view_half_cos = half[:, 2]
+            light = 2 * view_half_cos[:, None] * half - (0, 0, 1)
+            light_cos = (light * normal).sum(axis=1)
+            usable = (view_half_cos > 0) & (light_cos > 0) & (normal[:, 2] > 0)
+            weight = _weight(
+                model, normal[:, 2], np.where(usable, light_cos, 1), cos_half, view_half_cos, alpha
+            )
+            total += np.where(usable, weight, 0)[:, None] * _radiance_from(radiance, light)
     return total / (_RINGS * _SPOKES)
 
 
@@ -157,24 +159,24 @@ def _weight(
     view_cos: np.ndarray,
     light_cos: np.ndarray,
     half_cos: float,
-    deviation: np.ndarray,
+    view_half_cos: np.ndarray,
     alpha: float,
 ) -> np.ndarray:
     if model == "blinn_phong":
         exponent = 2 / alpha**2 - 2
-        return (exponent + 8) / (exponent + 1) * deviation * light_cos
-    fresnel = F0 + (1 - F0) * (1 - np.clip(deviation, 0, 1)) ** 5
+        return (exponent + 8) / (exponent + 1) * view_half_cos * light_cos
+    fresnel = F0 + (1 - F0) * (1 - np.clip(view_half_cos, 0, 1)) ** 5
     view_cos = np.maximum(view_cos, 1e-6)
     return (
         fresnel
         * visible(alpha, view_cos)
         * visible(alpha, light_cos)
-        * deviation
+        * view_half_cos
         / (view_cos * half_cos)
     )
 
 
-def _seen(radiance: np.ndarray, light: np.ndarray) -> np.ndarray:
+def _radiance_from(radiance: np.ndarray, light: np.ndarray) -> np.ndarray:
     """The radiance (N, 3) from unit directions (N, 3), bilinear."""
     rows = len(radiance)
     row = np.arccos(np.clip(light[:, 1], -1, 1)) * rows / np.pi - 0.5
@@ -189,7 +191,7 @@ def _seen(radiance: np.ndarray, light: np.ndarray) -> np.ndarray:
 
 
 def _tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (N, 3) across the normals, which face the viewer, and each other."""
+    """Unit vectors (N, 3) perpendicular to normals that face the viewer, and to each other."""
     first = np.stack([normal[:, 2], np.zeros(len(normal)), -normal[:, 0]], axis=1)
     length = np.linalg.norm(first, axis=1, keepdims=True)
     first = np.where(length > 1e-6, first / np.maximum(length, 1e-6), (1.0, 0, 0))

@@ -1,17 +1,17 @@
 """One lobe under a few lights, and the nonlinear least squares that fits it.
 
-Equation: the specular light, mean over the channels, at the place p (in radii of the object from
-its middle) is
+Equation: the specular light, mean over the channels, at the position p (in radii of the object from
+its centre) is
 
     s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,    v = l_k - q_k p,  l = v / |v|,
 
-y of `response`, over log a_k, log alpha, the base b, the directions l_k, which move in their
-tangent planes, and the nearness q_k >= 0 (0: infinitely far; 1 / q radii from the middle). The base
-is a mirrored smooth environment map, sum_j c_j B_j(n), see `mirrored_basis`; or, where a separator
-made the image, -c: it shows highlights only above an unknown level, so its image is max(0, s).
-The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic
-for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting;
-gradients are exact.
+y of `response`, with the unknowns log a_k, log alpha, the base b, the directions l_k, which are
+updated in their tangent planes, and the nearness q_k >= 0 (0: infinitely far; otherwise 1 / q radii
+from the centre). The base is a mirrored smooth environment map, sum_j c_j B_j(n), see
+`mirrored_basis`; or, for the image of a separator, -c: it contains highlights only above an unknown
+level, so the image is max(0, s). The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i
+= (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are
+Levenberg-Marquardt's with re-weighting; gradients are exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L.
 Blanc-Feraud, G. Aubert, M. Barlaud, IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
@@ -28,22 +28,22 @@ from .pixels import Pixels
 from .response import mirrored_basis, respond
 
 ALPHAS = (0.004, 0.98)
-_NEAREST = 0.6
-# Least z of the half vector: light from farther behind reaches no visible surface.
+_MAX_NEARNESS = 0.6
+# Smallest z of the half vector: light from farther behind reaches no visible surface.
 _LOWEST_TILT = 0.2
-_USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = (
+_TYPICAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = (
     0.15,
     0.7,
     20.0,
-)  # what is known beforehand of a separator's level, as a share of the peak
+)  # prior of a separator's level, as a share of the peak
 _TYPICAL_MIRRORED, _MIRRORED_WEIGHT = (
     0.1,
     0.1,
-)  # of the mirrored map, as a share of the peak; a weak prior too
-_USUAL_NEARNESS, _NEARNESS_WEIGHT = (
+)  # weak prior of the mirrored map, as a share of the peak
+_TYPICAL_NEARNESS, _NEARNESS_WEIGHT = (
     0.3,
     0.1,
-)  # q is below the first; a weak hint, where the image says nothing
+)  # weak prior of q, for images that do not determine it
 
 
 @dataclass(frozen=True)
@@ -147,7 +147,7 @@ class Fitted:
 
 
 def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
-    """Find the minimum near a start; deterministic.
+    """Find the local minimum near a start; deterministic.
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
     start : Lamps
         The start.
     steps : int, optional
-        At most so many.
+        Maximum number of steps.
 
     Returns
     -------
@@ -169,13 +169,13 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
         curvature, gradient = _normal_equations(problem, best)
         diagonal = np.diag(curvature)
         ridge = np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-300) + 1e-300)
-        tried = evaluate(
+        trial = evaluate(
             problem,
             step_parameters(best.lamps, -np.linalg.solve(curvature + ridge, gradient), problem),
         )
-        if tried.loss < best.loss:
-            small = best.loss - tried.loss < 1e-7 * best.loss
-            best, damping = tried, max(damping / 5, 1e-7)
+        if trial.loss < best.loss:
+            small = best.loss - trial.loss < 1e-7 * best.loss
+            best, damping = trial, max(damping / 5, 1e-7)
             if small:
                 break
         else:
@@ -186,9 +186,9 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
 
 
 def contributions(
-    model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.ndarray
+    model: LobeModel, lamps: Lamps, normal: np.ndarray, position: np.ndarray
 ) -> np.ndarray:
-    """Return each light's part of the specular light.
+    """Return each light's contribution to the specular light.
 
     Parameters
     ----------
@@ -197,8 +197,8 @@ def contributions(
     lamps : Lamps
     normal : (N, 3) ndarray
         Unit normals.
-    place : (N, 3) ndarray
-        In radii of the object from its middle.
+    position : (N, 3) ndarray
+        In radii of the object from its centre.
 
     Returns
     -------
@@ -209,14 +209,16 @@ def contributions(
     for direction, near, log_amplitude in zip(
         lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
     ):
-        light, length = arriving(direction, near, place)
+        light, length = light_directions(direction, near, position)
         parts.append(
             np.exp(log_amplitude) * respond(model, normal, light, lamps.alpha).value / length**2
         )
     return np.stack(parts)
 
 
-def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
+def predicted(
+    problem: Problem, lamps: Lamps, normal: np.ndarray, position: np.ndarray
+) -> np.ndarray:
     """Return the mean specular light of the channels.
 
     Parameters
@@ -226,32 +228,32 @@ def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndar
     lamps : Lamps
     normal : (N, 3) ndarray
         Unit normals.
-    place : (N, 3) ndarray
-        In radii of the object from its middle.
+    position : (N, 3) ndarray
+        In radii of the object from its centre.
 
     Returns
     -------
     (N,) ndarray
         Not negative.
     """
-    total = contributions(problem.model, lamps, normal, place).sum(
+    total = contributions(problem.model, lamps, normal, position).sum(
         axis=0
     ) + lamps.base @ problem.basis(normal)
     return np.maximum(total, 0)
 
 
-def arriving(
-    direction: np.ndarray, nearness: float, place: np.ndarray
+def light_directions(
+    direction: np.ndarray, nearness: float, position: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | float]:
     """Compute the directions toward a light.
 
     Parameters
     ----------
     direction : (3,) ndarray
-        Unit direction from the middle of the object.
+        Unit direction from the centre of the object.
     nearness : float
-        q; 0 for a far light.
-    place : (N, 3) ndarray
+        q; 0 for a distant light.
+    position : (N, 3) ndarray
         Positions.
 
     Returns
@@ -259,11 +261,11 @@ def arriving(
     light : (3,) or (N, 3) ndarray
         Unit directions toward the light.
     length : float or (N,) ndarray
-        Its distance over that from the middle.
+        Its distance over that from the centre.
     """
     if nearness == 0:
         return direction, 1.0
-    toward = direction - nearness * place
+    toward = direction - nearness * position
     length = np.maximum(np.sqrt((toward * toward).sum(axis=1)), 1e-6)
     return toward / length[:, None], length
 
@@ -301,81 +303,91 @@ def evaluate(problem: Problem, lamps: Lamps) -> Fitted:
     -------
     Fitted
     """
-    pixels, columns, turns, nearer = problem.pixels, [], [], []
+    pixels, columns, by_direction, by_nearness = problem.pixels, [], [], []
     by_alpha = np.zeros(len(pixels.value))
     for direction, near, log_amplitude in zip(
         lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
     ):
-        light, length = arriving(direction, near, pixels.place)
-        answer = respond(problem.model, pixels.normal, light, lamps.alpha)
+        light, length = light_directions(direction, near, pixels.position)
+        response = respond(problem.model, pixels.normal, light, lamps.alpha)
         scale = np.exp(log_amplitude) / length**2
-        columns.append(scale * answer.value)
-        by_alpha += scale * answer.by_log_alpha
+        columns.append(scale * response.value)
+        by_alpha += scale * response.by_log_alpha
         if problem.directions or problem.nearness:
-            along = (answer.by_light * light).sum(axis=1) + 2 * answer.value
-            by_toward = (answer.by_light - along[:, None] * light) * (np.ones(1) * scale / length)[
-                :, None
-            ]
-            turns += list((by_toward @ tangents(direction).T).T) if problem.directions else []
-            nearer += [-(by_toward * pixels.place).sum(axis=1)] if problem.nearness else []
+            along = (response.by_light * light).sum(axis=1) + 2 * response.value
+            by_toward = (response.by_light - along[:, None] * light) * (
+                np.ones(1) * scale / length
+            )[:, None]
+            by_direction += (
+                list((by_toward @ tangents(direction).T).T) if problem.directions else []
+            )
+            by_nearness += [-(by_toward * pixels.position).sum(axis=1)] if problem.nearness else []
     basis = problem.basis(pixels.normal)
     total = np.sum(columns, axis=0) + lamps.base @ basis
-    left = (total - pixels.value) / pixels.sigma
+    residual = (total - pixels.value) / pixels.sigma
     jacobian = (
         np.stack(
-            [*columns, *basis, *([by_alpha] if problem.alpha else []), *turns, *nearer], axis=1
+            [*columns, *basis, *([by_alpha] if problem.alpha else []), *by_direction, *by_nearness],
+            axis=1,
         )
         / pixels.sigma[:, None]
     )
-    silent = pixels.clipped & (left > 0)
+    inactive = pixels.clipped & (residual > 0)
     if problem.thresholded:
-        silent |= (pixels.value <= pixels.dark) & (total < pixels.value)
-    left = np.where(silent, 0, left)
-    root = np.sqrt(1 + left**2)
-    loss = float(pixels.weight @ (2 * (root - 1))) + sum(_hints(problem, lamps)[0])
-    return Fitted(lamps, loss, left, jacobian, np.where(silent, 0, pixels.weight / root))
+        inactive |= (pixels.value <= pixels.dark) & (total < pixels.value)
+    residual = np.where(inactive, 0, residual)
+    root = np.sqrt(1 + residual**2)
+    loss = float(pixels.weight @ (2 * (root - 1))) + sum(_priors(problem, lamps)[0])
+    return Fitted(lamps, loss, residual, jacobian, np.where(inactive, 0, pixels.weight / root))
 
 
-def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.ndarray]:
-    """Weak priors: their losses, and, by the columns of the Jacobian, halves of gradients and
-    curvatures.
+def _priors(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.ndarray]:
+    """Weak priors: their losses, and half of their gradients and curvatures, ordered like the
+    columns of the Jacobian.
     """
     count = lamps.count
-    turning = 2 * count if problem.directions else 0
+    direction_count = 2 * count if problem.directions else 0
     size = (
-        count + len(lamps.base) + int(problem.alpha) + turning + (count if problem.nearness else 0)
+        count
+        + len(lamps.base)
+        + int(problem.alpha)
+        + direction_count
+        + (count if problem.nearness else 0)
     )
     gradient, curvature, losses = np.zeros(size), np.zeros(size), []
     if problem.thresholded:
-        off, slope = (
-            np.log(lamps.base[0] / (_USUAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD,
+        deviation, slope = (
+            np.log(lamps.base[0] / (_TYPICAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD,
             1 / (_LEVEL_SPREAD * lamps.base[0]),
         )
-        losses.append(_LEVEL_WEIGHT * float(off) ** 2)
-        gradient[count], curvature[count] = _LEVEL_WEIGHT * off * slope, _LEVEL_WEIGHT * slope**2
+        losses.append(_LEVEL_WEIGHT * float(deviation) ** 2)
+        gradient[count], curvature[count] = (
+            _LEVEL_WEIGHT * deviation * slope,
+            _LEVEL_WEIGHT * slope**2,
+        )
     else:
-        usual = _TYPICAL_MIRRORED * problem.pixels.peak
-        losses.append(_MIRRORED_WEIGHT * float(np.square(lamps.base / usual).sum()))
-        gradient[count : count + len(lamps.base)] = _MIRRORED_WEIGHT * lamps.base / usual**2
-        curvature[count : count + len(lamps.base)] = _MIRRORED_WEIGHT / usual**2
+        typical = _TYPICAL_MIRRORED * problem.pixels.peak
+        losses.append(_MIRRORED_WEIGHT * float(np.square(lamps.base / typical).sum()))
+        gradient[count : count + len(lamps.base)] = _MIRRORED_WEIGHT * lamps.base / typical**2
+        curvature[count : count + len(lamps.base)] = _MIRRORED_WEIGHT / typical**2
     if problem.nearness:
-        losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _USUAL_NEARNESS).sum()))
-        gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _USUAL_NEARNESS**2
-        curvature[-count:] = _NEARNESS_WEIGHT / _USUAL_NEARNESS**2
+        losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _TYPICAL_NEARNESS).sum()))
+        gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _TYPICAL_NEARNESS**2
+        curvature[-count:] = _NEARNESS_WEIGHT / _TYPICAL_NEARNESS**2
     return losses, gradient, curvature
 
 
 def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-    _, gradient, curvature = _hints(problem, fitted.lamps)
-    return product(fitted.jacobian, fitted.weight, fitted.jacobian) + np.diag(curvature), (
-        product(fitted.jacobian, fitted.weight, fitted.residual[:, None])[:, 0] + gradient
+    _, gradient, curvature = _priors(problem, fitted.lamps)
+    return weighted_product(fitted.jacobian, fitted.weight, fitted.jacobian) + np.diag(curvature), (
+        weighted_product(fitted.jacobian, fitted.weight, fitted.residual[:, None])[:, 0] + gradient
     )
 
 
-def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
+def weighted_product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Compute sum_n left_ni weight_n right_nj.
 
-    Without BLAS, whose threads take longer to start than a few columns need.
+    Without BLAS, whose threads take longer to start than the product of a few columns.
 
     Parameters
     ----------
@@ -391,7 +403,7 @@ def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarr
 
 
 def step_parameters(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
-    """Move the parameters by a step, kept within their bounds.
+    """Update the parameters by a step, within their bounds.
 
     Parameters
     ----------
@@ -415,14 +427,13 @@ def step_parameters(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
     if problem.directions:
         directions = np.stack(
             [
-                _turned(d, np.clip(step[at + 2 * k : at + 2 * k + 2], -0.4, 0.4))
+                _rotated(d, np.clip(step[at + 2 * k : at + 2 * k + 2], -0.4, 0.4))
                 for k, d in enumerate(directions)
             ]
         )
     if problem.nearness:
-        # Not quite 0, where the light would count as infinitely far and its derivative would be
-        # lost.
-        nearness = np.clip(nearness + np.clip(step[-count:], -0.15, 0.15), 1e-6, _NEAREST)
+        # Not exactly 0, where the light would be treated as infinitely far, without a derivative.
+        nearness = np.clip(nearness + np.clip(step[-count:], -0.15, 0.15), 1e-6, _MAX_NEARNESS)
     amplitudes = np.clip(lamps.log_amplitudes + np.clip(step[:count], -1.5, 1.5), -200, 200)
     base = lamps.base + step[count : count + len(lamps.base)]
     if problem.thresholded:
@@ -437,7 +448,7 @@ def step_parameters(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
     )
 
 
-def _turned(direction: np.ndarray, step: np.ndarray) -> np.ndarray:
+def _rotated(direction: np.ndarray, step: np.ndarray) -> np.ndarray:
     moved = direction + step @ tangents(direction)
     moved /= np.linalg.norm(moved)
     lowest = 2 * _LOWEST_TILT**2 - 1

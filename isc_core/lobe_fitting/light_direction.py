@@ -1,7 +1,7 @@
-"""The optimal light direction: the one distant light that best explains a decomposition (thesis,
+"""The optimal light direction: the single distant light that best explains a decomposition (thesis,
 figure 4.49).
 
-Problem: the recovered light comes from everywhere; an artist, or a renderer, needs one direction.
+Problem: the recovered light comes from all directions; an artist, or a renderer, needs one.
 
 Equations, summed over the pixels' normals n and the channels c, with a robust rho(r) = 2 s^2
 (sqrt(1 + (r / s)^2) - 1): shading      min over l, E, A of  rho(S_c(n) - E_c / pi max(0, n . l) -
@@ -11,15 +11,16 @@ closed form; the best are refined by least squares.
 
 The cone: the 68 % standard error of the direction where it is largest, from the sandwich H^-1
 (sum_b g_b g_b^T) H^-1 with H the curvature and g_b the gradient summed over a block of neighbouring
-pixels: errors of shape and separation are alike within a block, so that counting single pixels
-would be far too optimistic. The share explained: 1 - (remaining sum of squares) / (that of no
-direction at all, which is a constant for the shading and nothing for the highlight).
+pixels: errors of shape and separation are correlated within a block, so that treating pixels as
+independent would be far too optimistic. The share explained: 1 - (residual sum of squares) / (that
+of a model without direction, which is a constant for the shading and zero for the highlight).
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; the sandwich of clustered errors: K.-Y.
 Liang, S. L. Zeger, Biometrika 73 (1986), doi:10.1093/biomet/73.1.13. H. Akbar 2016.
 
-Limits: the cone is the uncertainty of THIS model's direction, and does not include errors of shape
-and separation. One light; a window and a lamp give something between them, and a low share.
+Limits: the cone is the uncertainty under this model, and does not include errors of shape and
+separation. One light; with a window and a lamp, the direction lies between them, and the share is
+low.
 """
 
 from collections.abc import Callable
@@ -39,14 +40,15 @@ from ..shading.radiance import directional, radiance
 _SAMPLES, _GRID, _BLOCKS = 3000, 600, 8
 _EXPONENTS = (6.0, 25.0, 100.0, 400.0)
 _STARTS = 3
-_SHARPEST = 2000.0
-# Normals at the silhouette are the least certain, and separated light there is mostly background.
+_MAX_EXPONENT = 2000.0
+# Normals at the silhouette are the least certain, and specular light there is mostly background.
 _RIM = 0.25
 _ROBUST = 0.2  # of the white: errors from here on count linearly
-_LEAST_SHARE, _WIDEST_CONE = 0.2, 30.0
-# A lobe that explains so much of the specular light has its highlights where the photo has them;
-# its lamp is taken if it explains so much of what the best direction explains of the shading.
-_LOBE_EXPLAINS, _NEARLY = 0.5, 0.8
+_MIN_SHARE, _MAX_CONE = 0.2, 30.0
+# A lobe that explains at least this share of the specular light has its highlights where the photo
+# has them; its lamp is used if it explains at least this fraction of the shading that the best
+# direction explains.
+_LOBE_EXPLAINS, _LAMP_EXPLAINS = 0.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ class DirectionEstimate:
     explained : float
         Share explained, in [0, 1].
     cone : float
-        Degrees, of the direction's 68 % interval.
+        68 % interval of the direction, degrees.
     exponent : float or None
         Of the Blinn-Phong lobe, for the specular light.
     """
@@ -73,13 +75,13 @@ class DirectionEstimate:
     @property
     def determined(self) -> bool:
         """Whether enough is explained, and the cone is well below a hemisphere."""
-        return self.explained >= _LEAST_SHARE and self.cone <= _WIDEST_CONE
+        return self.explained >= _MIN_SHARE and self.cone <= _MAX_CONE
 
 
 @dataclass(frozen=True)
 class _Samples:
     """Pixels of the object: `normal`, `values` (N, 3), the `block` (N,) of each, and `scale`, the
-    error from which on errors count less.
+    error above which the loss is linear.
     """
 
     normal: np.ndarray
@@ -104,17 +106,17 @@ def explain_shading(d: Decomposition) -> DirectionEstimate:
     samples = _samples(d, d.shading)
     start = _best_lambert(samples)
 
-    def model(light: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        return np.maximum(samples.normal @ light, 0)[:, None] * rest[:3] + rest[3:]
+    def model(light: np.ndarray, others: np.ndarray) -> np.ndarray:
+        return np.maximum(samples.normal @ light, 0)[:, None] * others[:3] + others[3:]
 
     facing = np.maximum(samples.normal @ start, 0)
     design = np.stack([facing, np.ones_like(facing)], 1)
     first = np.maximum(np.linalg.lstsq(design, samples.values, rcond=None)[0], 1e-6 * samples.scale)
-    light, rest, cone = _refined(samples, model, start, np.concatenate(first), np.zeros(6))
+    light, others, cone = _refined(samples, model, start, np.concatenate(first), np.zeros(6))
     spread = np.square(samples.values - samples.values.mean(0)).sum()
-    explained = _explained(samples.values - model(light, rest), spread)
+    explained = _explained(samples.values - model(light, others), spread)
     return DirectionEstimate(
-        DirectionalLight(light, np.pi * rest[:3], rest[3:]),
+        DirectionalLight(light, np.pi * others[:3], others[3:]),
         explained,
         cone if explained > 0 else 180.0,
     )
@@ -133,7 +135,7 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
     Returns
     -------
     light : DirectionalLight
-        The best light from there.
+        The best light from that direction.
     explained : float
         Share of the shading that it explains, in [0, 1].
     """
@@ -149,7 +151,7 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
 
 
 def lies_on_highlights(fit: LobeFit) -> bool:
-    """Return whether a lobe has its highlights where the photo has them, as after `isc refine`.
+    """Return whether a lobe's highlights coincide with the photo's, as after `isc refine`.
 
     Parameters
     ----------
@@ -163,7 +165,7 @@ def lies_on_highlights(fit: LobeFit) -> bool:
 
 
 def main_light(d: Decomposition) -> DirectionEstimate:
-    """Find the one distant light to render a decomposition under.
+    """Find the single distant light under which to render a decomposition.
 
     Parameters
     ----------
@@ -181,7 +183,7 @@ def main_light(d: Decomposition) -> DirectionEstimate:
     if fit is None or fit.direction is None or not lies_on_highlights(fit):
         return best
     light, explained = share_explained(d, np.asarray(fit.direction, float))
-    if explained < _NEARLY * best.explained:
+    if explained < _LAMP_EXPLAINS * best.explained:
         return best
     return DirectionEstimate(light, explained, fit.lights[0].cone)
 
@@ -189,8 +191,8 @@ def main_light(d: Decomposition) -> DirectionEstimate:
 def explain_specular(d: Decomposition) -> DirectionEstimate:
     """Find the distant light and the Blinn-Phong exponent that best explain the specular layer.
 
-    Without specular light, or with next to none by the lobe fit, nothing is explained: some light
-    fits any two faint specks.
+    If there is no specular light, or hardly any according to the lobe fit, the share explained is
+    0: a light can be fitted to any two faint spots.
 
     Parameters
     ----------
@@ -208,28 +210,28 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
     ):
         return DirectionEstimate(DirectionalLight(VIEW, np.zeros(3)), 0.0, 180.0, None)
 
-    def model(light: np.ndarray, rest: np.ndarray) -> np.ndarray:
-        return lobe_light(samples.normal, light, float(np.exp(rest[3])))[:, None] * rest[:3]
+    def model(light: np.ndarray, others: np.ndarray) -> np.ndarray:
+        return lobe_light(samples.normal, light, float(np.exp(others[3])))[:, None] * others[:3]
 
     fits = []
     for light, exponent in _best_lobes(samples):
         lobe = lobe_light(samples.normal, light, exponent)
         strength = np.maximum(lobe @ samples.values / (lobe @ lobe), 1e-6 * samples.scale)
-        rest = np.append(strength, np.log(exponent))
+        others = np.append(strength, np.log(exponent))
         found = _refined(
             samples,
             model,
             light,
-            rest,
+            others,
             np.array([0, 0, 0, np.log(1.0)]),
-            np.array([np.inf] * 3 + [np.log(_SHARPEST)]),
+            np.array([np.inf] * 3 + [np.log(_MAX_EXPONENT)]),
         )
         fits.append((_robust_cost(samples, model(*found[:2])), found))
-    light, rest, cone = min(fits, key=lambda fit: fit[0])[1]
-    explained = _explained(samples.values - model(light, rest), np.square(samples.values).sum())
-    estimate = DirectionalLight(light, rest[:3])
+    light, others, cone = min(fits, key=lambda fit: fit[0])[1]
+    explained = _explained(samples.values - model(light, others), np.square(samples.values).sum())
+    estimate = DirectionalLight(light, others[:3])
     return DirectionEstimate(
-        estimate, explained, cone if explained > 0 else 180.0, float(np.exp(rest[3]))
+        estimate, explained, cone if explained > 0 else 180.0, float(np.exp(others[3]))
     )
 
 
@@ -256,9 +258,9 @@ def lobe_light(normal: np.ndarray, light: np.ndarray, exponent: float) -> np.nda
 def _samples(
     d: Decomposition, layer: np.ndarray, rim: float = 0.0, *, mirroring: bool = False
 ) -> _Samples:
-    """Some of the pixels, evenly; without those whose normal's z is below `rim`, unless that is
-    nearly all of them. Before a camera, `mirroring` gives normals that mirror the same light to a
-    viewer along z.
+    """An even subset of the pixels; without those whose normal's z is below `rim`, unless these are
+    most of them. With a camera, `mirroring` gives normals that mirror the same light to a viewer
+    along z.
     """
     normals = d.normal if d.camera is None or not mirroring else far_view_normals(d.normal, d.view)
     inside = d.mask & (normals[..., 2] >= rim)
@@ -316,7 +318,7 @@ def _refined(
     samples: _Samples,
     model: Model,
     light: np.ndarray,
-    rest: np.ndarray,
+    others: np.ndarray,
     low: np.ndarray,
     high: np.ndarray | float = np.inf,
 ) -> tuple[np.ndarray, np.ndarray, float]:
@@ -327,11 +329,9 @@ def _refined(
 
     bounds = (
         np.concatenate([[-1.0, -1.0], low]),
-        np.concatenate([[1.0, 1.0], np.broadcast_to(high, rest.shape)]),
+        np.concatenate([[1.0, 1.0], np.broadcast_to(high, others.shape)]),
     )
-    for _ in range(
-        2
-    ):  # the second time around the direction found, where the tangent plane is the sphere
+    for _ in range(2):  # again around the direction found, where the tangent plane is accurate
         plane = _tangents(light)
 
         def errors(
@@ -339,7 +339,7 @@ def _refined(
         ) -> np.ndarray:
             return (model(_moved(around, plane, x[:2]), x[2:]) - samples.values).reshape(-1)
 
-        start = np.concatenate([[0.0, 0.0], np.clip(rest, bounds[0][2:], bounds[1][2:])])
+        start = np.concatenate([[0.0, 0.0], np.clip(others, bounds[0][2:], bounds[1][2:])])
         fit = least_squares(
             errors,
             start,
@@ -349,8 +349,8 @@ def _refined(
             x_scale="jac",
             max_nfev=60,
         )
-        light, rest = _moved(light, plane, fit.x[:2]), fit.x[2:]
-    return light, rest, _cone(errors, fit.x, samples)
+        light, others = _moved(light, plane, fit.x[:2]), fit.x[2:]
+    return light, others, _cone(errors, fit.x, samples)
 
 
 def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _Samples) -> float:
@@ -368,7 +368,7 @@ def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _S
     np.add.at(blocks, np.repeat(samples.block, 3), (weight * error)[:, None] * jacobian)
     inverse = np.linalg.pinv(curvature, hermitian=True)
     spread = (inverse @ (blocks.T @ blocks) @ inverse)[:2, :2]
-    # A direction that nothing depends on has no curvature, and its error no bound.
+    # A direction without effect has no curvature, and its error is unbounded.
     flat = np.linalg.eigvalsh(curvature[:2, :2])[0] <= 1e-12 * max(
         float(np.trace(curvature)), 1e-300
     )
@@ -392,7 +392,7 @@ def _explained(error: np.ndarray, whole: float) -> float:
 
 
 def _tangents(direction: np.ndarray) -> np.ndarray:
-    """Two unit vectors (2, 3) across `direction` and each other."""
+    """Two unit vectors (2, 3) perpendicular to `direction` and to each other."""
     other = np.eye(3)[int(np.argmin(np.abs(direction)))]
     first = np.cross(direction, other)
     first /= np.linalg.norm(first)

@@ -1,4 +1,4 @@
-"""The image that a lobe is fitted to, and everything else that is given, validated."""
+"""The inputs of a lobe fit, validated."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ from ..shading.brdf.directions import unit
 
 @dataclass(frozen=True)
 class PixelData:
-    """What else is known of the pixels of a specular image.
+    """Optional data for the pixels of a specular image.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class PixelData:
     clipped : (H, W) ndarray of bool or None
         Where the light is a lower bound.
     height : (H, W) ndarray or None
-        Pixels toward the viewer. With it lights may be near; otherwise they are infinitely far.
+        Pixels toward the viewer. With it, lights may be near; otherwise they are infinitely far.
     """
 
     confidence: np.ndarray | None = None
@@ -33,7 +33,7 @@ class PixelData:
 
 @dataclass(frozen=True)
 class GivenLight:
-    """Known light: at most one of the two.
+    """Known light: at most one of the two attributes.
 
     Attributes
     ----------
@@ -49,14 +49,14 @@ class GivenLight:
 
 @dataclass(frozen=True)
 class RecoveredScene:
-    """What was recovered from the same photo as the specular image, see `recovered`.
+    """Quantities recovered from the same photo as the specular image, see `recovered`.
 
     Attributes
     ----------
     shading : (H, W, 3) ndarray
         Of a white Lambertian surface, >= 0.
     silhouette_normals : (H, W, 3) ndarray or None
-        Unit normals that the silhouette alone suggests.
+        Unit normals expected from the silhouette alone.
     light_estimate : LightEstimate or None
         The predicted light.
     """
@@ -67,16 +67,16 @@ class RecoveredScene:
 
 
 @dataclass(frozen=True)
-class Places:
-    """Where the pixels' surface is, in radii of the object (half of the longer side of the mask's
-    box) from the middle of that box.
+class SurfacePositions:
+    """Surface positions of the pixels, in radii of the object (half of the longer side of the
+    mask's bounding box) from the centre of that box.
 
     Attributes
     ----------
     height : (H, W) ndarray
         Pixels toward the viewer.
     middle : tuple of float
-        Row, column and height that are 0.
+        Row, column and height of the origin.
     radius : float
         In pixels.
     """
@@ -86,7 +86,7 @@ class Places:
     radius: float
 
     def at(self, cells: np.ndarray) -> np.ndarray:
-        """Return places.
+        """Return surface positions.
 
         Parameters
         ----------
@@ -118,11 +118,11 @@ class Observed:
     clipped : (H, W) ndarray of bool
         Where the light is a lower bound.
     inside : (H, W) ndarray of bool
-        Pixels that count.
-    places : Places or None
+        Pixels that are used.
+    positions : SurfacePositions or None
         None where the height is unknown.
     silhouette_normals : (H, W, 3) ndarray or None
-        Unit normals that the silhouette alone suggests.
+        Unit normals expected from the silhouette alone.
     """
 
     specular: np.ndarray
@@ -131,7 +131,7 @@ class Observed:
     confidence: np.ndarray
     clipped: np.ndarray
     inside: np.ndarray
-    places: Places | None
+    positions: SurfacePositions | None
     silhouette_normals: np.ndarray | None = None
 
     @property
@@ -141,11 +141,11 @@ class Observed:
 
     @property
     def brightness(self) -> np.ndarray:
-        """Means over the channels (n,) of the specular light where pixels count."""
+        """Means over the channels (n,) of the specular light of the pixels that are used."""
         return channel_means(self.specular, self.inside)
 
     def specular_at(self, where: np.ndarray) -> np.ndarray:
-        """Return the specular light of some pixels in doubles.
+        """Return the specular light of some pixels in float64.
 
         Parameters
         ----------
@@ -158,7 +158,7 @@ class Observed:
         return np.asarray(self.specular[where], float)
 
     def normal_at(self, where: np.ndarray | tuple[slice, slice]) -> np.ndarray:
-        """Return the normals of some pixels in doubles.
+        """Return the normals of some pixels in float64.
 
         Parameters
         ----------
@@ -189,7 +189,7 @@ def observe(
     pixels : PixelData, optional
         Confidence, clipping and height.
     silhouette_normals : (H, W, 3) ndarray, optional
-        Unit normals that the silhouette alone suggests.
+        Unit normals expected from the silhouette alone.
 
     Returns
     -------
@@ -237,8 +237,10 @@ def observe(
             )
         _check_unit(silhouette_normals, mask, "silhouette_normals")
     inside = mask & (confidence > 0) & (normal[..., 2] > 0)
-    places = _places(pixels.height, mask)
-    return Observed(specular, normal, mask, confidence, clipped, inside, places, silhouette_normals)
+    positions = _positions(pixels.height, mask)
+    return Observed(
+        specular, normal, mask, confidence, clipped, inside, positions, silhouette_normals
+    )
 
 
 def _check_unit(vectors: np.ndarray, mask: np.ndarray, name: str) -> None:
@@ -246,7 +248,7 @@ def _check_unit(vectors: np.ndarray, mask: np.ndarray, name: str) -> None:
         unit(vectors[block.rows][mask[block.rows]], name)
 
 
-def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
+def _positions(height: np.ndarray | None, mask: np.ndarray) -> SurfacePositions | None:
     if height is None or not mask.any():
         return None
     height = np.asarray(height, float)
@@ -258,4 +260,4 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> Places | None:
     low, high = np.array([part.start for part in box]), np.array([part.stop - 1 for part in box])
     (row, column), radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
     middle = float((height[mask].min() + height[mask].max()) / 2)
-    return Places(height, (float(row), float(column), middle), radius)
+    return SurfacePositions(height, (float(row), float(column), middle), radius)

@@ -2,12 +2,12 @@
 
 Equation: the deviation of a pixel of specular light s is sigma = sqrt(floor^2 + (relative s)^2),
 floor being a share of the peak; its weight is its confidence times the number of pixels that it
-represents. Pixels are taken at even steps in their order of brightness, so that the same image
+represents. Pixels are chosen at even steps in their order of brightness, so that the same image
 gives the same pixels.
 
 Citation: W. G. Cochran, "Sampling techniques", 3rd edition (1977) (systematic sampling; no DOI).
 
-Limits: a clipped pixel is a lower bound only; it counts where the model is darker.
+Limits: a clipped pixel is only a lower bound; its residual is used where the model is darker.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ import numpy as np
 from .observed import Observed
 
 _BRIGHT, _DARK = 0.03, 1e-3  # of the peak
-_PEAK_PIXELS = 5  # the peak is the mean of that many: one hot pixel is no highlight
+_PEAK_PIXELS = 5  # the peak is their mean: a single hot pixel is not a highlight
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Pixels:
     ----------
     normal : (N, 3) ndarray
         Unit normals.
-    place : (N, 3) ndarray
-        See `Places`; 0 where unknown.
+    position : (N, 3) ndarray
+        See `SurfacePositions`; 0 where unknown.
     colour : (N, 3) ndarray
         Specular light.
     value : (N,) ndarray
@@ -43,7 +43,7 @@ class Pixels:
     peak : float
         Of the highlight.
     dark : float
-        Light that counts as none.
+        Light below this is treated as 0.
     bright : int
         Number of pixels of the image that reach half of the peak.
     peak_clipped : float
@@ -51,7 +51,7 @@ class Pixels:
     """
 
     normal: np.ndarray
-    place: np.ndarray
+    position: np.ndarray
     colour: np.ndarray
     value: np.ndarray
     sigma: np.ndarray
@@ -64,48 +64,53 @@ class Pixels:
     peak_clipped: float
 
 
-def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixels:
-    """Choose pixels to fit to.
+def choose_pixels(observed: Observed, noise: tuple[float, float], max_pixels: int) -> Pixels:
+    """Choose the pixels for a fit.
 
     Parameters
     ----------
-    seen : Observed
+    observed : Observed
         The specular image.
     noise : tuple of float
         The floor as a share of the peak, and the relative part.
-    most : int
-        At most about so many.
+    max_pixels : int
+        Approximate maximum number of pixels.
 
     Returns
     -------
     Pixels
-        The same for the same image.
+        Deterministic.
     """
-    inside = seen.inside
-    value = seen.brightness
+    inside = observed.inside
+    value = observed.brightness
     order = np.argsort(-value, kind="stable")
     peak = float(value[order[:_PEAK_PIXELS]].mean())
     bright = int((value > _BRIGHT * peak).sum())
     parts, weights = [], []
-    for part, share in ((order[:bright], most // 2), (order[bright:], most - most // 2)):
+    for part, share in (
+        (order[:bright], max_pixels // 2),
+        (order[bright:], max_pixels - max_pixels // 2),
+    ):
         step = max(1, -(-len(part) // max(share, 1)))
-        taken = part[::step]
-        parts.append(taken)
-        weights.append(np.full(len(taken), len(part) / max(len(taken), 1)))
-    taken = np.concatenate(parts)
-    sigma = np.sqrt((noise[0] * peak) ** 2 + (noise[1] * value[taken]) ** 2)
-    cell = np.argwhere(inside)[taken]
+        chosen = part[::step]
+        parts.append(chosen)
+        weights.append(np.full(len(chosen), len(part) / max(len(chosen), 1)))
+    chosen = np.concatenate(parts)
+    sigma = np.sqrt((noise[0] * peak) ** 2 + (noise[1] * value[chosen]) ** 2)
+    cell = np.argwhere(inside)[chosen]
     return Pixels(
-        normal=np.asarray(seen.normal[inside][taken], float),
-        place=np.zeros((len(taken), 3)) if seen.places is None else seen.places.at(cell),
-        colour=np.asarray(seen.specular[inside][taken], float),
-        value=value[taken],
+        normal=np.asarray(observed.normal[inside][chosen], float),
+        position=np.zeros((len(chosen), 3))
+        if observed.positions is None
+        else observed.positions.at(cell),
+        colour=np.asarray(observed.specular[inside][chosen], float),
+        value=value[chosen],
         sigma=np.maximum(sigma, np.finfo(float).tiny),
-        weight=np.concatenate(weights) * seen.confidence[inside][taken],
-        clipped=seen.clipped[inside][taken],
+        weight=np.concatenate(weights) * observed.confidence[inside][chosen],
+        clipped=observed.clipped[inside][chosen],
         cell=cell,
         peak=peak,
         dark=_DARK * peak,
         bright=int((value > 0.5 * peak).sum()),
-        peak_clipped=float(seen.clipped[inside][order[:_PEAK_PIXELS]].mean()),
+        peak_clipped=float(observed.clipped[inside][order[:_PEAK_PIXELS]].mean()),
     )

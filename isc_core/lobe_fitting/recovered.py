@@ -1,12 +1,12 @@
-"""The lobe of an object known from one photo only: normals, shading and specular light are
-recovered.
+"""The lobe of an object of which normals, shading and specular light were recovered from a single
+photo.
 
-Problem: recovered normals are wrong by 10 to 20 degrees, most of all in highlights, so the WIDTH of
-the highlight among them carries hardly any information (alpha had a deviation of a factor 1.9, the
-light was 30 to 60 degrees off). Its brightness carries more: an insulator mirrors about f0 = 4 % of
-the light along the normal, and the shading shows how bright that light is. So does the share of the
-OBJECT that the highlight covers, whatever the normals there: all directions toward the viewer occur
-somewhere on it.
+Problem: recovered normals are wrong by 10 to 20 degrees, most of all in highlights, so the width of
+the highlight in terms of these normals carries hardly any information (alpha had a deviation of a
+factor 1.9, the light was 30 to 60 degrees off). Its brightness carries more: a dielectric reflects
+about f0 = 4 % of the light at normal incidence, and the shading shows how bright that light is. So
+does the share of the object's area that the highlight covers, regardless of the normals there: all
+normals that face the viewer occur somewhere on the object.
 
 Equation: with A the brightest shading (97th percentile), a light with irradiance E = pi A across
 its beam, and the highlight's peak P, the lobe's height D F G / (4 cos) at n = h gives
@@ -15,27 +15,28 @@ its beam, and the highlight's peak P, the lobe's height D F G / (4 cos) at n = h
     f = sum of max(s - .2 P, 0) over the object / (P times its pixels),
     log alpha = a + b log alpha_P + c log sqrt(f),    strength E = pi A,
 
-s the specular light (a separator may have left darker parts or not), cos = .85 the typical tilt of
-h. h is the mean of the normals, weighted by the squared specular light, after the normals were
-blurred over .3 of the object's size (the root of its area): what remains is the position of the
+s the specular light (a separator may or may not include darker parts), cos = .85 the typical tilt
+of h. h is the mean of the normals, weighted by the squared specular light, after the normals were
+blurred over .3 of the object's size (the root of its area): this retains the position of the
 highlight on the object. Where the silhouette's normals are given, h is the mean of both. Where the
-light was predicted (`light_estimate`), the prediction is the light's direction, and h only
-positions the highlight on these normals.
+light was predicted (`light_estimate`), the prediction is the light's direction, and h is only used
+to place the highlight on these normals.
 
 a, b and c were fitted to 44 rendered GGX objects (alpha .05 to .45, strength .6 to 1.5, ior 1.5)
-that went through the whole chain; each left out in turn, alpha was within a factor 1.5 on 83 % of
-those from .1 to .4 (70 % without f), strength over shading within 40 % on 77 %, and the light 22
-degrees off in the median (28 without the silhouette). The widths of the intervals hold 68 % of 30
-of them since SIRFS uses predicted shape and light. `benchmarks/decomposition/lobe_fitting.py`
+that went through the whole pipeline; in leave-one-out validation, alpha was within a factor 1.5 on
+83 % of those from .1 to .4 (70 % without f), strength over shading within 40 % on 77 %, and the
+light 22 degrees off in the median (28 without the silhouette). The intervals contain 68 % of 30 of
+them, with SIRFS using predicted shape and light. `benchmarks/decomposition/lobe_fitting.py`
 measures others.
 
 Citation: the brightness of highlights as a measure of gloss: J. A. Ferwerda, F. Pellacini, D. P.
 Greenberg, "A psychophysically-based model of surface gloss perception", SPIE 4299 (2001),
-doi:10.1117/12.429501. Facets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
+doi:10.1117/12.429501. Microfacets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
 
-A clipped highlight was brighter than P: alpha_P then is too wide, and the result an upper bound.
+A clipped highlight was brighter than P: alpha_P is then too large, and the result is an upper
+bound.
 
-Limits: insulators (metals mirror ten times as much) under lights that are small beside the
+Limits: dielectrics (metals reflect ten times as much) under lights that are small compared with the
 highlight; one light, the strongest. Strength is relative to the given shading: one photo does not
 determine how dark an albedo is, so the shading's own scale may be off by two.
 """
@@ -65,25 +66,25 @@ from .pixels import Pixels
 from .starts import light_of_half_vector
 
 _BLUR = 0.3  # of the root of the object's area
-_BLOCKS = 16  # to a width of the blur
+_BLOCKS = 16  # per width of the blur
 _BRIGHTEST = 97.0  # percentile of the shading
 _TILT = 0.85
 _OFFSET, _SLOPE, _COVERED = 0.319, 0.589, 0.434
-_TOPS = 0.2  # of the peak: what is brighter counts as covered
+_COVER_LEVEL = 0.2  # of the peak: brighter pixels count as covered
 _ALPHA_SPREAD, _STRENGTH_SPREAD, _CONE = (
     0.28,
     0.34,
     30.0,
-)  # hold 68 %: factors as logarithms, degrees
-_LEAST_SHARE = 1e-3  # of specular light over shading: separators leave less on diffuse objects
-_WIDEST = 0.6
-_NARROWEST_PIXELS = 6
-_FLATTEST = 0.05
-_MOST_CLIPPED = 0.5  # of the pixels of the peak
+)  # 68 % intervals: log factors, degrees
+_MIN_SHARE = 1e-3  # of specular light over shading: separators find less on diffuse objects
+_MAX_ALPHA = 0.6
+_MIN_PEAK_PIXELS = 6
+_MIN_Z = 0.05
+_MAX_CLIPPED = 0.5  # of the pixels of the peak
 
 
 def fit_recovered(
-    seen: Observed,
+    observed: Observed,
     pixels: Pixels,
     shading: np.ndarray,
     direction: np.ndarray | None,
@@ -94,7 +95,7 @@ def fit_recovered(
 
     Parameters
     ----------
-    seen : Observed
+    observed : Observed
         The specular image.
     pixels : Pixels
         The fitted pixels.
@@ -112,41 +113,43 @@ def fit_recovered(
     LobeFit
         With one light.
     """
-    convention, inside = CONVENTION[options.model], seen.inside
-    light_there = channel_means(shading, inside)
-    brightest, mirrored_light = (
-        float(np.percentile(light_there, _BRIGHTEST)),
-        seen.brightness,
+    convention, inside = CONVENTION[options.model], observed.inside
+    shading_level = channel_means(shading, inside)
+    brightest, specular_level = (
+        float(np.percentile(shading_level, _BRIGHTEST)),
+        observed.brightness,
     )
-    if brightest <= 0 or mirrored_light.sum() < _LEAST_SHARE * light_there.sum():
-        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
+    if brightest <= 0 or specular_level.sum() < _MIN_SHARE * shading_level.sum():
+        return LobeFit.without_lobe(
+            options.model, LobeFitOutcome.NO_SPECULAR, observed.specular.shape
+        )
     by_brightness = 0.5 * float(np.log(F0 * brightest / (4 * _TILT * pixels.peak)))
-    by_size = 0.5 * float(np.log(np.maximum(mirrored_light / pixels.peak - _TOPS, 0).mean()))
+    by_size = 0.5 * float(np.log(np.maximum(specular_level / pixels.peak - _COVER_LEVEL, 0).mean()))
     log_alpha = _OFFSET + _SLOPE * by_brightness + _COVERED * by_size
     alpha = float(np.clip(np.exp(log_alpha), *ALPHAS))
-    normal = blurred_normals(seen.normal, seen.mask)
-    mirrored_at = _light_direction(seen, normal) if direction is None else direction
+    normal = blurred_normals(observed.normal, observed.mask)
+    highlight_light = _light_direction(observed, normal) if direction is None else direction
     if direction is not None:
-        towards, cone = direction, 0.0
+        toward, cone = direction, 0.0
     else:
-        towards, cone = (
-            (mirrored_at, _CONE)
+        toward, cone = (
+            (highlight_light, _CONE)
             if light_estimate is None
             else (light_estimate.direction, light_estimate.cone)
         )
     colour = (pixels.weight * pixels.value) @ pixels.colour
     mirrored = (
         1.0 if options.model == "ggx" else F0
-    )  # the strength of Blinn-Phong's lobe has f0 in it
+    )  # the strength of the Blinn-Phong lobe includes f0
     product = mirrored * np.pi * brightest * colour / max(float(colour.mean()), 1e-300)
     light = LobeLight(
-        towards,
+        toward,
         cone,
         product,
         Interval(product * np.exp(-_STRENGTH_SPREAD), product * np.exp(_STRENGTH_SPREAD)),
     )
     image, explained = _predicted(
-        seen, normal, replace(light, direction=mirrored_at), alpha, options
+        observed, normal, replace(light, direction=highlight_light), alpha, options
     )
     outcome = _outcome(alpha, pixels, light_estimate)
     interval: Interval | None = Interval(
@@ -161,19 +164,18 @@ def fit_recovered(
 
 
 def _outcome(alpha: float, pixels: Pixels, light_estimate: LightEstimate | None) -> LobeFitOutcome:
-    if pixels.peak_clipped > _MOST_CLIPPED:
-        # Even where the bound is wide: clipping is no sign of a smooth light.
+    if pixels.peak_clipped > _MAX_CLIPPED:
+        # Even if the bound is large: clipping does not indicate smooth light.
         return LobeFitOutcome.CLIPPED
-    if alpha > _WIDEST or (light_estimate is not None and light_estimate.smooth):
+    if alpha > _MAX_ALPHA or (light_estimate is not None and light_estimate.smooth):
         return LobeFitOutcome.SMOOTH_LIGHT
-    return LobeFitOutcome.NARROW if pixels.bright < _NARROWEST_PIXELS else LobeFitOutcome.DETERMINED
+    return LobeFitOutcome.NARROW if pixels.bright < _MIN_PEAK_PIXELS else LobeFitOutcome.DETERMINED
 
 
 def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Blur normals over .3 of the object's size.
 
-    The blur works on sums over blocks, a sixteenth of its width each, since its time grows with its
-    width.
+    For speed, the blur is applied to sums over blocks of a sixteenth of its width.
 
     Parameters
     ----------
@@ -204,7 +206,7 @@ def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
         here = inside[block.rows]
         near = enlarged(sums, here.shape, step, (block.rows.start, 0))
         means = near[..., :3] / np.maximum(near[..., 3:], 1e-9)
-        means[..., 2] = np.maximum(means[..., 2], _FLATTEST)
+        means[..., 2] = np.maximum(means[..., 2], _MIN_Z)
         unit = means / np.linalg.norm(means, axis=-1, keepdims=True)
         of_box[block.rows][here] = unit[here]
     return blurred
@@ -225,12 +227,14 @@ def _block_sums(normal: np.ndarray, inside: np.ndarray, step: int) -> np.ndarray
     return np.concatenate(sums).transpose(2, 0, 1)
 
 
-def _light_direction(seen: Observed, normal: np.ndarray) -> np.ndarray:
-    """From the highlight's mean normal, or the mean of it and the silhouette's."""
-    weight = np.square(seen.brightness) * seen.confidence[seen.inside]
-    half = _unit(weight @ normal[seen.inside])
-    if seen.silhouette_normals is not None:
-        half = _unit(half + _unit(weight @ np.asarray(seen.silhouette_normals[seen.inside], float)))
+def _light_direction(observed: Observed, normal: np.ndarray) -> np.ndarray:
+    """From the mean normal of the highlight, averaged with the silhouette's if given."""
+    weight = np.square(observed.brightness) * observed.confidence[observed.inside]
+    half = _unit(weight @ normal[observed.inside])
+    if observed.silhouette_normals is not None:
+        half = _unit(
+            half + _unit(weight @ np.asarray(observed.silhouette_normals[observed.inside], float))
+        )
     return light_of_half_vector(half)
 
 
@@ -239,19 +243,19 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _predicted(
-    seen: Observed, normal: np.ndarray, light: LobeLight, alpha: float, options: LobeFitOptions
+    observed: Observed, normal: np.ndarray, light: LobeLight, alpha: float, options: LobeFitOptions
 ) -> tuple[np.ndarray, float]:
     """The fit's specular image on the blurred normals, and the share that it explains."""
     lamps = Lamps(
         light.direction[None], np.zeros(1), np.zeros(1), np.zeros(1), float(np.log(alpha))
     )
-    image = np.zeros(seen.specular.shape, np.float32)
-    for block in row_blocks(seen.mask.shape):
-        here = seen.mask[block.rows]
+    image = np.zeros(observed.specular.shape, np.float32)
+    for block in row_blocks(observed.mask.shape):
+        here = observed.mask[block.rows]
         inside = normal[block.rows][here]
         shares = contributions(options.model, lamps, inside, np.zeros_like(inside))[0]
         image[block.rows][here] = shares[:, None] * light.strength_light
-    given = seen.specular_at(seen.inside)
-    error = given - image[seen.inside]
-    left, total = (float(np.square(one, out=one).sum()) for one in (error, given))
-    return image, float(np.clip(1 - left / max(total, 1e-300), 0, 1))
+    given = observed.specular_at(observed.inside)
+    error = given - image[observed.inside]
+    remaining, total = (float(np.square(one, out=one).sum()) for one in (error, given))
+    return image, float(np.clip(1 - remaining / max(total, 1e-300), 0, 1))

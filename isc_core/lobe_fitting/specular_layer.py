@@ -1,25 +1,26 @@
 """The base colour under the specular layer of a renderer's surface.
 
 Problem: the recovered base colour rho explains the photo's diffuse image without a layer above it.
-Renderers give the diffuse layer only what the specular one does not reflect, and add what that one
-mirrors of the recovered environment. This broad reflection is in the diffuse image already: a
-separator finds highlights. The object would be too bright in most places.
+In renderers, the diffuse layer receives only the light that the specular layer does not reflect,
+and the specular layer adds its reflection of the recovered environment. The diffuse image already
+contains this broad reflection, since a separator extracts only highlights. The object would be too
+bright in most places.
 
-Equation: seen at the angle t, the specular layer reflects the share E(t), its directional albedo:
-GGX with Fresnel's equations for the index of refraction whose reflectance along the normal is
-.04 level. Of the environment it mirrors M toward the photo's camera. With the shading S, the colour
-b looks like rho where
+Equation: viewed at the angle t, the specular layer reflects the share E(t), its directional albedo:
+GGX with Fresnel's equations for the index of refraction whose reflectance at normal incidence is
+.04 level. It reflects M of the environment toward the photo's camera. With the shading S, the
+colour b has the appearance of rho if
 
     b (1 - E) S + M = rho S
 
-Where M is large beside rho S, it is more likely wrong than the base colour is dark: it comes from
-the sides or from behind, where the environment is a guess. So at most half of rho is taken off,
-smoothly, in each channel:  b (1 - E) = rho (1 + exp(-2 M / (rho S))) / 2.
+Where M is large compared with rho S, an error of M is more likely than a dark base colour: M comes
+from the sides or from behind, where the environment is uncertain. So rho is reduced by at most a
+half, smoothly, in each channel: b (1 - E) = rho (1 + exp(-2 M / (rho S))) / 2.
 
 Citation: the layering is that of B. Burley, "Extending the Disney BRDF to a BSDF with integrated
 subsurface scattering", SIGGRAPH 2015 courses (no DOI).
 
-Limits: right in the photo's light and view. Light that is reflected between facets is left out.
+Limits: exact only for the photo's light and view. Interreflection between microfacets is neglected.
 """
 
 from dataclasses import dataclass, field
@@ -35,16 +36,16 @@ from ..shading.brdf.ggx import F0, Ggx
 from ..shading.lights import VIEW
 from ..shading.mirrored_environment import MirroredEnvironment
 
-MOST = 0.96  # of the reflectance along the normal: an index of refraction is finite
+MOST = 0.96  # of the reflectance at normal incidence: the index of refraction is finite
 ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth
 _ANGLES, _NODES = 10, 32
-_SMALLEST_ROUGHNESS = 0.05
+_MIN_ROUGHNESS = 0.05
 _DARKEST = 1e-6
 
 
 @dataclass(frozen=True)
 class _Layer:
-    """GGX with Fresnel's equations, as the integral of the albedo needs it."""
+    """GGX with Fresnel's equations, for the integral of the albedo."""
 
     alpha: float
     f0: float
@@ -57,23 +58,23 @@ class _Layer:
 
 @dataclass(frozen=True)
 class SpecularLayer:
-    """What the specular layer of an object takes and adds, in the photo's light and view.
+    """Light that the specular layer of an object removes and adds, for the photo's light and view.
 
     Attributes
     ----------
     effect : (H, W, 4) ndarray of float32
-        M / S in three channels, and E; continued beyond the mask.
+        M / S in three channels, and E; extrapolated beyond the mask.
     """
 
     effect: np.ndarray
 
     def color_under(self, color: np.ndarray) -> np.ndarray:
-        """Return the base colour that looks as recovered under this layer.
+        """Return the base colour that, under this layer, has the recovered appearance.
 
         Parameters
         ----------
         color : (H, W, 3) ndarray
-            The recovered one, linear.
+            The recovered base colour, linear.
 
         Returns
         -------
@@ -83,7 +84,7 @@ class SpecularLayer:
         return _under(color, self.effect)
 
     def codes_under(self, codes: np.ndarray) -> np.ndarray:
-        """Return the same for a texture of any resolution over the same frame.
+        """Return the corrected texture, of any resolution, over the same frame.
 
         Parameters
         ----------
@@ -102,14 +103,14 @@ class SpecularLayer:
         return under
 
     def rows_under(self, colors: np.ndarray, first: int) -> np.ndarray:
-        """Return the same for some rows of such a texture.
+        """Return the corrected colours of some rows of a texture.
 
         Parameters
         ----------
         colors : (rows, columns, 3) ndarray
-            The recovered ones, linear.
+            The recovered colours, linear.
         first : int
-            The texture's row that is their first one.
+            Index of the first of these rows in the texture.
 
         Returns
         -------
@@ -122,7 +123,7 @@ class SpecularLayer:
 
 @dataclass(frozen=True)
 class CoatedSurface:
-    """A surface in the recovered light, on which a specular layer lies.
+    """A surface with a specular layer, in the recovered light.
 
     Attributes
     ----------
@@ -145,7 +146,7 @@ class CoatedSurface:
     variation: np.ndarray | None = None
 
     def layer(self, level: float, roughness: float) -> SpecularLayer | None:
-        """Compute what a specular layer takes and adds.
+        """Compute the light that a specular layer removes and adds.
 
         Parameters
         ----------
@@ -176,7 +177,7 @@ class CoatedSurface:
 
 
 def specular_share(level: float, roughness: float, cosines: np.ndarray) -> np.ndarray:
-    """Return the share of the light that the specular layer takes from the diffuse one.
+    """Return the share of the light that the specular layer removes from the diffuse layer.
 
     Parameters
     ----------
@@ -195,13 +196,13 @@ def specular_share(level: float, roughness: float, cosines: np.ndarray) -> np.nd
     if level <= 0:
         return np.zeros(len(cosines))
     layer = _layer(level, roughness)
-    places = np.linspace(1 / _ANGLES, 1, _ANGLES)
-    albedos = [float(directional_albedo(layer, float(one), _NODES)) for one in places]
-    return np.interp(cosines, places, albedos)
+    nodes = np.linspace(1 / _ANGLES, 1, _ANGLES)
+    albedos = [float(directional_albedo(layer, float(one), _NODES)) for one in nodes]
+    return np.interp(cosines, nodes, albedos)
 
 
 def _layer(level: float, roughness: float) -> _Layer:
-    return _Layer(max(roughness, _SMALLEST_ROUGHNESS) ** 2, min(F0 * level, MOST))
+    return _Layer(max(roughness, _MIN_ROUGHNESS) ** 2, min(F0 * level, MOST))
 
 
 def _under(color: np.ndarray, effect: np.ndarray) -> np.ndarray:
@@ -211,7 +212,7 @@ def _under(color: np.ndarray, effect: np.ndarray) -> np.ndarray:
 
 
 def _fresnel(cosine: np.ndarray, f0: float) -> np.ndarray:
-    """The reflectance of unpolarised light, from that along the normal."""
+    """The reflectance of unpolarised light, given that at normal incidence."""
     index = (1 + np.sqrt(f0)) / (1 - np.sqrt(f0))
     inner = np.sqrt(index**2 - 1 + cosine**2)
     across = (cosine - inner) / (cosine + inner)

@@ -1,15 +1,17 @@
-"""Roughness and specular level of the fitted lobe as renderers use them, and where the level
-varies.
+"""Roughness and specular level of the fitted lobe in the parameters of renderers, and the spatial
+variation of the level.
 
-Problem: a photo determines the product of a lobe's strength and its light. The diffuse shading has
-the same lamp in it: the lamp's share of the shading gives its irradiance, and the strength remains.
+Problem: a photo determines the product of a lobe's strength and its light. The diffuse shading
+contains the same lamp: the lamp's share of the shading gives its irradiance, and hence the
+strength.
 
 Equation: S(n) = a max(0, n . l) + b is fitted to the shading, l being the fit's brightest light, a,
-b >= 0. A lamp of irradiance E gives white Lambertian reflection E / pi max(0, n . l): E = pi a,
-level = strength x light / E, for a base colour equal to the reflectance. 1 is the specular
-reflection of plastic, f0 = .04; Blinn-Phong's strength, which contains f0, is divided by .04. Where
-a is less than a third of the brightest shading, the lamp is not visible in it (recovered lights are
-smooth, and directions wrong by tens of degrees): that brightest shading then replaces a.
+b >= 0. Under a lamp of irradiance E, a white Lambertian surface has the radiance E / pi max(0, n .
+l), so E = pi a and level = strength x light / E, for a base colour equal to the reflectance. 1 is
+the specular reflection of plastic, f0 = .04; Blinn-Phong's strength, which contains f0, is divided
+by .04. Where a is less than a third of the brightest shading, the shading does not show the lamp
+(recovered lights are smooth, and directions wrong by tens of degrees): the brightest shading then
+replaces a.
 
 Variation: t(x) = sum w p s / sum w p^2 around x, s the specular image, p the predicted one. It is
 used where the fit explains most of the specular image, p is bright on a quarter of the object, and
@@ -35,15 +37,15 @@ from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.ggx import F0
 
 _BRIGHTEST_SHADING = 97.0  # percentile
-_LEAST_LAMP = 1 / 3  # of it: a weaker lamp cannot be told from none
-_MOST = 1 / F0  # a level that mirrors all light
+_MIN_LAMP = 1 / 3  # of it: a weaker lamp cannot be detected
+_MAX_LEVEL = 1 / F0  # a level that reflects all light
 _BLOCK = 0.03  # of the object's diagonal
 _COVERED, _BRIGHT, _EXPLAINED, _GAIN = 0.25, 0.1, 0.6, 0.3
-_EVEN = 0.01  # of the specular light's squares: what one level leaves less of is even
+_UNIFORM = 0.01  # of the squared specular light: a smaller residual means a uniform level
 
 
 class SpecularSource(StrEnum):
-    """Where a roughness or a specular level comes from.
+    """Source of a roughness or a specular level.
 
     Attributes
     ----------
@@ -71,7 +73,7 @@ class SpecularSource(StrEnum):
 
 @dataclass(frozen=True)
 class SpecularFit:
-    """Specular reflection in a renderer's terms; None where unknown.
+    """Specular parameters of a renderer; None where unknown.
 
     Attributes
     ----------
@@ -80,7 +82,7 @@ class SpecularFit:
     specular : float or None
         Level >= 0 for a base colour equal to the reflectance; 1 is plastic.
     roughness_source, specular_source : SpecularSource
-        Where they come from.
+        Their sources.
     variation : (H, W) ndarray or None
         Factor >= 0 of `specular`; None where one level explains the photo as well.
     """
@@ -93,7 +95,7 @@ class SpecularFit:
 
 
 def fitted_specular(d: Decomposition) -> SpecularFit:
-    """Convert a decomposition's lobe fit to a renderer's terms.
+    """Convert a decomposition's lobe fit to the parameters of a renderer.
 
     Parameters
     ----------
@@ -136,29 +138,35 @@ def specular_variation(d: Decomposition) -> np.ndarray | None:
     Returns
     -------
     (H, W) ndarray or None
-        t >= 0, 1 where nothing is known; None where one level explains the photo as well.
+        t >= 0, 1 where unknown; None where a single level explains the photo as well.
     """
     if d.brdf is None or d.brdf.explained < _EXPLAINED:
         return None
-    predicted, seen = (layer.mean(-1, dtype=float) for layer in (d.brdf.predicted, d.specular))
+    predicted, specular = (layer.mean(-1, dtype=float) for layer in (d.brdf.predicted, d.specular))
     usable = d.mask & (d.residual == 0).all(-1) & (predicted > _BRIGHT * predicted.max())
     if usable.sum() < _COVERED * d.mask.sum():
         return None
     rows, columns = np.nonzero(d.mask)
     block = max(3, round(_BLOCK * float(np.hypot(np.ptp(rows), np.ptp(columns)))))
     even = (np.indices(d.mask.shape) // block).sum(0) % 2 == 0
-    left = [0.0, 0.0]
-    for known, asked in ((usable & even, usable & ~even), (usable & ~even, usable & even)):
-        local, everywhere = _ratio(seen, predicted, known, block), _constant(seen, predicted, known)
-        for k, factor in enumerate((local[asked], everywhere)):
-            left[k] += float(np.square(seen[asked] - factor * predicted[asked]).sum())
-    if left[1] < _EVEN * np.square(seen[usable]).sum() or left[0] > (1 - _GAIN) * left[1]:
+    residual = [0.0, 0.0]
+    for known, held_out in ((usable & even, usable & ~even), (usable & ~even, usable & even)):
+        local, everywhere = (
+            _ratio(specular, predicted, known, block),
+            _constant(specular, predicted, known),
+        )
+        for k, factor in enumerate((local[held_out], everywhere)):
+            residual[k] += float(np.square(specular[held_out] - factor * predicted[held_out]).sum())
+    if (
+        residual[1] < _UNIFORM * np.square(specular[usable]).sum()
+        or residual[0] > (1 - _GAIN) * residual[1]
+    ):
         return None
-    return _ratio(seen, predicted, usable, block)
+    return _ratio(specular, predicted, usable, block)
 
 
 def lamp_shading(d: Decomposition, direction: np.ndarray) -> float:
-    """Return the shading that a lamp gives to what faces it.
+    """Return the shading of a surface that faces a lamp.
 
     Parameters
     ----------
@@ -170,33 +178,35 @@ def lamp_shading(d: Decomposition, direction: np.ndarray) -> float:
     Returns
     -------
     float
-        a above; the brightest shading where the lamp is not visible in it.
+        a above, or the brightest shading where the shading does not show the lamp.
     """
     facing = np.maximum(d.normal[d.mask].astype(float) @ direction, 0)
     shading = d.shading[d.mask].mean(-1, dtype=float)
     lamp, _ = nonnegative_pair(facing, np.ones_like(facing), shading)
     brightest = float(np.percentile(shading, _BRIGHTEST_SHADING))
-    return float(lamp) if lamp > _LEAST_LAMP * brightest else brightest
+    return float(lamp) if lamp > _MIN_LAMP * brightest else brightest
 
 
 def _level(d: Decomposition, fit: LobeFit) -> float | None:
     if fit.direction is None or fit.strength_light is None:
         return None
     level = float(fit.strength_light.mean()) / (np.pi * lamp_shading(d, fit.direction))
-    return min(level / F0 if fit.model.startswith("blinn_phong") else level, _MOST)
+    return min(level / F0 if fit.model.startswith("blinn_phong") else level, _MAX_LEVEL)
 
 
-def _constant(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray) -> float:
+def _constant(specular: np.ndarray, predicted: np.ndarray, known: np.ndarray) -> float:
     return float(
-        seen[known] @ predicted[known] / max(float(np.square(predicted[known]).sum()), 1e-30)
+        specular[known] @ predicted[known] / max(float(np.square(predicted[known]).sum()), 1e-30)
     )
 
 
-def _ratio(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray, block: int) -> np.ndarray:
-    """t (H, W) from the `known` pixels nearby, drawn toward 1 where they are weak."""
+def _ratio(
+    specular: np.ndarray, predicted: np.ndarray, known: np.ndarray, block: int
+) -> np.ndarray:
+    """t (H, W) from the `known` pixels nearby, regularised toward 1 in dark predictions."""
     common, square = (
         ndimage.gaussian_filter(np.where(known, part, 0.0), 0.5 * block, mode="constant")
-        for part in (seen * predicted, predicted**2)
+        for part in (specular * predicted, predicted**2)
     )
     ridge = 0.02 * float(square.max())
-    return (common + ridge) / (square + ridge) if ridge > 0 else np.ones(seen.shape)
+    return (common + ridge) / (square + ridge) if ridge > 0 else np.ones(specular.shape)

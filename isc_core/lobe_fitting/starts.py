@@ -1,7 +1,7 @@
 """Starting directions of the lights: the peaks of the specular light as a function of the normal.
 
-Problem: the least squares need a start near the light. For an orthographic view and a far light the
-lobe is highest near the normal that equals the half vector, l = 2 (v . h) h - v.
+Problem: the least squares need a start near the light. For an orthographic view and a distant
+light, the lobe has its maximum near the normal that equals the half vector, l = 2 (v . h) h - v.
 
 Equation: normals are laid out on a disc by Lambert's equal-area map, (x, y) / sqrt(1 + z); the mean
 specular light of each cell, blurred together with its number of pixels, has its maximum at h.
@@ -9,14 +9,14 @@ specular light of each cell, blurred together with its number of pixels, has its
 Citation: J. P. Snyder, "Map projections: a working manual", USGS Professional Paper 1395 (1987),
 doi:10.3133/pp1395.
 
-Limits: normals that no pixel has are empty cells; cells are 3 degrees wide.
+Limits: cells of normals that do not occur are empty; cells are 3 degrees wide.
 """
 
 import numpy as np
 from scipy import ndimage
 
 _CELLS = 41
-_BLUR, _APART = 1.0, 5.0  # cells
+_BLUR, _MIN_DISTANCE = 1.0, 5.0  # cells
 
 
 def bright_half_vectors(
@@ -38,7 +38,7 @@ def bright_half_vectors(
     Returns
     -------
     list of (3,) ndarray
-        The highest first; the last is that of the brightest pixel.
+        The highest first; the last is the normal of the brightest pixel.
     """
     flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
     cell = np.clip(np.floor((flat + 1) / 2 * _CELLS).astype(int), 0, _CELLS - 1)
@@ -60,7 +60,9 @@ def bright_half_vectors(
         length = float(np.linalg.norm(middle))
         if length > 0:
             found.append(middle / length)
-        mean = np.where((rows - best[0]) ** 2 + (columns - best[1]) ** 2 < _APART**2, -np.inf, mean)
+        mean = np.where(
+            (rows - best[0]) ** 2 + (columns - best[1]) ** 2 < _MIN_DISTANCE**2, -np.inf, mean
+        )
     return [*found, normal[int(np.argmax(value * (weight > 0)))]]
 
 

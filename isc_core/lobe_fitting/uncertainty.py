@@ -3,24 +3,24 @@
 Equation: with the scores g_i = w_i r_i J_i summed over blocks B of neighbouring pixels, and H = sum
 w_i J_i J_i^T,
 
-    covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p),      b blocks that count, p parameters.
+    covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p),      b effective blocks, p parameters.
 
-Errors within a block may depend on each other in any way; a block is about as wide as a highlight,
-since errors of normals, of the separation or of the lobe's form affect all of it.
+Errors within a block may be correlated in any way; a block is about as wide as a highlight, since
+errors of the normals, the separation or the lobe's shape affect all of it.
 
 Citation: K.-Y. Liang and S. L. Zeger, "Longitudinal data analysis using generalized linear models",
 Biometrika 73(1) (1986), 13-22, doi:10.1093/biomet/73.1.13 (the sandwich over clusters).
 
-Limits: an error that is the same everywhere does not show in the fit; `normal_error` accounts for
-it.
+Limits: an error that is the same everywhere does not affect the residuals; `normal_error` accounts
+for it.
 """
 
 import numpy as np
 
-from .lamps import product
+from .lamps import weighted_product
 from .pixels import Pixels
 
-_FEWEST = 4.0  # blocks; a highlight is at least cut in four
+_MIN_BLOCKS = 4.0  # blocks: a highlight is divided into at least four
 
 
 def covariance(
@@ -44,7 +44,7 @@ def covariance(
     (P, P) ndarray
         The covariance.
     """
-    bread = _inverse(product(jacobian, weight, jacobian))
+    bread = _inverse(weighted_product(jacobian, weight, jacobian))
     side = max(3.0, float(np.sqrt(pixels.bright / np.pi)))
     cell = np.floor(pixels.cell / side).astype(int)
     _, block = np.unique(cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1], return_inverse=True)
@@ -53,7 +53,7 @@ def covariance(
     leverage = np.bincount(block, weight * (jacobian @ bread * jacobian).sum(axis=1))
     count = float(leverage.sum() ** 2 / max((leverage**2).sum(), 1e-300))
     free = max(count - jacobian.shape[1] / 2, 1.0)
-    return bread @ (sums.T @ sums) @ bread * max(count, _FEWEST) / free
+    return bread @ (sums.T @ sums) @ bread * max(count, _MIN_BLOCKS) / free
 
 
 def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> float:
@@ -72,11 +72,11 @@ def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> flo
     -------
     float
     """
-    return float(_inverse(product(jacobian, weight, jacobian))[column, column])
+    return float(_inverse(weighted_product(jacobian, weight, jacobian))[column, column])
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Inverse of a symmetric, maybe singular matrix: columns without effect get no variance."""
+    """Inverse of a symmetric, possibly singular matrix: columns without effect get variance 0."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 0))
     scale = np.where(scale > 1e-12 * max(float(scale.max()), 1e-300), scale, np.inf)
     return np.asarray(
