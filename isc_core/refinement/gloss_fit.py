@@ -1,14 +1,14 @@
-"""The fit of a gloss at the working scale, without the pixels that are held out.
+"""The fit of a gloss at the working scale, without the held-out pixels.
 
-Method: the objective F of `gloss_objective` is minimised from the light of the start's lobe and
-from the two brightest spots of the specular layer; the lowest F is taken. Further lamps begin at
-the brightest spot that is left, and stay if F falls by more than their unknowns. Of blocks of
-pixels, a quarter as wide as all that is bright, every fifth in the order of their specular light is
-held out.
+Method: the objective F of `gloss_objective` is minimised starting from the light of the initial
+lobe and from the two brightest spots of the specular layer; the lowest F is used. Further lamps
+start at the brightest spot of the residual, and are kept if F decreases by more than the number of
+their unknowns. The object is divided into blocks of pixels, a quarter as wide as the bright area;
+in the order of their specular light, every fifth is held out.
 
-Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x (pixels held out).
+Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x (held-out data).
 
-Limits: those of `gloss_objective`. What is held out is near to what is fitted.
+Limits: those of `gloss_objective`. Held-out pixels are close to fitted ones.
 """
 
 from dataclasses import dataclass, replace
@@ -27,27 +27,31 @@ from .gloss_objective import (
     Gloss,
     GlossData,
     GlossObjective,
-    normals_of,
+    height_slopes,
+    normals_from_slopes,
     rendered,
-    shown,
-    slopes_of,
+    thresholded,
 )
 from .height_bumps import HeightBumps
 from .held_out import held_out_blocks, pixels_of
 from .working_scale import WorkingScale
 
-_SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: of the object's longer side
-_LEAST_SPACING = 2.0  # pixels
-_BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one of so many blocks is held out
-_BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across all that is bright
-_SPOT, _FAINT, _SPOTS = 0.4, 0.15, 2  # shares of the peak: of a spot, of the faintest spot
-_APART = 3  # pixels
+_SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: fractions of the object's longer side
+_MIN_SPACING = 2.0  # pixels
+_BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one in this many blocks is held out
+_BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across the bright area
+_SPOT, _FAINT, _SPOTS = (
+    0.4,
+    0.15,
+    2,
+)  # extent and faintest peak of spots over the peak; their number
+_MIN_DISTANCE = 3  # pixels
 _LAMP_UNKNOWNS = 4
 
 
 @dataclass(frozen=True)
 class GlossProblem:
-    """What a gloss is fitted to.
+    """The data of the fit of a gloss.
 
     Attributes
     ----------
@@ -56,9 +60,9 @@ class GlossProblem:
     data : GlossData
         All pixels.
     held : (N,) ndarray of bool
-        Pixels that are held out.
+        Held-out pixels.
     bumps : HeightBumps or None
-        Freedom of the shape; None keeps it.
+        Degrees of freedom of the shape; None keeps the shape.
     """
 
     work: WorkingScale
@@ -68,7 +72,7 @@ class GlossProblem:
 
     @property
     def fitted(self) -> GlossData:
-        """The data without what is held out."""
+        """The data without the held-out pixels."""
         return replace(self.data, weight=np.where(self.held, 0.0, 1.0))
 
     def unpacked(self, x: np.ndarray) -> Gloss:
@@ -77,7 +81,7 @@ class GlossProblem:
         Parameters
         ----------
         x : (M,) ndarray
-            Of `Gloss.packed`.
+            From `Gloss.packed`.
 
         Returns
         -------
@@ -86,7 +90,7 @@ class GlossProblem:
         return Gloss.unpacked(x, 0 if self.bumps is None else self.bumps.size)
 
     def normal(self, gloss: Gloss) -> np.ndarray:
-        """Return the normals with the change of the shape.
+        """Return the normals of the changed shape.
 
         Parameters
         ----------
@@ -99,23 +103,23 @@ class GlossProblem:
         """
         down, right = self.data.down, self.data.right
         if self.bumps is None:
-            return normals_of(down, right)
-        more_down, more_right = slopes_of(self.bumps.height(gloss.bumps))
-        return normals_of(down + more_down, right + more_right)
+            return normals_from_slopes(down, right)
+        more_down, more_right = height_slopes(self.bumps.height(gloss.bumps))
+        return normals_from_slopes(down + more_down, right + more_right)
 
 
 def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int) -> GlossProblem:
-    """Pose the fit of a result's gloss.
+    """Set up the fit of a result's gloss.
 
     Parameters
     ----------
     d : Decomposition
     fit : LobeFit
-        Its lobe, of known roughness and with a light.
+        Its lobe, with known roughness and a light.
     work : WorkingScale
         Its maps, reduced.
     seed : int
-        Of the choice of held-out blocks.
+        Of the random choice of held-out blocks.
 
     Returns
     -------
@@ -141,31 +145,31 @@ def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int)
 
 
 def bumps_of(work: WorkingScale, step: int = 1) -> HeightBumps:
-    """Return the freedom of the shape.
+    """Return the degrees of freedom of the shape.
 
     Parameters
     ----------
     work : WorkingScale
     step : int, optional
-        As of `HeightBumps.spaced`: the same on the result's own maps.
+        As for `HeightBumps.spaced`: the same bumps on the result's own maps.
 
     Returns
     -------
     HeightBumps
     """
     height, width = work.mask.shape
-    spacings = tuple(max(share * max(height, width), _LEAST_SPACING) for share in _SPACINGS)
+    spacings = tuple(max(share * max(height, width), _MIN_SPACING) for share in _SPACINGS)
     return HeightBumps.spaced((height, width), spacings, _SLOPES, step)
 
 
 def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -> Gloss:
-    """Fit a gloss to what is not held out.
+    """Fit a gloss to the pixels that are not held out.
 
     Parameters
     ----------
     problem : GlossProblem
     lamps, steps : int
-        At most so many.
+        Maximum numbers.
     monitor : Monitor
 
     Returns
@@ -178,22 +182,22 @@ def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -
         If the user cancels.
     """
     data, work = problem.fitted, problem.work
-    objective, tried = GlossObjective(data, problem.bumps), list[tuple[float, np.ndarray]]()
+    objective, starts = GlossObjective(data, problem.bumps), list[tuple[float, np.ndarray]]()
     for k, direction in enumerate([data.direction, *_spots(data.specular, work, _SPOTS)]):
         x = _start(problem, direction)
         part = monitor.part(0.2 * k, 0.2 * (k + 1))
-        tried.append((minimised(objective, x, steps, part), x))
-    loss, x = min(tried, key=lambda one: one[0])
+        starts.append((minimised(objective, x, steps, part), x))
+    loss, x = min(starts, key=lambda one: one[0])
     for count in range(2, lamps + 1):
         gloss = problem.unpacked(x)
         light = rendered(gloss, problem.normal(gloss)[work.mask])
-        left = data.weight * (data.specular - shown(gloss, light, data.peak))
-        more = _spots(left, work, 1)
-        if not more:
+        residual = data.weight * (data.specular - thresholded(gloss, light, data.peak))
+        spots = _spots(residual, work, 1)
+        if not spots:
             break
         found = replace(
             gloss,
-            directions=np.vstack([gloss.units, more[0]]),
+            directions=np.vstack([gloss.units, spots[0]]),
             log_strengths=np.append(gloss.log_strengths, gloss.log_strengths.max() - 1),
         ).packed()
         part = monitor.part(0.6 + 0.2 * (count - 2), 0.6 + 0.2 * (count - 1))
@@ -213,7 +217,7 @@ def minimised(objective: GlossObjective, x: np.ndarray, steps: int, monitor: Mon
     x : (M,) ndarray
         Changed in place.
     steps : int
-        At most so many.
+        Maximum number.
     monitor : Monitor
 
     Returns
@@ -230,19 +234,19 @@ def minimised(objective: GlossObjective, x: np.ndarray, steps: int, monitor: Mon
 
 
 def explained(problem: GlossProblem, gloss: Gloss, start: np.ndarray) -> tuple[float, float]:
-    """Return the shares of the squared held-out light that the start and the new gloss explain.
+    """Return the shares of the squared held-out light that the initial and the new gloss explain.
 
     Parameters
     ----------
     problem : GlossProblem
     gloss : Gloss
     start : (N,) ndarray
-        What the start's lobe predicts.
+        Prediction of the initial lobe.
 
     Returns
     -------
     before, after : float
-        Negative where the prediction is worse than none; clipped pixels do not count.
+        Negative where the prediction is worse than none; clipped pixels are ignored.
     """
     data, which = problem.data, problem.held & ~problem.data.clipped
     light = rendered(gloss, problem.normal(gloss)[problem.work.mask])
@@ -253,7 +257,7 @@ def explained(problem: GlossProblem, gloss: Gloss, start: np.ndarray) -> tuple[f
 
 
 def _start(problem: GlossProblem, direction: np.ndarray) -> np.ndarray:
-    """The unknowns at one lamp whose highlight has the peak of the specular layer."""
+    """The initial unknowns: one lamp whose highlight has the peak of the specular layer."""
     data = problem.data
     height = float(np.log(4 * np.pi * data.alpha**2 * data.peak / F0))
     return Gloss(
@@ -274,7 +278,7 @@ def _held_out(work: WorkingScale, seed: int) -> np.ndarray:
 
 
 def _spots(values: np.ndarray, work: WorkingScale, count: int) -> list[np.ndarray]:
-    """Lights (3,) that the recovered normals mirror in the brightest spots of some light (N,)."""
+    """Lights (3,) that the recovered normals reflect at the brightest spots of `values` (N,)."""
     image = np.zeros(work.mask.shape)
     image[work.mask] = np.maximum(values, 0)
     image = ndimage.gaussian_filter(image, 1.0)
@@ -286,5 +290,5 @@ def _spots(values: np.ndarray, work: WorkingScale, count: int) -> list[np.ndarra
         half = (work.normal[spot] * image[spot][:, None]).sum(axis=0)
         half[2] = max(half[2], 0.2 * float(np.linalg.norm(half)))
         found.append(light_of_half_vector(half / np.linalg.norm(half)))
-        image = np.where(ndimage.binary_dilation(spot, iterations=_APART), 0, image)
+        image = np.where(ndimage.binary_dilation(spot, iterations=_MIN_DISTANCE), 0, image)
     return found

@@ -1,6 +1,6 @@
-"""The note of a refinement in the settings of its result: what became of the gloss, as a line.
+"""The note about a refinement in the settings of its result, and its one-line summary.
 
-Programs that show a result read it too, so that it needs no numerical library.
+Programs that display results read it, too; it therefore needs no numerical library.
 """
 
 import math
@@ -12,7 +12,7 @@ NOTE = "refine_gloss"
 
 
 class GlossOutcome(StrEnum):
-    """What became of a gloss."""
+    """Outcome of the refinement of a gloss."""
 
     REFINED = "refined"
     NO_HIGHLIGHT = "no_highlight"
@@ -28,12 +28,12 @@ _REASONS = {
 
 
 def was_refined(settings: Mapping[str, Any]) -> bool:
-    """Return whether the gloss of a result is refined.
+    """Return whether the gloss of a result was refined.
 
     Parameters
     ----------
     settings : mapping
-        Of the result; they may be anybody's.
+        Of the result; not validated.
 
     Returns
     -------
@@ -43,17 +43,17 @@ def was_refined(settings: Mapping[str, Any]) -> bool:
 
 
 def gloss_line(settings: Mapping[str, Any]) -> str:
-    """Say what became of the gloss of a result.
+    """Summarise the refinement of the gloss of a result.
 
     Parameters
     ----------
     settings : mapping
-        Of the result; they may be anybody's.
+        Of the result; not validated.
 
     Returns
     -------
     str
-        One line; "" where no refinement was tried.
+        One line; "" if no refinement was attempted.
     """
     outcome = _outcome(settings)
     if outcome is None:

@@ -2,22 +2,22 @@
 
 Equation: with slopes p0 + dz/dr, q0 + dz/dc of the height, z the bumps of u (`height_bumps`), and
 normals n of these slopes, the gloss is G = sum_k E_k f(n, l_k; alpha), f the GGX lobe with its
-cosine. A separator shows only what exceeds an unknown level b, so s ~ max(G - b, 0), softened:
+cosine. A separator returns only light above an unknown level b, so s ~ max(G - b, 0), softened:
 
     F = w sum_p 2 (sqrt(1 + r_p^2) - 1) + (|u|^2 + (log(alpha / alpha_0) / .28)^2
         + |l_0 - l*|^2 / c^2 + (max(log(sum E / E*), 0) / .3)^2 + (log(b / b_0) / .5)^2) / 2,
     r = (max(G - b, 0) - s) / sqrt((.03 P)^2 + (.15 s)^2)
 
-P is the peak of s, l* the light of the start's lobe, alpha_0 its roughness, E* the irradiance that
-the shading has of it (`lobe_fitting.specular_level`): more strength than that is more gloss than
-that of plastic. Of clipped pixels, only too little gloss counts. w < 1: errors of neighbours are
-alike. Gradients are exact.
+P is the peak of s, l* the light of the initial lobe, alpha_0 its roughness, E* its irradiance
+according to the shading (`lobe_fitting.specular_level`): a greater strength would exceed the gloss
+of plastic. At clipped pixels, only too little gloss is penalised. w < 1, since errors of
+neighbouring pixels are correlated. Gradients are exact.
 
 Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206. P. Charbonnier et al. 1997,
 doi:10.1109/83.551699 (the loss).
 
-Limits: far, small lamps: the size of a lamp and the roughness widen a highlight alike, and so does
-less curvature, so that the width is left to the prior of alpha. No shadows.
+Limits: distant, small lamps: the size of a lamp, the roughness and a lower curvature all widen a
+highlight, so that the width is mostly determined by the prior of alpha. No shadows.
 """
 
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ from ..shading.surface_stencils import (
 )
 from .height_bumps import HeightBumps
 
-ROUGHNESS_SPREAD = 0.28  # of log alpha: of `lobe_fitting.recovered`
+ROUGHNESS_SPREAD = 0.28  # of log alpha, from `lobe_fitting.recovered`
 _WEIGHT = 0.05
 _FLOOR, _RELATIVE = 0.03, 0.15
 _CONE = 0.26  # radians, 15 degrees
@@ -46,16 +46,16 @@ _LOG_STRENGTHS = (-60.0, 30.0)
 
 @dataclass(frozen=True)
 class GlossData:
-    """What the gloss is fitted to, at a working scale.
+    """The data to which the gloss is fitted, at a working scale.
 
     Attributes
     ----------
     specular : (N,) ndarray
-        Mean of the channels of the mask's pixels.
+        Mean of the channels, at the pixels of the mask.
     clipped : (N,) ndarray of bool
-        Where it is a lower bound.
+        Where `specular` is a lower bound.
     weight : (N,) ndarray
-        0 for pixels that are held out.
+        0 for held-out pixels.
     down, right : (H, W) ndarray
         Slopes of the recovered height along rows and columns.
     mask : (H, W) ndarray of bool
@@ -123,7 +123,7 @@ class Gloss:
 
     @property
     def strengths(self) -> np.ndarray:
-        """E (K,), bounded: a line search may try anything."""
+        """E (K,), clipped: a line search may try extreme values."""
         return np.exp(np.clip(self.log_strengths, *_LOG_STRENGTHS))
 
     @property
@@ -155,8 +155,8 @@ class Gloss:
         return Gloss(x[:bumps], directions, x[first:last], float(x[-2]), float(x[-1]))
 
 
-def normals_of(down: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Return unit normals, camera frame, of slopes along rows and columns.
+def normals_from_slopes(down: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Compute unit normals, camera frame, from slopes along rows and columns.
 
     Parameters
     ----------
@@ -170,8 +170,8 @@ def normals_of(down: np.ndarray, right: np.ndarray) -> np.ndarray:
     return np.asarray(steep / np.linalg.norm(steep, axis=-1, keepdims=True))
 
 
-def slopes_of(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of a height, as the normals of a result have them.
+def height_slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the slopes of a height with the stencils of a result's normals.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def rendered(gloss: Gloss, normal: np.ndarray) -> np.ndarray:
     ----------
     gloss : Gloss
     normal : (N, 3) ndarray
-        Unit normals that mirror to a viewer along z.
+        Unit normals for a viewer along z.
 
     Returns
     -------
@@ -204,8 +204,8 @@ def rendered(gloss: Gloss, normal: np.ndarray) -> np.ndarray:
     return total
 
 
-def shown(gloss: Gloss, light: np.ndarray, peak: float) -> np.ndarray:
-    """Compute what a separator shows of a gloss, max(G - b, 0), softened.
+def thresholded(gloss: Gloss, light: np.ndarray, peak: float) -> np.ndarray:
+    """Compute the light of a gloss that a separator returns, max(G - b, 0), softened.
 
     Parameters
     ----------
@@ -240,43 +240,43 @@ class GlossObjective:
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         gloss = Gloss.unpacked(x, self._size)
-        normal = normals_of(*self._slopes(gloss.bumps))[self._data.mask]
-        answers = [respond("ggx", normal, light, gloss.alpha) for light in gloss.units]
+        normal = normals_from_slopes(*self._slopes(gloss.bumps))[self._data.mask]
+        responses = [respond("ggx", normal, light, gloss.alpha) for light in gloss.units]
         strengths = gloss.strengths
         light = np.zeros(len(normal))
-        for strength, answer in zip(strengths, answers, strict=True):
-            light += strength * answer.value
+        for strength, response in zip(strengths, responses, strict=True):
+            light += strength * response.value
         cost, by_light, by_level = self._misfit(gloss, light)
         gradient[:] = 0
         _, to_direction, to_strength, to_last = self._parts(gradient, len(strengths))
         by_normal = np.zeros_like(normal)
         lengths = np.linalg.norm(gloss.directions, axis=1)
-        for k, (strength, answer) in enumerate(zip(strengths, answers, strict=True)):
-            pull = strength * by_light
-            to_strength[k] = (pull * answer.value).sum()
-            to_last[0] += (pull * answer.by_log_alpha).sum()
-            along = np.einsum("n,nk->k", pull, answer.by_light)
+        for k, (strength, response) in enumerate(zip(strengths, responses, strict=True)):
+            scaled = strength * by_light
+            to_strength[k] = (scaled * response.value).sum()
+            to_last[0] += (scaled * response.by_log_alpha).sum()
+            along = np.einsum("n,nk->k", scaled, response.by_light)
             unit = gloss.units[k]
             to_direction[k] = (along - (along * unit).sum() * unit) / lengths[k]
-            by_normal += pull[:, None] * answer.by_normal
+            by_normal += scaled[:, None] * response.by_normal
         to_last[1] = by_level
         if self._bumps is not None:
             gradient[: self._size] = self._to_bumps(normal, by_normal) + gloss.bumps
         return cost + self._prior(gloss, gradient) + 0.5 * float(np.square(gloss.bumps).sum())
 
     def without_gloss(self) -> float:
-        """Return the misfit of no gloss at all."""
+        """Return the misfit without gloss."""
         return _WEIGHT * float((self._data.weight * _loss(self._data.specular / self._sigma)).sum())
 
     def _slopes(self, bumps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         data = self._data
         if self._bumps is None:
             return data.down, data.right
-        down, right = slopes_of(self._bumps.height(bumps))
+        down, right = height_slopes(self._bumps.height(bumps))
         return data.down + down, data.right + right
 
     def _misfit(self, gloss: Gloss, light: np.ndarray) -> tuple[float, np.ndarray, float]:
-        """The first term, and its derivatives by G (N,) and by log b."""
+        """The first term, and its derivatives with respect to G (N,) and log b."""
         data = self._data
         over = light - gloss.level
         root = np.sqrt(over**2 + (_SOFT * data.peak) ** 2)

@@ -1,20 +1,21 @@
-"""`refine_gloss`: a result whose lobe lies where the photo's highlights are, or as it was.
+"""`refine_gloss`: adapts a result's lobe to the positions of the photo's highlights, if that helps.
 
 Method: lamps, lobe and a bounded change of the shape are fitted to four fifths of the specular
 layer (`gloss_fit`). They are kept if
 
-- F of `gloss_objective` and the reflectance terms of SIRFS together are lower than without gloss
-  and change of the shape, and the latter, to which the shape was fitted, rise by `_RISE` at most,
-- of the other fifth, they explain at least `_LEAST`, and more than the start's lobe does.
+- the sum of F of `gloss_objective` and the reflectance terms of SIRFS is lower than without gloss
+  and change of the shape, and the reflectance terms, to which the shape was fitted, increase by at
+  most `_MAX_RISE`,
+- they explain at least `_MIN_EXPLAINED` of the remaining fifth, and more than the initial lobe.
 
-Then all pixels are fitted. Image and layers stay. The light becomes the one whose shading on the
-new normals is nearest to the old shading; with shading = exp(SH(normal)) and reflectance = diffuse
-/ shading, every identity of a result holds.
+Then all pixels are fitted. Image and layers are unchanged. The light is replaced by the one whose
+shading on the new normals is closest to the old shading; with shading = exp(SH(normal)) and
+reflectance = diffuse / shading, every identity of a result holds.
 
 Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x; J. T. Barron, J. Malik 2015,
 doi:10.1109/TPAMI.2014.2377712 (reflectance terms).
 
-Limits: measured in docs/methods/refine.md. Before a camera the shape stays.
+Limits: measured in docs/methods/refine.md. With a perspective camera, the shape is not changed.
 """
 
 from dataclasses import dataclass, replace
@@ -34,16 +35,16 @@ from .gloss_objective import (
     ROUGHNESS_SPREAD,
     Gloss,
     GlossObjective,
-    normals_of,
+    height_slopes,
+    normals_from_slopes,
     rendered,
-    slopes_of,
 )
 from .reflectance_terms import ReflectanceTerms, terms_of, with_diffuse
-from .working_scale import WorkingScale, mirroring_normals, slopes_of_normals, working_scale
+from .working_scale import WorkingScale, mirroring_normals, slopes_from_normals, working_scale
 
-_LEAST, _RISE = 0.25, 1.0
-_STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # of `lobe_fitting.recovered`; degrees
-_LEAST_ALPHA = 0.01
+_MIN_EXPLAINED, _MAX_RISE = 0.25, 1.0
+_STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # from `lobe_fitting.recovered`; degrees
+_MIN_ALPHA = 0.01
 _LIGHT_RIDGE = 1e-3
 
 
@@ -54,11 +55,11 @@ class GlossOptions:
     Attributes
     ----------
     lamps : int
-        At most so many, 1 to 3.
+        Maximum number, 1 to 3.
     steps : int
-        At most so many steps of the optimiser for each start, > 0.
+        Maximum number of steps of the optimiser for each start, > 0.
     seed : int
-        Of the choice of the held-out blocks, >= 0.
+        Of the random choice of the held-out blocks, >= 0.
 
     Raises
     ------
@@ -82,14 +83,14 @@ class GlossRefinement:
     Attributes
     ----------
     result : Decomposition
-        Refined, or the start.
+        Refined, or the input.
     outcome : GlossOutcome
-        Whether it is refined, or why not.
+        Whether it was refined, or why not.
     lamps : int
         Number of lamps found; 0 where there is nothing to fit.
     before, after : float
-        Share of the squared held-out specular light that the start's lobe and the new one explain;
-        negative where it is worse than no gloss.
+        Share of the squared held-out specular light that the initial and the new lobe explain;
+        negative if worse than no gloss.
     """
 
     result: Decomposition
@@ -100,7 +101,7 @@ class GlossRefinement:
 
     @property
     def kept(self) -> bool:
-        """Whether the result is refined."""
+        """Whether the result was refined."""
         return self.outcome is GlossOutcome.REFINED
 
 
@@ -118,13 +119,13 @@ def refine_gloss(
     Returns
     -------
     GlossRefinement
-        `kept` is False, and the result the start but for a note in its settings, where nothing was
-        separated, or the new gloss does not explain held-out pixels better.
+        If there is no specular light, or the new gloss does not explain held-out pixels better,
+        `kept` is False, and the result is the input with a note in its settings.
 
     Raises
     ------
     InputError
-        If the gloss of the result is refined already.
+        If the gloss of the result was already refined.
     Cancelled
         If the user cancels.
     """
@@ -133,21 +134,21 @@ def refine_gloss(
     monitor.report("refining the gloss", 0.0)
     fit = d.brdf
     if fit is None or fit.alpha is None or not fit.lights or not d.specular[d.mask].any():
-        return _noted(GlossRefinement(d, GlossOutcome.NO_HIGHLIGHT), options)
+        return _with_note(GlossRefinement(d, GlossOutcome.NO_HIGHLIGHT), options)
     work = working_scale(d)
     problem = gloss_problem(d, fit, work, options.seed)
     gloss = fit_gloss(problem, options.lamps, options.steps, monitor.part(0.0, 0.7))
     start = work.reduced(fit.predicted.mean(axis=2), d.mask)[work.mask]
     before, after = explained(problem, gloss, start)
     done = GlossRefinement(d, GlossOutcome.NOT_BETTER, len(gloss.units), before, after)
-    if after < _LEAST or after <= before:
-        return _noted(done, options)
+    if after < _MIN_EXPLAINED or after <= before:
+        return _with_note(done, options)
     if not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
-        return _noted(replace(done, outcome=GlossOutcome.UNLIKELY_REFLECTANCE), options)
+        return _with_note(replace(done, outcome=GlossOutcome.UNLIKELY_REFLECTANCE), options)
     x = gloss.packed()
     minimised(GlossObjective(problem.data, problem.bumps), x, options.steps, monitor.part(0.7, 1))
     result = _refined(d, fit, problem, problem.unpacked(x))
-    return _noted(replace(done, result=result, outcome=GlossOutcome.REFINED), options)
+    return _with_note(replace(done, result=result, outcome=GlossOutcome.REFINED), options)
 
 
 @dataclass(frozen=True)
@@ -190,14 +191,14 @@ def _new_shading(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> np.nd
 def _allowed(
     d: Decomposition, problem: GlossProblem, gloss: Gloss, reflectance: _Reflectance
 ) -> bool:
-    """Whether the reflectance terms rise by `_RISE` at most, and F falls by more."""
+    """Whether the reflectance terms rise by at most `_MAX_RISE`, and F decreases by more."""
     objective, x, work = GlossObjective(problem.fitted, problem.bumps), gloss.packed(), problem.work
     before, after = (
         reflectance.cost(work.diffuse, shading)
         for shading in (work.shading[work.mask], _new_shading(d, problem, gloss))
     )
-    fall = objective.without_gloss() - objective(x, np.empty_like(x))
-    return after - before < min(fall, _RISE)
+    decrease = objective.without_gloss() - objective(x, np.empty_like(x))
+    return after - before < min(decrease, _MAX_RISE)
 
 
 def _refined(
@@ -223,10 +224,10 @@ def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decompos
     change = bumps_of(problem.work, problem.work.step).height(gloss.bumps)
     height, width = mask[box].shape
     inside = mask[box]
-    down, right = (slope[:height, :width] for slope in slopes_of(change))
-    old_down, old_right = slopes_of_normals(d.normal[box].astype(float))
+    down, right = (slope[:height, :width] for slope in height_slopes(change))
+    old_down, old_right = slopes_from_normals(d.normal[box].astype(float))
     normal, new_height = d.normal.copy(), d.height.astype(float)
-    normal[box][inside] = normals_of(old_down + down, old_right + right)[inside]
+    normal[box][inside] = normals_from_slopes(old_down + down, old_right + right)[inside]
     new_height[box] += change[:height, :width]
     new_height = np.where(mask, new_height - new_height[mask].min(), 0)
     shading = np.zeros_like(d.shading)
@@ -241,12 +242,12 @@ def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decompos
 
 
 def _refitted(basis: np.ndarray, old: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """The light (9, 3) whose log shading on the new normals is nearest to that of `light` on the
+    """The light (9, 3) whose log shading on the new normals is closest to that of `light` on the
     old ones.
     """
-    wanted = np.einsum("nk,kc->nc", old, light)
+    target = np.einsum("nk,kc->nc", old, light)
     gram = np.einsum("nk,nl->kl", basis, basis) / len(basis)
-    right = np.einsum("nk,nc->kc", basis, wanted) / len(basis)
+    right = np.einsum("nk,nc->kc", basis, target) / len(basis)
     return solve_linear(gram + _LIGHT_RIDGE * np.eye(9), right + _LIGHT_RIDGE * light)
 
 
@@ -256,10 +257,10 @@ def _lobe(
     predicted = np.zeros_like(d.specular)
     predicted[d.mask] = light[:, None] * colour
     given = d.specular[d.mask].astype(float)
-    left = float(np.square(given - predicted[d.mask]).sum())
+    remaining = float(np.square(given - predicted[d.mask]).sum())
     total = max(float(np.square(given).sum()), 1e-300)
     alpha, factor = gloss.alpha, float(np.exp(_STRENGTH_SPREAD))
-    low = _LEAST_ALPHA if fit.outcome.bounded else alpha * float(np.exp(-ROUGHNESS_SPREAD))
+    low = _MIN_ALPHA if fit.outcome.bounded else alpha * float(np.exp(-ROUGHNESS_SPREAD))
     high = alpha if fit.outcome.bounded else min(alpha * float(np.exp(ROUGHNESS_SPREAD)), 1.0)
     strengths = gloss.strengths
     lights = []
@@ -277,13 +278,13 @@ def _lobe(
         tuple(lights),
         None,
         None,
-        float(np.clip(1 - left / total, 0, 1)),
+        float(np.clip(1 - remaining / total, 0, 1)),
         predicted,
     )
 
 
-def _noted(done: GlossRefinement, options: GlossOptions) -> GlossRefinement:
-    """The outcome with a note in the settings of its result, and the lobe in its status."""
+def _with_note(done: GlossRefinement, options: GlossOptions) -> GlossRefinement:
+    """The outcome with a note in the settings of its result, and the lobe in its diagnostics."""
     d = done.result
     note = {
         "outcome": str(done.outcome),

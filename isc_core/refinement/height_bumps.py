@@ -1,14 +1,14 @@
 """A bounded, smooth change of a height: Gaussian bumps on grids of a few spacings.
 
 Equation: z(r, c) = sum_s a_s sum_jk u_sjk exp(-((r - j d_s)^2 + (c - k d_s)^2) / (2 d_s^2)), d_s
-the spacing. For independent u of deviation 1 the slopes of each scale have the deviation that was
-asked for: a = slope d / sqrt(pi / 2). Bumps are products of two factors, so z is two products of
-small matrices; sums are in a fixed order.
+the spacing. For independent u of deviation 1, the slopes of each scale have the requested
+deviation: a = slope d / sqrt(pi / 2). Bumps are separable, so z is the product of small matrices;
+sums are taken in a fixed order.
 
 Citation: C. E. Rasmussen, C. K. I. Williams, "Gaussian processes for machine learning" (2006),
 section 2.2 (a Gaussian process as a sum of such functions; no DOI).
 
-Limits: nothing finer than the smallest spacing.
+Limits: no detail finer than the smallest spacing.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ class HeightBumps:
     Attributes
     ----------
     rows : tuple of (H, j) ndarray
-        Of each scale: the bumps' factors along the rows.
+        Of each scale: the factors of the bumps along the rows.
     columns : tuple of (W, k) ndarray
         Along the columns.
     amplitudes : tuple of float
@@ -46,12 +46,12 @@ class HeightBumps:
         Parameters
         ----------
         shape : tuple of int
-            (H, W) of the map that the spacings belong to.
+            (H, W) of the map to which the spacings refer.
         spacings, slopes : tuple of float
             Of each scale: pixels of that map, and the deviation of the slope.
         step : int, optional
-            Pixels to one of that map: with more than 1 the same bumps on a finer map, of H step
-            rows and W step columns.
+            Pixels per pixel of that map: above 1, the same bumps on a finer map of H step rows and
+            W step columns.
 
         Returns
         -------
@@ -110,6 +110,6 @@ class HeightBumps:
 
 
 def _factors(length: int, spacing: float, step: int) -> np.ndarray:
-    places = (np.arange(length * step) + 0.5) / step - 0.5
+    positions = (np.arange(length * step) + 0.5) / step - 0.5
     centres = np.arange(-spacing, length + 1.5 * spacing, spacing)
-    return np.exp(-0.5 * np.square((places[:, None] - centres) / spacing))
+    return np.exp(-0.5 * np.square((positions[:, None] - centres) / spacing))

@@ -1,11 +1,11 @@
-"""Blocks of pixels that a fit does not see, and that it is judged by.
+"""Held-out blocks of pixels, which validate a fit.
 
-Equation: of blocks of a grid, every n-th is held out in the order of their light, the first one
-drawn: bright and dark ones are held out alike.
+Equation: the blocks of a grid are sorted by their light, and every n-th is held out, starting at a
+random one, so that bright and dark blocks are held out equally.
 
 Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x.
 
-Limits: what is held out is near to what is fitted.
+Limits: held-out pixels are close to fitted ones.
 """
 
 import numpy as np
@@ -19,20 +19,20 @@ def held_out_blocks(
     Parameters
     ----------
     light : (H, W) ndarray
-        What is to be explained; 0 outside of the object.
+        The light to be explained; 0 outside the object.
     side : int
         Of a block, pixels.
     every : int
-        One of so many blocks is chosen.
+        One in this many blocks is chosen.
     seed : int
-        Of the draw of the first one.
+        Of the random choice of the first one.
     candidates : (H, W) ndarray of bool, optional
-        Blocks that are not wholly inside are left out.
+        Blocks that are not completely inside are excluded.
 
     Returns
     -------
     (B, 2) ndarray of int
-        Their first row and column, in the order of the rows; blocks may go on beyond the image.
+        Their first row and column, in row order; blocks may extend beyond the image.
     """
     bright = _grid(light, side).sum(axis=(1, 3))
     allowed = np.ones(bright.shape, bool)
@@ -50,7 +50,7 @@ def pixels_of(blocks: np.ndarray, side: int, shape: tuple[int, ...]) -> np.ndarr
     Parameters
     ----------
     blocks : (B, 2) ndarray of int
-        Of `held_out_blocks`.
+        From `held_out_blocks`.
     side : int
     shape : tuple of int
         (H, W).

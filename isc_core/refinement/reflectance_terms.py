@@ -1,10 +1,10 @@
-"""The reflectance terms of SIRFS, of a diffuse image and any shading.
+"""The reflectance terms of SIRFS for a diffuse image and any shading.
 
 Equation: g(log D - log S): smoothness, parsimony and absolute terms, dg/dS = -(dg/dA) / S.
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the diffuse image is taken as exact.
+Limits: the diffuse image is assumed to be exact.
 """
 
 from dataclasses import dataclass, replace
@@ -18,8 +18,8 @@ from ..sirfs.priors.priors import Priors
 from ..sirfs.reflectance import palette_cost, smoothness_cost
 from ..sirfs.settings import Weights, isc_weights
 
-_DARKEST = 1e-4  # of the diffuse image, white being 1
-_LIKELY = ("photo", "natural", "laboratory")
+_DARKEST = 1e-4  # of the diffuse image, where white is 1
+_ILLUMINATIONS = ("photo", "natural", "laboratory")
 
 
 @dataclass(frozen=True)
@@ -73,13 +73,18 @@ class ReflectanceTerms:
             With respect to the shading.
         """
         values = self.log_reflectance(shading)
-        smooth, pull = smoothness_cost(values, pixel_weight, self.priors, self.weights.smoothness)
-        parsimony, absolute, more = palette_cost(values, pixel_weight, self.priors, self.weights)
-        return smooth + parsimony + absolute, -(pull + more)[self.mask] / shading
+        smooth, d_smooth = smoothness_cost(
+            values, pixel_weight, self.priors, self.weights.smoothness
+        )
+        parsimony, absolute, d_palette = palette_cost(
+            values, pixel_weight, self.priors, self.weights
+        )
+        return smooth + parsimony + absolute, -(d_smooth + d_palette)[self.mask] / shading
 
 
 def terms_of(d: Decomposition) -> tuple[ReflectanceTerms, float]:
-    """Return the reflectance terms of a result's diffuse image at the exposure of photos.
+    """Return the reflectance terms of a result's diffuse image, normalised to the exposure of
+    photos.
 
     Parameters
     ----------
@@ -89,13 +94,16 @@ def terms_of(d: Decomposition) -> tuple[ReflectanceTerms, float]:
     -------
     terms : ReflectanceTerms
     gain : float
-        Factor that brings the result's light to that exposure.
+        Factor that normalises the result's light to that exposure.
     """
-    kind = str(d.provenance.settings.get("illumination", _LIKELY[0]))
-    kind = kind if kind in _LIKELY else _LIKELY[0]
+    illumination = str(d.provenance.settings.get("illumination", _ILLUMINATIONS[0]))
+    illumination = illumination if illumination in _ILLUMINATIONS else _ILLUMINATIONS[0]
     gain = exposure_normalisation(d.image, d.mask)
     terms = ReflectanceTerms(
-        np.zeros(d.diffuse.shape), d.mask, shipped_priors(kind, 3), isc_weights(kind, 3)
+        np.zeros(d.diffuse.shape),
+        d.mask,
+        shipped_priors(illumination, 3),
+        isc_weights(illumination, 3),
     )
     return with_diffuse(terms, d.diffuse, d.mask, gain), gain
 
@@ -103,7 +111,7 @@ def terms_of(d: Decomposition) -> tuple[ReflectanceTerms, float]:
 def with_diffuse(
     terms: ReflectanceTerms, diffuse: np.ndarray, mask: np.ndarray, gain: float
 ) -> ReflectanceTerms:
-    """Return the same terms of another diffuse image.
+    """Return the same terms for another diffuse image.
 
     Parameters
     ----------
@@ -112,7 +120,7 @@ def with_diffuse(
         Linear.
     mask : (h, w) ndarray of bool
     gain : float
-        Of `terms_of`.
+        From `terms_of`.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """A result at the scale at which its gloss is fitted: the object at most `LONGEST` pixels long.
 
-Equation: means over blocks of `step` x `step` pixels, of those inside the mask; a block counts
-where more than half of it is inside.
+Equation: means over blocks of `step` x `step` pixels, restricted to the mask; a block is used if
+more than half of it is inside.
 
 Limits: highlights narrower than a block are blurred.
 """
@@ -17,24 +17,24 @@ from ..shading.perspective import far_view_normals
 
 LONGEST = 192
 _CLIPPED = 0.995  # of the brightest value
-_STEEPEST = 1e-3  # of a normal's z
+_MIN_Z = 1e-3  # of a normal's z
 
 
 @dataclass(frozen=True)
 class WorkingScale:
-    """The maps of a result over the box of its object, reduced.
+    """The maps of a result over the bounding box of its object, downsampled.
 
     Attributes
     ----------
     box : tuple of slice
-        Of the object in the result's maps.
+        Bounding box of the object in the result's maps.
     step : int
-        Pixels of the maps to one of these.
+        Pixels of the result's maps per pixel of these.
     mask, clipped : (h, w) ndarray of bool
     specular : (h, w) ndarray
         Mean of the channels.
     normal : (h, w, 3) ndarray
-        Unit normals that mirror to a viewer along z.
+        Unit normals that reflect the same light to a viewer along z.
     diffuse, shading : (h, w, 3) ndarray
     """
 
@@ -50,10 +50,10 @@ class WorkingScale:
     @property
     def slopes(self) -> tuple[np.ndarray, np.ndarray]:
         """Slopes (h, w) of the height along rows and columns, 0 outside the mask."""
-        return slopes_of_normals(self.normal)
+        return slopes_from_normals(self.normal)
 
     def reduced(self, layer: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """Reduce a layer of the result.
+        """Downsample a layer of the result.
 
         Parameters
         ----------
@@ -68,8 +68,8 @@ class WorkingScale:
         return padded_means_inside(layer[self.box].astype(float), mask[self.box], self.step)[0]
 
 
-def slopes_of_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of the height along rows and columns that normals have.
+def slopes_from_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the slopes of the height along rows and columns from normals.
 
     Parameters
     ----------
@@ -80,12 +80,12 @@ def slopes_of_normals(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     -------
     down, right : (...) ndarray
     """
-    facing = np.maximum(normal[..., 2], _STEEPEST)
+    facing = np.maximum(normal[..., 2], _MIN_Z)
     return normal[..., 1] / facing, -normal[..., 0] / facing
 
 
 def mirroring_normals(d: Decomposition) -> np.ndarray:
-    """Return normals (H, W, 3) that mirror the same light to a viewer along z.
+    """Return normals (H, W, 3) that reflect the same light to a viewer along z.
 
     Parameters
     ----------
@@ -94,14 +94,14 @@ def mirroring_normals(d: Decomposition) -> np.ndarray:
     Returns
     -------
     (H, W, 3) ndarray
-        The result's own without a camera.
+        The result's own normals if it has no camera.
     """
     normal = d.normal.astype(float)
     return normal if d.camera is None else far_view_normals(normal, d.view)
 
 
 def working_scale(d: Decomposition) -> WorkingScale:
-    """Reduce a result.
+    """Downsample the maps of a result.
 
     Parameters
     ----------

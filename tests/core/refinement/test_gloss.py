@@ -10,7 +10,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.refinement import GlossOptions, refine_gloss
 from isc_core.refinement.gloss_note import GlossOutcome, gloss_line
-from isc_core.refinement.gloss_objective import Gloss, GlossData, GlossObjective, slopes_of
+from isc_core.refinement.gloss_objective import Gloss, GlossData, GlossObjective, height_slopes
 from isc_core.refinement.height_bumps import HeightBumps
 from isc_core.refinement.working_scale import working_scale
 from isc_core.result_files.result_folder import load, save
@@ -33,7 +33,7 @@ def dome(size: int, lean: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarr
     y, x = np.mgrid[:size, :size] + 0.5 - size / 2
     mask = np.hypot(x, y) < 0.42 * size
     height = np.sqrt(np.maximum(0.36 * size**2 - x**2 - y**2, 1)) + lean * x
-    down, right = slopes_of(height)
+    down, right = height_slopes(height)
     normal = np.stack([-right, down, np.ones_like(down)], -1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     normal[~mask] = (0, 0, 1)
@@ -111,7 +111,7 @@ def test_bumps_of_a_finer_map_are_the_same_surface_and_have_the_slopes_asked_for
     fine = HeightBumps.spaced((60, 50), (4.0,), (0.3,), 3)
     u = np.random.default_rng(0).normal(size=coarse.size)
     assert np.allclose(fine.height(u)[1::3, 1::3], 3 * coarse.height(u))
-    slopes = slopes_of(fine.height(u))
+    slopes = height_slopes(fine.height(u))
     assert np.std(slopes) == pytest.approx(0.3, rel=0.15)
     g = np.random.default_rng(1).normal(size=(60, 50))
     assert (coarse.height(u) * g).sum() == pytest.approx(coarse.adjoint(g) @ u)
