@@ -25,7 +25,7 @@ from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.evaluation.evaluate import paired_bootstrap
 from isc_core.evaluation.metrics import geometric_mean
 from isc_core.numerics.lbfgs import LbfgsOptions
-from isc_core.prior_fitting.fit import RECIPE, FitOptions, fit_priors
+from isc_core.prior_fitting.fit import PUBLISHED, FitOptions, fit_priors
 from isc_core.prior_fitting.statistics import ObjectStatistics, collect_statistics
 from isc_core.prior_fitting.training_objects import read_training_objects
 from isc_core.sirfs.priors.prior_set import PriorSet
@@ -78,9 +78,11 @@ def fit_options(method: str) -> FitOptions:
     -------
     FitOptions
     """
-    return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[
-        method
-    ]
+    return {
+        "B": PUBLISHED,
+        "B, lights scaled": PUBLISHED.with_fitted_contrast(),
+        "ours": FitOptions(),
+    }[method]
 
 
 def run_job(job: SolveJob) -> tuple[str, str, str, list[float], float]:

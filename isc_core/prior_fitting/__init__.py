@@ -1,9 +1,9 @@
 """Fitting the statistics of SIRFS (Barron & Malik 2015) to objects whose shape, reflectance and
 light are known.
 
-`training_objects` reads the objects, `statistics` condenses each of them once, `fit` turns any
-selection of them into a `PriorSet`; `cross_validation` scores a selection on the others. Solvers
-import `sirfs.priors` only.
+`training_objects` reads the objects, `statistics` computes the statistics of each object once,
+`fit` fits a `PriorSet` to any selection of them; `cross_validation` evaluates a selection on the
+other objects. Solvers import `sirfs.priors` only.
 """
 
 from .fit import FitOptions, LightFitOptions, fit_photo_priors, fit_priors

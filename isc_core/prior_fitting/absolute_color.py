@@ -1,15 +1,15 @@
-"""Which reflectances are likely at all: a smooth density over whitened log colour, fitted to a
+"""The prior of absolute reflectance: a smooth density over whitened log colour, fitted to a
 histogram.
 
 Equation: minimise over tables f   sum p f + log sum exp(-f) + (c / nodes) sum sqrt(|second
 derivatives of f|^2 + 1e-5), the negative log likelihood of the histogram p and a robust thin-plate
 energy. The problem is convex; f is written as the sum of the levels of a pyramid whose finest level
-is 0 (see `absolute_table`), so that L-BFGS moves large and small features alike.
+is 0 (see `absolute_table`), so that L-BFGS updates features of all sizes at once.
 
 Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712; D. C. Liu, J. Nocedal 1989, doi:10.1007/BF01589116 (L-BFGS).
 
-Limits: where there are no data, the table rises along straight lines to the border of its range.
+Limits: where there are no data, the table is extrapolated linearly to the border of its range.
 """
 
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def _ignore(loss: float) -> None:
 
 @dataclass(frozen=True)
 class TableFitOptions:
-    """How a table is fitted.
+    """Options of the fit of a table.
 
     Attributes
     ----------
@@ -41,13 +41,13 @@ class TableFitOptions:
     levels : int
         Levels of the pyramid, the fixed finest one included.
     memory : int
-        Pairs that L-BFGS keeps.
+        Pairs stored by L-BFGS.
     tolerance : float
-        Stop when the last five losses lie within this relative distance of the current one.
+        Stop when the last five losses are within this relative distance of the current one.
     runs : int
-        Restarts from the result, with an empty memory.
+        Number of runs, each starting from the previous result with an empty memory.
     max_steps : int
-        Steps of each run.
+        Maximum number of steps of each run.
     """
 
     smoothness: float = 512.0
@@ -66,7 +66,7 @@ def fit_absolute_table(
     Parameters
     ----------
     histogram : (n, ...) ndarray
-        p, with one or three equal axes, sum 1.
+        p, with one or three axes of equal length, sum 1.
     options : TableFitOptions
     on_step : callable, optional
         Receives the loss after every step, and may raise to stop.
@@ -112,7 +112,7 @@ class _Problem:
         self.size = int(self.ends[-1])
 
     def coarse(self, unknowns: np.ndarray) -> np.ndarray:
-        """The second finest level with all coarser ones added, whose upsampling is the table."""
+        """The sum of the second finest and all coarser levels, whose upsampling is the table."""
         parts = np.split(unknowns, self.ends[:-1])
         levels = [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
         total = levels[-1]
@@ -121,7 +121,7 @@ class _Problem:
         return total
 
     def loss(self, unknowns: np.ndarray, gradient: np.ndarray) -> float:
-        """Return the loss, and write its gradient; fields are float32, sums over them float64."""
+        """Return the loss, and write its gradient; arrays are float32, sums float64."""
         f = synthesise(self.matrices[0], self.coarse(unknowns))
         value, slope = _negative_log_likelihood(f, self.histogram)
         bending, bending_slope = roughness(f)

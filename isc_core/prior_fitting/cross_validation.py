@@ -1,5 +1,5 @@
-"""The likelihood of objects under reflectance statistics fitted to the others; the criterion that
-selects the table's smoothness.
+"""The likelihood of held-out objects under reflectance statistics fitted to the others, the
+criterion that selects the smoothness of the table.
 
 Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x (leave-one-out cross-validation).
 """
@@ -23,8 +23,8 @@ def held_out_log_likelihood(
 ) -> np.ndarray:
     """Score each object under the table fitted to all the others.
 
-    Nodes of the grid are the outcomes: figures are comparable between `options`, not between
-    numbers of `channels`.
+    The distribution is over the nodes of the grid: values are comparable between `options`, but not
+    between numbers of `channels`.
 
     Parameters
     ----------

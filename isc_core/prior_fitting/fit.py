@@ -1,7 +1,7 @@
 """Fits every prior of SIRFS to a selection of training objects.
 
-Each statistic has its own module beside this one. Objects count alike in the statistics of absolute
-colour, pixels (pairs of pixels) alike in those of smoothness. No random numbers.
+Each statistic has its own module. In the statistics of absolute colour, objects have equal weights;
+in those of smoothness, pairs of pixels do. No random numbers.
 
 Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712.
@@ -28,7 +28,7 @@ from .whitening import parsimony_whitening
 
 @dataclass(frozen=True)
 class LightFitOptions:
-    """How the light priors are fitted.
+    """Options of the fit of the light priors.
 
     Attributes
     ----------
@@ -37,14 +37,14 @@ class LightFitOptions:
         lights. Likelihood alone gives 2.6 in brightness (1.9 if colour shares the factor); held-out
         accuracy is best nearer 1.6 in brightness and 0.7 in colour, the default.
     split_contrast : bool
-        Whether brightness and colour have a factor each.
+        Whether brightness and colour have separate factors.
     mirror : bool
-        Whether lights also count with left and right exchanged.
+        Whether the mirror images of lights are samples, too.
     permute_natural, permute_laboratory : bool
-        Whether lights count with every order of the channels.
+        Whether all permutations of a light's channels are samples.
     laboratory_ridge : tuple of float
-        See `fit_light`; ten lights leave many directions unobserved, so a held-out light is much
-        likelier with some.
+        See `fit_light`; ten lights leave many directions unobserved, so a ridge makes held-out
+        lights much more likely.
     floor : float
         Added where the solver whitens, see `GaussianLight`.
     photo_contrast : Contrast
@@ -66,24 +66,24 @@ class LightFitOptions:
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How the priors are fitted.
+    """Options of the fit of the priors.
 
     Attributes
     ----------
     components : int
-        Components of the mixtures of one number.
+        Components of the scalar mixtures.
     iterations : int
         Steps of expectation maximisation, for all mixtures.
     whiten_floor : float
         See `whitening`.
     absolute, grey_absolute : TableFitOptions
-        The tables of absolute reflectance. The grey one's smoothness is where held-out objects are
-        likeliest; with 256 numbers it can be fitted closely.
+        The tables of absolute reflectance. The smoothness of the grey one maximises the likelihood
+        of held-out objects; with only 256 nodes, it can be fitted closely.
     light : LightFitOptions
     relief, texture : float
         Deviations that are added to those of the differences of curvature (1 / pixel) and of log
-        reflectance: made bodies and paints are smoother than any real ones, and costs without
-        them have a spike at 0.
+        reflectance: synthetic bodies and paints are smoother than real ones, which would cause a
+        spike of the costs at 0.
     """
 
     components: int = 40
@@ -102,11 +102,11 @@ class FitOptions:
         return replace(self, light=replace(self.light, natural_contrast=None))
 
 
-# For bodies and paints that are made. Both numbers were chosen on held-out bodies.
-MADE = FitOptions(relief=0.003, texture=0.02)
-# As published: the lights as they are, no ridge, the table's constant 512 (Barron & Malik 2015).
-# The defaults are ours.
-RECIPE = FitOptions(
+# For synthetic bodies and paints. Both values were chosen on held-out bodies.
+SYNTHETIC = FitOptions(relief=0.003, texture=0.02)
+# As published (Barron & Malik 2015): unscaled lights, no ridge, the table's constant 512. The
+# defaults are ours.
+PUBLISHED = FitOptions(
     light=LightFitOptions(natural_contrast=Contrast(), laboratory_ridge=(0.0, 0.0)),
     absolute=TableFitOptions(512.0),
 )
@@ -138,7 +138,7 @@ def fit_priors(
     InputError
         If there are fewer than two objects.
     Cancelled
-        If the user asked to stop.
+        If the monitor cancels.
     """
     options, monitor = options or FitOptions(), monitor or Monitor()
     objects = _objects(statistics)
@@ -159,7 +159,7 @@ def fit_photo_priors(
     statistics : mapping of str to ObjectStatistics
         Their lights are not used; the order does not matter.
     photo_lights : (n, 9, 3) ndarray
-        Lights of white-balanced photos, reference convention; of the options of lights, `mirror`,
+        Lights of white-balanced photos, reference convention. Of `LightFitOptions`, `mirror`,
         `photo_contrast`, `photo_ridge` and `floor` apply.
     options : FitOptions, optional
     monitor : Monitor, optional
@@ -174,12 +174,12 @@ def fit_photo_priors(
     InputError
         If there are fewer than two objects.
     Cancelled
-        If the user asked to stop.
+        If the monitor cancels.
     """
     options, monitor = options or FitOptions(), monitor or Monitor()
     given = options.light
-    seen = _augmented(photo_lights, given.mirror, False)
-    fitted = scaled(fit_light(seen, given.photo_ridge, given.floor), given.photo_contrast)
+    lights = _augmented(photo_lights, given.mirror, False)
+    fitted = scaled(fit_light(lights, given.photo_ridge, given.floor), given.photo_contrast)
     return _fit(statistics, LightPriors(photo=fitted), given.photo_contrast, options, monitor)
 
 
@@ -196,7 +196,7 @@ def _fit(
     options: FitOptions,
     monitor: Monitor,
 ) -> PriorSet:
-    """Fit what objects tell, and join it with the lights."""
+    """Fit the statistics of the objects, and combine them with the light priors."""
     objects = _objects(statistics)
     monitor.report("smoothness of shape and reflectance", 0.0)
     curvature, grey_smoothness = (
@@ -226,7 +226,7 @@ def _fit(
         options.absolute,
         _steps("absolute colour", monitor.part(0.3, 1.0)),
     )
-    silhouette = fit_silhouette([o.outline for o in objects])
+    silhouette = fit_silhouette([o.silhouette for o in objects])
     record = FitRecord(tuple(sorted(statistics)), contrast, _as_text(options))
     monitor.report("priors fitted", 1.0)
     return PriorSet(
@@ -243,7 +243,7 @@ def _fit(
 
 
 def _widened(mixture: ScaleMixture, deviation: float) -> ScaleMixture:
-    """The density of a sum: samples of the mixture, and a Gaussian of this deviation."""
+    """The density of the sum of a sample of the mixture and Gaussian noise of this deviation."""
     return replace(mixture, deviations=np.sqrt(mixture.deviations**2 + deviation**2))
 
 
@@ -258,7 +258,7 @@ def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
 
 
 def fit_whitening(objects: Sequence[ObjectStatistics], floor: float = 0.01) -> np.ndarray:
-    """Return the whitening of log reflectance; every object counts alike.
+    """Return the whitening of log reflectance; objects have equal weights.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def fit_whitening(objects: Sequence[ObjectStatistics], floor: float = 0.01) -> n
 def color_histogram(
     objects: Sequence[ObjectStatistics], whiten: np.ndarray, nodes: int = COLOR_NODES
 ) -> np.ndarray:
-    """Return the histogram of whitened log reflectance; every object counts alike.
+    """Return the histogram of whitened log reflectance; objects have equal weights.
 
     Parameters
     ----------
@@ -294,7 +294,7 @@ def color_histogram(
 
 
 def grey_histogram(objects: Sequence[ObjectStatistics], nodes: int = GREY_NODES) -> np.ndarray:
-    """Return the histogram of grey log reflectance; every object counts alike.
+    """Return the histogram of grey log reflectance; objects have equal weights.
 
     Parameters
     ----------
@@ -344,10 +344,10 @@ def fit_lights(
     contrast = options.natural_contrast
     if contrast is None:
         contrast = fit_contrast(environments, np.array(natural), options.split_contrast)
-    permuted_too = _augmented(np.array(laboratory), options.mirror, options.permute_laboratory)
+    augmented = _augmented(np.array(laboratory), options.mirror, options.permute_laboratory)
     return LightPriors(
         scaled(environments, contrast),
-        fit_light(permuted_too, options.laboratory_ridge, options.floor),
+        fit_light(augmented, options.laboratory_ridge, options.floor),
     ), contrast
 
 

@@ -1,5 +1,5 @@
-"""The bending of a table: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a robust
-thin-plate energy.
+"""The bending energy of a table: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a
+robust thin-plate energy.
 
 Equation: |.|^2 = sum_a f_aa^2 + 2 sum_{a<b} f_ab^2, f_aa by (1, -2, 1), f_ab by (1, 0, -1)/2 on
 both axes, each smoothed by (1, 2, 1)/4 on the other axes.

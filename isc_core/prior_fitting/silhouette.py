@@ -1,9 +1,9 @@
-"""How surfaces lean behind their silhouettes, measured on objects of known shape: the profile of
-the `silhouette` term.
+"""The slant of surfaces as a function of the distance from their silhouettes, measured on objects
+of known shape: the profile of the `silhouette` term.
 
-Equation: for every pixel with a known normal, u is its relative depth behind the silhouette and x,
-y are the normal's components in the image plane along and across the outward direction. In each of
-`BINS` bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects count alike.
+Equation: for every pixel with a known normal, u is its relative depth from the silhouette, and x, y
+are the normal's components in the image plane along and across the outward direction. In each of
+`BINS` bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects have equal weights.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,8 @@ class SilhouetteMoments:
     Attributes
     ----------
     sums : (4, BINS) ndarray
-        Share of the object's pixels in each bin, and of the sums of x, x^2 and y^2 there.
+        Fraction of the object's pixels in each bin, and sums of x, x^2 and y^2 there over the
+        number of pixels.
     """
 
     sums: np.ndarray
@@ -57,7 +58,7 @@ class SilhouetteMoments:
 
 
 def fit_silhouette(objects: Sequence[SilhouetteMoments]) -> SilhouetteProfile:
-    """Fit the profile of all objects; an empty bin takes its neighbours' values.
+    """Fit the profile of all objects; empty bins are interpolated.
 
     Parameters
     ----------

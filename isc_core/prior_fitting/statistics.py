@@ -1,5 +1,5 @@
-"""What the fit of the priors needs of each training object, condensed once so that any selection of
-objects is fitted fast.
+"""The statistics of each training object that the fit of the priors needs, computed once, so that
+the fit to any selection of objects is fast.
 """
 
 from collections.abc import Mapping
@@ -46,7 +46,7 @@ class TrainingObject:
 
 @dataclass(frozen=True)
 class ObjectStatistics:
-    """One object's share in every prior.
+    """One object's contribution to every prior.
 
     Attributes
     ----------
@@ -55,8 +55,8 @@ class ObjectStatistics:
         Differences over neighbouring pixels.
     log_reflectance : (n, 3) float32 ndarray
     grey_log_reflectance : (n, 1) float32 ndarray
-        All valid pixels; grey is the mean of the channels.
-    outline : SilhouetteMoments
+        All valid pixels; grey is the log of the mean of the channels.
+    silhouette : SilhouetteMoments
     natural_light, laboratory_light : (9, 3) ndarray or None
         Where known.
     """
@@ -66,7 +66,7 @@ class ObjectStatistics:
     color_smoothness: ColorCells
     log_reflectance: np.ndarray
     grey_log_reflectance: np.ndarray
-    outline: SilhouetteMoments
+    silhouette: SilhouetteMoments
     natural_light: np.ndarray | None = None
     laboratory_light: np.ndarray | None = None
 
@@ -77,7 +77,7 @@ class ObjectStatistics:
 
 
 def object_statistics(training: TrainingObject) -> ObjectStatistics:
-    """Condense one object; pixels with a channel at or below 0 are left out.
+    """Compute the statistics of one object; pixels with a channel at or below 0 are excluded.
 
     Parameters
     ----------
@@ -96,19 +96,19 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
     positive = np.where(valid[..., None], training.reflectance, 1.0)
     log_reflectance, log_grey = np.log(positive), np.log(positive.mean(axis=-1))
     curvature = geometry(np.asarray(training.height, float)).curvature
-    bends = pair_differences(curvature, np.isfinite(curvature))
-    steps = pair_differences(log_reflectance, valid)
-    if len(bends) == 0 or len(steps) == 0:
+    curvature_differences = pair_differences(curvature, np.isfinite(curvature))
+    color_differences = pair_differences(log_reflectance, valid)
+    if len(curvature_differences) == 0 or len(color_differences) == 0:
         raise InputError(
             f"training object '{training.name}' has no neighbouring valid pixels: leave it out"
         )
     return ObjectStatistics(
-        curvature=Magnitudes.of(bends),
+        curvature=Magnitudes.of(curvature_differences),
         grey_smoothness=Magnitudes.of(pair_differences(log_grey, valid)),
-        color_smoothness=ColorCells.of(steps),
+        color_smoothness=ColorCells.of(color_differences),
         log_reflectance=log_reflectance[valid].astype(np.float32),
         grey_log_reflectance=log_grey[valid].astype(np.float32)[:, None],
-        outline=SilhouetteMoments.of(np.asarray(training.height, float), training.mask),
+        silhouette=SilhouetteMoments.of(np.asarray(training.height, float), training.mask),
         natural_light=training.natural_light,
         laboratory_light=training.laboratory_light,
     )
@@ -117,7 +117,7 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
 def collect_statistics(
     objects: Mapping[str, TrainingObject], monitor: Monitor | None = None
 ) -> dict[str, ObjectStatistics]:
-    """Condense each object.
+    """Compute the statistics of each object.
 
     Parameters
     ----------

@@ -1,5 +1,4 @@
-"""The linear map that makes log reflectances comparable: white, of unit size, and still anchored at
-log 1 = 0.
+"""The linear map that whitens log reflectances, without centring: log 1 = 0 stays 0.
 
 Equation: W ~ (C + floor I)^(-1/2) with C the mean of a a^T over the training log reflectances, NOT
 centred, scaled so that the whitened data have unit root mean square.

@@ -40,11 +40,8 @@ _SPACINGS, _SLOPES = (0.03, 0.12), (0.2, 0.2)  # spacings: fractions of the obje
 _MIN_SPACING = 2.0  # pixels
 _BLOCKS, _SHARE = (2, 8), 5  # sides of a block, pixels; one in this many blocks is held out
 _BRIGHT, _ACROSS = 0.3, 4  # of the peak; blocks across the bright area
-_SPOT, _FAINT, _SPOTS = (
-    0.4,
-    0.15,
-    2,
-)  # extent and faintest peak of spots over the peak; their number
+_SPOTS = 2
+_SPOT, _FAINT = 0.4, 0.15  # fractions of the peak: at the edge of a spot, of the faintest spot
 _MIN_DISTANCE = 3  # pixels
 _LAMP_UNKNOWNS = 4
 

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.prior_fitting.fit import MADE, fit_photo_priors
+from isc_core.prior_fitting.fit import SYNTHETIC, fit_photo_priors
 from isc_core.prior_fitting.statistics import ObjectStatistics, object_statistics
 from isc_core.sirfs.priors.lights import GaussianLight, stacked
 from isc_core.sirfs.priors.prior_file import save_prior_set, shipped_prior_set
@@ -157,7 +157,9 @@ def main() -> None:
         for title, photos in (("training", training), ("held out", held_out)):
             print(describe_balance(title, photos), flush=True)
         statistics = body_statistics(given.world, given.bodies, given.seed)
-        found = fit_photo_priors(statistics, np.array([photo.light for photo in training]), MADE)
+        found = fit_photo_priors(
+            statistics, np.array([photo.light for photo in training]), SYNTHETIC
+        )
         save_prior_set(given.output, found)
     except InputError as error:
         parser.error(str(error))
