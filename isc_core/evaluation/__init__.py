@@ -1,1 +1,1 @@
-"""Error metrics and the accuracy protocols."""
+"""Error metrics and evaluation protocols."""

@@ -1,9 +1,9 @@
-"""Scores of a method on the MIT-Berkeley set, object by object, and comparison of two methods.
+"""Scores of a method on each object of the MIT-Berkeley set, and comparison of two methods.
 
-Problem: errors of different units, on few objects, need one summary and its uncertainty.
+Problem: errors with different units, on few objects, have to be summarised, with an uncertainty.
 
 Equation: each error of `evaluation.metrics.Scores` is summarised by its geometric mean over the
-objects, so that no single object or unit dominates. Two methods are compared by the ratio of their
+objects, so that no object and no unit dominates. Two methods are compared by the ratio of their
 geometric means; its interval comes from resampling the objects.
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712; B. Efron 1979, "Bootstrap
@@ -53,7 +53,7 @@ class Estimate:
     normal : (h, w, 3) ndarray
         Unit vectors, camera frame: x right, y up, z toward the viewer.
     shading, reflectance : (h, w, 3) ndarray
-        Linear, read where the input is valid.
+        Linear, used where the input is valid.
     light : (9, 3) ndarray
         Log-shading SH coefficients, ISC's convention.
     loss : float or None
@@ -71,7 +71,7 @@ class Estimate:
     evaluations: int | None = None
 
 
-# A method under evaluation: it reads the object's `image`, `valid` and `mask`, never the ground
+# A method under evaluation: it uses the object's `image`, `valid` and `mask`, never the ground
 # truth, and reports its progress.
 Runner = Callable[[MitBerkeleyObject, Monitor], Estimate]
 
@@ -118,7 +118,7 @@ class EvaluationReport:
     results : tuple of ObjectResult
         One for each object and illumination, in the order of the runs.
     protocol : str
-        What was measured, see `runner.Protocol`.
+        The evaluation protocol, see `runner.Protocol`.
     """
 
     model: str
@@ -128,7 +128,7 @@ class EvaluationReport:
 
     @property
     def illuminations(self) -> tuple[str, ...]:
-        """The illuminations, in order."""
+        """The illuminations, in the order of the results."""
         return tuple(dict.fromkeys(result.illumination for result in self.results))
 
     def under(self, illumination: str) -> tuple[ObjectResult, ...]:

@@ -1,19 +1,19 @@
-"""Structural similarity of images, regions of highlights, and the quality of a confidence.
+"""Structural similarity, highlight regions, and the quality of a confidence map.
 
-Problem: how similar two images are in structure, where a photo's highlights are, and whether a
-confidence is low where the errors are.
+Problem: measure the structural similarity of two images, the region of a photo's highlights, and
+whether a confidence is low where errors are large.
 
 Equation: structural similarity is (2 m_t m_u + C1)(2 v_tu + C2) / ((m_t^2 + m_u^2 + C1)(v_t + v_u +
 C2)), means m and biased (co)variances v under a Gaussian window of sigma 1.5 and 11 taps, C1 = (.01
 peak)^2, C2 = (.03 peak)^2, border values replicated, averaged. `ssim` treats each channel
 separately; `ssim_volume` also runs the window across the channels, as MATLAB's `ssim` does with an
-H x W x 3 array, from which published figures of highlight removal come. The two differ by up to
-.04: never mix them. Sparsification: pixels are dropped from the least confident on; a meaningful
-confidence drops the error with them.
+H x W x 3 array, which published figures of highlight removal use. The two differ by up to .04 and
+must not be compared. Sparsification: pixels are removed in order of increasing confidence; a
+meaningful confidence removes most of the error first.
 
 Citation: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli (2004), doi:10.1109/TIP.2003.819861.
 
-Limits: none of this is a perceptual distance; all of it needs the ground truth.
+Limits: none of the metrics is perceptual; all need the ground truth.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ _SIGMA, _RADIUS = 1.5, 5
 _TAPS = np.exp(-0.5 * (np.arange(-_RADIUS, _RADIUS + 1) / _SIGMA) ** 2)
 _TAPS /= _TAPS.sum()
 
-# A pixel belongs to a highlight from this share of the photo's strongest specular light on; the
-# strongest is a quantile.
+# A pixel belongs to a highlight above this fraction of the photo's strongest specular light, which
+# is a percentile.
 _HIGHLIGHT_SHARE, _STRONGEST = 0.1, 99.9
 
 
@@ -40,8 +40,8 @@ def ssim(
     truth, estimate : (H, W, C) ndarray
         The images.
     mask : (H, W) ndarray of bool, optional
-        The similarity is averaged inside it. Windows read the images as they are, so set the
-        outside to the same value in both.
+        The similarity is averaged inside it. Windows also cover pixels outside, so set these to the
+        same value in both images.
     peak : float, optional
         Range of the values.
 
@@ -116,12 +116,12 @@ def highlight_region(specular: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Sparsification:
-    """The error that remains as the least confident pixels are dropped.
+    """The remaining error as the least confident pixels are removed.
 
     Attributes
     ----------
     dropped : (n,) ndarray
-        Shares of the pixels, from 0 to 1.
+        Fractions of the pixels removed, from 0 to 1.
     left : (n,) ndarray
         Share of the total error in the remaining pixels, from 1 to 0.
     """
@@ -131,18 +131,18 @@ class Sparsification:
 
     @property
     def area(self) -> float:
-        """The area under the curve: .5 for a confidence without information, lower is better; the
+        """The area under the curve: .5 for an uninformative confidence; lower is better, and the
         lower bound depends on the errors.
         """
         return float(((self.left[1:] + self.left[:-1]) / 2 * np.diff(self.dropped)).sum())
 
     def removed(self, share: float) -> float:
-        """Return the share of the error in the given share of dropped pixels.
+        """Return the share of the error in the removed pixels.
 
         Parameters
         ----------
         share : float
-            Share of the pixels, in [0, 1].
+            Fraction of the pixels removed, in [0, 1].
 
         Returns
         -------
@@ -155,8 +155,8 @@ class Sparsification:
 def sparsification(error: np.ndarray, confidence: np.ndarray) -> Sparsification:
     """Compute the sparsification curve.
 
-    Pixels of equal confidence leave in no order: each carries their mean error. Without any error
-    the curve is that of a confidence without information.
+    Pixels of equal confidence are removed together: each is assigned their mean error. Without any
+    error, the curve is that of an uninformative confidence.
 
     Parameters
     ----------
@@ -180,12 +180,12 @@ def sparsification(error: np.ndarray, confidence: np.ndarray) -> Sparsification:
     sums = np.bincount(group, weights=np.asarray(error, float))
     total = sums.sum()
     dropped = np.concatenate([[0.0], np.cumsum(count) / len(group)])
-    gone = np.minimum(np.cumsum(sums) / total, 1) if total > 0 else dropped[1:]
-    return Sparsification(dropped, np.concatenate([[1.0], 1 - gone]))
+    removed_error = np.minimum(np.cumsum(sums) / total, 1) if total > 0 else dropped[1:]
+    return Sparsification(dropped, np.concatenate([[1.0], 1 - removed_error]))
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Compute Spearman's rank correlation; equal values share their mean rank.
+    """Compute Spearman's rank correlation; ties have their mean rank.
 
     Parameters
     ----------
@@ -251,4 +251,6 @@ def _blurred(values: np.ndarray, axes: tuple[int, ...]) -> np.ndarray:
 
 def _same_length(a: np.ndarray, b: np.ndarray) -> None:
     if a.ndim != 1 or a.shape != b.shape or not len(a):
-        raise ValueError(f"need two non-empty rows of the same length, not {a.shape} and {b.shape}")
+        raise ValueError(
+            f"need two non-empty vectors of the same length, not {a.shape} and {b.shape}"
+        )

@@ -5,14 +5,14 @@ determine: the offset of the height, and one scale each of shading, reflectance 
 
 Equation: the six errors of one object and their geometric mean `avg` follow Barron and Malik. The
 local error is that of Grosse et al.: sum |t - a_b u|^2 / sum |t|^2 over windows b that overlap by
-half, each with its own best scale a_b. It forgives slow drifts; an estimate of zero has an error of
-1.
+half, each with its own optimal scale a_b. It is insensitive to slowly varying errors; an estimate
+of zero has an error of 1.
 
 Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712; R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009),
 doi:10.1109/ICCV.2009.5459428.
 
-Limits: all errors need the ground truth; none is a perceptual distance. Images are compared at the
+Limits: all errors need the ground truth; none is perceptual. Images are compared at the
 scale of their stored values.
 """
 
@@ -40,7 +40,7 @@ class Scores:
     Attributes
     ----------
     height : float
-        Mean absolute error, pixels, after the best offset.
+        Mean absolute error, pixels, after the optimal offset.
     normal : float
         Mean angle, radians.
     shading, reflectance : float
@@ -84,7 +84,7 @@ def score(
     normal : (h, w, 3) ndarray
         Unit vectors, camera frame: x right, y up, z toward the viewer.
     shading, reflectance : (h, w, 3) ndarray
-        Linear, read where the input is valid.
+        Linear, used where the input is valid.
     light : (9, 3) ndarray
         Log-shading coefficients of `shading.spherical_harmonics.real_sh`.
 
@@ -96,7 +96,7 @@ def score(
     Raises
     ------
     ValueError
-        If a shape is wrong, or an estimate is not finite where it is read.
+        If a shape is wrong, or an estimate is not finite where it is used.
     """
     if light.shape != truth.light.shape or not np.isfinite(light).all():
         raise ValueError(f"{truth.name}: the light must be {truth.light.shape} finite coefficients")
@@ -146,14 +146,14 @@ def truth_normal(height: np.ndarray) -> np.ndarray:
 
 
 def height_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Compute the mean absolute difference of two heights after the best constant offset.
+    """Compute the mean absolute difference of two heights after the optimal constant offset.
 
     Parameters
     ----------
     truth : (h, w) ndarray
-        Pixels; only finite values count.
+        Pixels; only finite values are used.
     estimate : (h, w) ndarray
-        Pixels. Its scale counts.
+        Pixels; not rescaled.
 
     Returns
     -------
@@ -197,7 +197,7 @@ def scaled_mse(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 
 def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Compare two lights on a rendered front hemisphere, after one common scale.
+    """Compare two lights on a rendered front hemisphere, after scaling by one factor.
 
     Parameters
     ----------
@@ -226,7 +226,7 @@ def mse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None)
     truth, estimate : (h, w[, C]) ndarray
         The images.
     mask : (h, w) ndarray of bool, optional
-        Pixels that count.
+        Pixels that are used.
 
     Returns
     -------
@@ -253,7 +253,7 @@ def psnr(
     truth, estimate : (h, w[, C]) ndarray
         The images.
     mask : (h, w) ndarray of bool, optional
-        Pixels that count.
+        Pixels that are used.
     peak : float, optional
         Range of the values.
 
@@ -279,7 +279,7 @@ def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
     truth, estimate : (h, w[, C]) ndarray
         The images; NaN is allowed outside the mask.
     mask : (h, w) ndarray of bool
-        Pixels that count.
+        Pixels that are used.
 
     Returns
     -------
@@ -331,7 +331,7 @@ def geometric_mean(values: Iterable[float]) -> float:
 
 
 def _window_sums(image: np.ndarray) -> np.ndarray:
-    """Sums over the windows that tile an image (h, w, C), zero beyond its end."""
+    """Sums over the windows that tile an image (h, w, C), zero outside."""
     down, right = (np.arange(0, size, _WINDOW) for size in image.shape[:2])
     if not (len(down) and len(right)):
         return np.zeros((0, 0, image.shape[2]))
@@ -348,10 +348,10 @@ def _same_shape(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None
         raise ValueError("the mask is empty")
 
 
-def _require(truth: MitBerkeleyObject, **answer: np.ndarray) -> None:
-    """Check that every map fits the truth and is finite where it is read."""
+def _require(truth: MitBerkeleyObject, **maps: np.ndarray) -> None:
+    """Check that every map has the shape of the truth and is finite where it is used."""
     needed = {"shading": truth.valid, "reflectance": truth.valid}
-    for name, value in answer.items():
+    for name, value in maps.items():
         shape = truth.height.shape if name == "height" else truth.image.shape
         if value.shape != shape:
             raise ValueError(

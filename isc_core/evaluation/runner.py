@@ -1,12 +1,13 @@
-"""How each model is run on the MIT-Berkeley set, under one of two protocols.
+"""Runs models on the MIT-Berkeley set under one of two protocols.
 
 Both run the pipeline of `isc decompose` (`decompose.models.solve`). "reference" is the protocol of
 J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: SIRFS is solved at the images' own
-scale on the data set's crop; the image is explained where all its channels are above zero; the
-occluding contour is that of the object's mask, without the points near the crop's frame. "users" is
-`decompose` at its defaults on the crop, its maps at the crop's resolution.
+scale on the data set's crop; pixels are used where all channels are above zero; the occluding
+contour is that of the object's mask, without the points near the border of the crop. "users" is
+`decompose` with its defaults on the crop, with maps at the crop's resolution.
 
-Limits: under "reference" no lobe is fitted and no assumption is checked, since neither is scored.
+Limits: under "reference", no lobe is fitted and no assumptions are checked, since neither is
+scored.
 """
 
 from dataclasses import dataclass
@@ -28,18 +29,18 @@ from ..shading.surface_stencils import normals
 from ..sirfs.priors.prior_set import PriorSet
 from .evaluate import Estimate, Runner
 
-_CODE = 1 / 65535  # the images have 16 bits; a separation may leave less than half a code
+_CODE = 1 / 65535  # of 16-bit images; separated diffuse light may be below half a code
 
 
 class Protocol(StrEnum):
-    """What is measured.
+    """The evaluation protocol.
 
     Attributes
     ----------
     REFERENCE
         The published protocol: own scale, the data set's crop.
     USERS
-        `decompose` at its defaults.
+        `decompose` with its defaults.
     """
 
     REFERENCE = "reference"
@@ -48,9 +49,9 @@ class Protocol(StrEnum):
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """What is run on each object.
+    """Options of the run on each object.
 
-    The defaults measure SIRFS alone: priors of the data set, and of the silhouette.
+    The defaults evaluate SIRFS without predictions: priors of the data set, and of the silhouette.
 
     Attributes
     ----------
@@ -67,7 +68,7 @@ class RunnerOptions:
     light_prior, shape_prior : str or None
         See `Settings`. None: the default of the protocol.
     protocol : Protocol
-        What is measured.
+        The evaluation protocol.
     """
 
     model: str = "sirfs"
@@ -121,7 +122,7 @@ class RunnerOptions:
 def make_runner(
     options: RunnerOptions, prior_set: PriorSet, network: SceneNetwork | None = None
 ) -> Runner:
-    """Make the function that `evaluate` runs on each object.
+    """Create the function that `evaluate` runs on each object.
 
     Parameters
     ----------
@@ -130,12 +131,12 @@ def make_runner(
     prior_set : PriorSet
         SIRFS priors.
     network : SceneNetwork, optional
-        What looks at the photo under `Protocol.REFERENCE`; the shipped one by default.
+        The network for predictions under `Protocol.REFERENCE`; the shipped one by default.
 
     Returns
     -------
     Runner
-        Explains one object.
+        Decomposes one object.
 
     Raises
     ------
@@ -149,7 +150,7 @@ def make_runner(
         return _estimate(truth, solve(task))
 
     def users(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
-        return _as_users_run(truth, options, prior_set, monitor)
+        return _run_default_pipeline(truth, options, prior_set, monitor)
 
     return users if options.protocol == Protocol.USERS else reference
 
@@ -163,7 +164,7 @@ def reference_task(
 ) -> DecompositionTask:
     """Set up one object under the reference protocol.
 
-    Only the image, its valid pixels and the mask of `truth` are read.
+    Only the image, its valid pixels and the mask of `truth` are used.
 
     Parameters
     ----------
@@ -174,7 +175,7 @@ def reference_task(
     prior_set : PriorSet
         SIRFS priors.
     network : SceneNetwork, optional
-        What looks at the photo; the shipped one by default.
+        The network for predictions; the shipped one by default.
     monitor : Monitor, optional
         Receives progress.
 
@@ -204,10 +205,10 @@ def reference_task(
     )
 
 
-def _as_users_run(
+def _run_default_pipeline(
     truth: MitBerkeleyObject, options: RunnerOptions, prior_set: PriorSet, monitor: Monitor
 ) -> Estimate:
-    """What `isc decompose` makes of the crop and the object's mask."""
+    """The result of `isc decompose` for the crop and the object's mask."""
     photo = _photo(truth, truth.image.astype(np.float32), truth.mask)
     settings = options.settings(truth.illumination)
     given = prior_set if settings.takes_priors else None
@@ -231,7 +232,7 @@ def _photo(truth: MitBerkeleyObject, image: np.ndarray, mask: np.ndarray) -> Pho
 
 
 def _estimate(truth: MitBerkeleyObject, found: SceneEstimate) -> Estimate:
-    """The maps that follow from height and light, in the data set's precision."""
+    """The maps derived from height and light, in the data set's precision."""
     normal = normal_from_reference(normals(found.height))
     light = light_from_reference(found.light)
     log_shading = real_sh(normal) @ light if found.log_shading is None else found.log_shading

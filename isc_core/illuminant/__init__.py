@@ -1,4 +1,4 @@
-"""The colour of the light in a photo, and whether white is among its colours."""
+"""The colour of the light in a photo, and detection of strongly coloured light."""
 
 from .illuminant import Illuminant, IlluminantOptions, estimate_illuminant, tinted, whitened
 

@@ -1,37 +1,37 @@
-"""The colour of the light, from highlights, as a separation under white light needs it.
+"""The colour of the light from highlights, for a separation that assumes white light.
 
-Problem: separations assume white light. Otherwise only the highlights show the light's colour;
-albedo may have any.
+Problem: separations assume white light. Only highlights show the colour of another light, since
+albedo may have any colour.
 
-Equation: of one albedo under one light every pixel is I = m B + s L, diffuse colour B and light
-colour L, and so is every change of I. Both lie in the plane of B and L (Lee 1986), whose normal is
-perpendicular to L whatever B is:
+Equation: with one albedo and one light, every pixel is I = m B + s L, with diffuse colour B and
+light colour L, and so is every change of I. Both lie in the plane of B and L (Lee 1986), whose
+normal is perpendicular to L for any B:
 
     n = I x dI,    n . L = 0.
 
-One albedo gives one plane, which determines one of two unknowns; several albedos meet in L alone.
-So L = 1 + d, sum d = 0, minimises
+One albedo gives one plane, which determines one of two unknowns; the planes of several albedos
+intersect in L. So L = 1 + d, sum d = 0, minimises
 
     sum w (n . (1 + d))^2 / |n|^2   and   |d|^2 / 2 prior_deviation^2,
 
 weighted by the precision of the first, which comes from the disagreement of the normals, summed
-over blocks of the photo because neighbours have similar errors. The second term thus covers both
-kinds of ignorance, noise and a missing second plane: what the planes do not determine stays white.
-Confidence is the share of the data's precision in its weakest direction.
+over blocks of the photo because neighbours have similar errors. The second term handles both noise
+and a missing second plane: components that the planes do not determine remain white. Confidence is
+the share of the data in the total precision along the least determined direction.
 
-Only changes count that look like a highlight's flank: all channels rise, and the chromaticity moves
-toward the light's (the highlight's end of the lines that R. T. Tan, K. Nishino and K. Ikeuchi draw
-over inverse intensity). Changes that disagree have Cauchy's weight, and the square of the share
-that agrees reduces the precision: where half of the flanks are texture, the other half is less
-reliable.
+Only potential flanks of highlights are used: all channels increase, and the chromaticity changes
+toward that of the light (the specular end of the lines in the inverse-intensity space of R. T. Tan,
+K. Nishino and K. Ikeuchi). Outliers are down-weighted by Cauchy's function, and the precision is
+multiplied by the square of the share of inliers: where half of the flanks are texture, the other
+half is less reliable.
 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694; R. T. Tan, K. Nishino, K. Ikeuchi 2004,
 doi:10.1364/JOSAA.21.000321. The blocks: K.-Y. Liang and S. L. Zeger 1986,
 doi:10.1093/biomet/73.1.13.
 
-Limits: one colour of light, tinted by a quarter at most; `gamut` checks for stronger colours.
-Metals tint their highlights themselves. Albedo that fades toward a common colour looks like a
-highlight; grey albedo carries no information.
+Limits: one colour of light, at most a quarter away from white; `gamut` checks for stronger colours.
+Metals have coloured highlights. Albedo that fades toward a common colour resembles a highlight;
+grey albedo carries no information.
 """
 
 from dataclasses import dataclass
@@ -42,15 +42,15 @@ from ..errors import InputError
 from ..imaging.channels import length, total
 from ..imaging.smoothing import masked_gaussian
 from ..scene.diagnostics import IlluminantOutcome
-from .gamut import PLANE, leads_to, turns, without_white
+from .gamut import PLANE, chromaticity_changes, lacks_white, points_toward
 
 _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
-_LOOSE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first round and in the last
-_ROUNDS, _GATES = 15, 3
-_OPEN = 2.0  # factor of the prior's deviation in the rounds, before the result is weighted
+_FIRST_TOLERANCE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first and in the last iteration
+_ITERATIONS, _SELECTIONS = 15, 3
+_WIDE_PRIOR = 2.0  # factor of the prior's deviation during the iterations
 _BLOCKS = 8
-_FEW = 20  # changes; fewer carry no information
-_FARTHEST = 0.25  # d beyond this is albedo, not light
+_MIN_FLANKS = 20  # flanks; fewer carry no information
+_MAX_SHIFT = 0.25  # of |d|; larger values are caused by albedo, not light
 
 
 @dataclass(frozen=True)
@@ -60,11 +60,11 @@ class IlluminantOptions:
     Attributes
     ----------
     prior_deviation : float
-        Prior standard deviation of a light's colour from white, of mean 1; > 0.
+        Prior standard deviation of the colour of a light, of mean 1, from white; > 0.
     common_deviation : float
-        Standard deviation of the error that all planes of normals of a photo share; >= 0.
+        Standard deviation of the error common to all planes of a photo; >= 0.
     min_confidence : float
-        Confidence from which on the colour is determined, in [0, 1].
+        Smallest confidence at which the colour counts as determined, in [0, 1].
     """
 
     prior_deviation: float = 0.1
@@ -81,7 +81,7 @@ class Illuminant:
     colour : (3,) ndarray
         Linear RGB > 0 of mean 1; white where the photo has no information.
     confidence : float
-        Share of the data's precision in its weakest direction, in [0, 1].
+        Share of the data in the precision along the least determined direction, in [0, 1].
     outcome : IlluminantOutcome
         Whether the photo determines the colour, and if not, why.
     """
@@ -126,7 +126,7 @@ def estimate_illuminant(
     mask : (H, W) ndarray of bool
         The object.
     clipped : (H, W) ndarray of bool, optional
-        Pixels to leave out.
+        Pixels to ignore.
     options : IlluminantOptions, optional
         Priors and thresholds.
 
@@ -138,7 +138,7 @@ def estimate_illuminant(
     Raises
     ------
     InputError
-        If the arrays do not fit, the mask is empty, or an option is out of range.
+        If the shapes do not match, the mask is empty, or an option is out of range.
     """
     options = options or IlluminantOptions()
     if image.ndim != 3 or image.shape[2] != 3 or mask.shape != image.shape[:2] or not mask.any():
@@ -155,20 +155,20 @@ def estimate_illuminant(
             "[0, 1]"
         )
     changes = _changes(image, mask if clipped is None else mask & ~clipped)
-    if without_white(changes.colour, changes.change):
+    if lacks_white(changes.colour, changes.change):
         return _white(IlluminantOutcome.STRONG_OBJECT_COLOUR)
-    here, turn, rising = turns(changes.colour, changes.change)
-    rises, here, turn = changes.at(rising), here[rising], turn[rising]
+    here, change_direction, rising = chromaticity_changes(changes.colour, changes.change)
+    rises, here, change_direction = changes.at(rising), here[rising], change_direction[rising]
     shift = np.zeros(2)
     precision = np.zeros((2, 2))
-    for _ in range(_GATES):
-        flanks = rises.at(leads_to(_colour(shift), here, turn))
-        if len(flanks.block) < _FEW:
+    for _ in range(_SELECTIONS):
+        flanks = rises.at(points_toward(_colour(shift), here, change_direction))
+        if len(flanks.block) < _MIN_FLANKS:
             return _white(IlluminantOutcome.NO_FLANKS)
-        shift, precision = _planes(flanks, shift, options)
+        shift, precision = _fit_planes(flanks, shift, options)
     weakest = float(np.linalg.eigvalsh(precision)[0])
     confidence = weakest / (weakest + 1 / options.prior_deviation**2)
-    if np.abs(PLANE @ shift).max() > _FARTHEST:
+    if np.abs(PLANE @ shift).max() > _MAX_SHIFT:
         return _white(IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR)
     determined = confidence >= options.min_confidence
     outcome = IlluminantOutcome.DETERMINED if determined else IlluminantOutcome.UNRELIABLE
@@ -197,7 +197,7 @@ def whitened(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
     Raises
     ------
     InputError
-        If the colour is unusable.
+        If the colour is invalid.
     """
     return image / _checked(colour).astype(image.dtype)
 
@@ -220,7 +220,7 @@ def tinted(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
     Raises
     ------
     InputError
-        If the colour is unusable.
+        If the colour is invalid.
     """
     return image * _checked(colour).astype(image.dtype)
 
@@ -242,13 +242,13 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
     if len(rows) == 0:
         return _Changes(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
     box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    image, mask = image[box], mask[box]  # the background does not count
+    image, mask = image[box], mask[box]  # without the background
     diagonal = float(np.hypot(mask.shape[0], mask.shape[1]))
     sigma = max(_FINE * diagonal, 0.6)
     smooth = masked_gaussian(np.where(mask[..., None], image, 0).astype(float), mask, sigma)
     bright = max(float(np.quantile(total(smooth[mask]), 0.99)), 1e-30)
     step, side = max(1, round(sigma)), max(diagonal / _BLOCKS, 1.0)
-    places = np.stack(
+    block_of = np.stack(
         np.meshgrid(*(np.arange(n) // side for n in mask.shape), indexing="ij"), -1
     ) @ [4 * _BLOCKS, 1]
     colours, rises, blocks = [], [], []
@@ -258,7 +258,7 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
         change = (smooth[after] - smooth[before])[known] / bright
         colours.append(smooth[middle][known] / bright)
         rises.append(change * np.where(total(change) < 0, -1, 1)[:, None])
-        blocks.append(places[middle][known].astype(int))
+        blocks.append(block_of[middle][known].astype(int))
     return _Changes(np.concatenate(colours), np.concatenate(rises), np.concatenate(blocks))
 
 
@@ -268,11 +268,11 @@ def _slices(axis: int, start: int, length: int) -> tuple[slice, ...]:
     return (part,) if axis == 0 else (slice(None), part)
 
 
-def _planes(
+def _fit_planes(
     flanks: _Changes, shift: np.ndarray, options: IlluminantOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (2,) along `PLANE` and the planes' precision (2, 2) of it, from changes that may
-    be highlights of that light.
+    """The shift (2,) along `PLANE` and its precision (2, 2) from the planes of potential flanks of
+    highlights.
     """
     normals = np.cross(flanks.colour, flanks.change)
     size = length(normals)
@@ -281,24 +281,26 @@ def _planes(
     in_use = np.bincount(flanks.block) > 0
     blocks = (np.cumsum(in_use) - 1)[flanks.block]
     prior = np.eye(2) / options.prior_deviation**2
-    precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
-    for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):
-        off = offset + along @ shift
-        weight = size / (1 + np.square(off / tolerance))
-        agreeing = weight.sum() / size.sum()
+    precision, target, inliers = np.zeros((2, 2)), shift, 0.0
+    for tolerance in np.geomspace(_FIRST_TOLERANCE, _TOLERANCE, _ITERATIONS):
+        residual = offset + along @ shift
+        weight = size / (1 + np.square(residual / tolerance))
+        inliers = weight.sum() / size.sum()
         weight /= weight.sum()
         curvature = (along * weight[:, None]).T @ along
-        pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)
-        # The blocks' pulls scatter around zero at the best shift; `common_deviation` is the error
-        # that all of them share, along each plane's normal.
-        scatter = pulls.T @ pulls + options.common_deviation**2 * curvature + 1e-12 * np.eye(2)
-        precision = curvature @ np.linalg.solve(scatter, curvature)
-        wanted = (
-            shift
-            - np.linalg.lstsq(curvature, (along * (weight * off)[:, None]).sum(axis=0), rcond=1e-6)[
-                0
-            ]
+        scores = np.stack(
+            [np.bincount(blocks, weight * residual * along[:, k]) for k in (0, 1)], axis=1
         )
-        shift = np.linalg.solve(precision + prior / _OPEN**2, precision @ wanted)
-    precision *= agreeing**2
-    return np.linalg.solve(precision + prior, precision @ wanted), precision
+        # The blocks' scores scatter around zero at the best shift; `common_deviation` is the error
+        # common to all of them, along each plane's normal.
+        scatter = scores.T @ scores + options.common_deviation**2 * curvature + 1e-12 * np.eye(2)
+        precision = curvature @ np.linalg.solve(scatter, curvature)
+        target = (
+            shift
+            - np.linalg.lstsq(
+                curvature, (along * (weight * residual)[:, None]).sum(axis=0), rcond=1e-6
+            )[0]
+        )
+        shift = np.linalg.solve(precision + prior / _WIDE_PRIOR**2, precision @ target)
+    precision *= inliers**2
+    return np.linalg.solve(precision + prior, precision @ target), precision

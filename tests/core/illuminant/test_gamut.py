@@ -5,7 +5,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from isc_core.illuminant.gamut import PLANE, distance_of_white, share_toward_white, without_white
+from isc_core.illuminant.gamut import PLANE, distance_of_white, lacks_white, share_toward_white
 from isc_core.illuminant.illuminant import estimate_illuminant
 from tests.core.illuminant.test_illuminant import ALBEDOS, ball
 
@@ -72,8 +72,8 @@ def test_flanks_toward_white_are_known_from_others() -> None:
 
 def test_units_and_few_colours_say_nothing() -> None:
     red = np.repeat([[0.6, 0.1, 0.1]], 200, axis=0)
-    assert without_white(red, np.zeros_like(red))
-    assert not without_white(red[:5], np.zeros((5, 3)))
+    assert lacks_white(red, np.zeros_like(red))
+    assert not lacks_white(red[:5], np.zeros((5, 3)))
     colour, change = lines(np.array([0.6, 0.1, 0.1]), np.ones(3), 50_000)
     few = slice(None, None, 100)
     assert share_toward_white(colour, change) == pytest.approx(
