@@ -77,7 +77,9 @@ def _one_orbit(objective: OtsuObjective, count: int, evaluations: int, seed: int
 
 
 def _falling_swarm(objective: OtsuObjective, count: int, evaluations: int, seed: int) -> Optimum:
-    return particle_swarm.maximise(objective, count, evaluations, seed, particle_swarm.FALLING)
+    return particle_swarm.maximise(
+        objective, count, evaluations, seed, particle_swarm.DECREASING_INERTIA
+    )
 
 
 def _named(name: str) -> Callable[[OtsuObjective, int, int, int], Optimum]:

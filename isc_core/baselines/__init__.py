@@ -1,5 +1,5 @@
-"""Simple decompositions to compare SIRFS with: one method a file, and `estimate`, which selects
-one by name and imports it.
+"""Simple decompositions for comparison with SIRFS: one method per file, and `estimate`, which
+imports a method by name.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ METHODS = tuple(_MODULES)
 
 
 def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
-    """Estimate shape, shading and light by a method's defaults.
+    """Estimate shape, shading and light with a method's defaults.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEs
     Raises
     ------
     InputError
-        For an unknown method, and for arrays that do not fit.
+        For an unknown method, and for arrays of wrong shapes.
     """
     if method not in METHODS:
         raise InputError(f"unknown model {method!r}: choose one of {', '.join(METHODS)}")

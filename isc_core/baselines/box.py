@@ -1,5 +1,5 @@
-"""The part of the frame that an object needs, so that empty background costs nothing and changes
-nothing.
+"""Crops an image to an object, so that empty background takes no time and does not affect the
+result.
 """
 
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ class Box:
     rows, columns : tuple of int
         [start, stop) of the box.
     around : tuple of tuple of int
-        Empty pixels around it: (above, below), (left, right); 0 where the frame cuts the object,
-        which has no contour there.
+        Empty pixels around it: (above, below), (left, right); 0 where the frame cuts off the
+        object, which has no contour there.
     """
 
     shape: tuple[int, int]
@@ -75,7 +75,7 @@ class Box:
         return np.pad(inside, [*self.around, *[(0, 0)] * (array.ndim - 2)])
 
     def place(self, cropped: np.ndarray) -> np.ndarray:
-        """Put the box with its margin back into the frame; its border values continue outward.
+        """Put the box with its margin back into the frame, which is filled with the nearest values.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""The result of every baseline, and the way to it from a shading image."""
+"""The result of every baseline, and its computation from a shading image."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ class BaselineEstimate:
     Attributes
     ----------
     height : (H, W) float64 ndarray
-        Pixels toward the viewer, mean 0 in the mask. It continues beyond the mask, so that normals
-        at the rim are meaningful.
+        Pixels toward the viewer, mean 0 in the mask. It is extrapolated beyond the mask, so that
+        normals at the rim are meaningful.
     log_shading : (H, W, 3) float64 ndarray
         The method's own shading, 0 outside the mask.
     light : (9, 3) float64 ndarray
@@ -36,7 +36,7 @@ class BaselineEstimate:
 
 
 def from_log_shading(log_shading: np.ndarray, mask: np.ndarray, solve: Solver) -> BaselineEstimate:
-    """Estimate the shape from a shading image, and the light that fits it.
+    """Estimate the shape from a shading image, and fit the light.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def check_log_image(log_image: np.ndarray, mask: np.ndarray) -> None:
     Raises
     ------
     InputError
-        If one of them does not fit.
+        If the shape or the values of one of them are invalid.
     """
     if log_image.ndim != 3 or log_image.shape[2] != 3:
         raise InputError(

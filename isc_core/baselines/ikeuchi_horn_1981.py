@@ -4,19 +4,19 @@
 Problem: find stereographic coordinates (u, v) = 2 (n_x, n_y) / (1 + n_z) of the normals that
 minimise
   sum of (E - R(u, v))^2 + weight * (|grad u|^2 + |grad v|^2),   R = max(0, n . l),
-with n in the image plane, along the contour's normal, where the object turns away: there (u, v) has
-length 2, which slopes could not express.
+with n in the image plane, along the contour's normal, at the occluding contour: there (u, v) has
+length 2, while slopes would be infinite.
 
 Equation: setting the derivative to zero gives the iteration (u, v) <- mean of neighbours + (E - R)
-grad R / weight, from coarse to fine, because the contour's influence travels one pixel an
-iteration. The normals become a surface by least squares.
+grad R / weight, from coarse to fine, because the contour's influence propagates by one pixel per
+iteration. The normals are integrated by least squares.
 
 Citation: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries",
 Artificial Intelligence 17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The integration
 is as in R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451 (1988), doi:10.1109/34.3909, but
 in the mask.
 
-Limits: one distant light, one albedo; every contour is taken for an occluding one, so flat sheets
+Limits: one distant light, one albedo; every contour is assumed to be occluding, so flat objects
 bulge; smoothness flattens detail.
 """
 
@@ -30,22 +30,22 @@ from .box import Box
 from .from_shading import BaselineEstimate, from_log_shading, grey_log_shading
 from .poisson import integrate
 
-_AROUND = np.array([[1.0, 4.0, 1.0], [4.0, 0.0, 4.0], [1.0, 4.0, 1.0]]) / 20
-_COARSEST = 24
+_NEIGHBOURS = np.array([[1.0, 4.0, 1.0], [4.0, 0.0, 4.0], [1.0, 4.0, 1.0]]) / 20
+_MIN_SIDE = 24
 
 
 @dataclass(frozen=True)
 class IkeuchiHorn1981Options:
-    """How the normals are found.
+    """Options of the estimate of the normals.
 
     Attributes
     ----------
     weight : float
-        Of the smoothness, > 0, for brightness scaled to a light of length 1.
+        Weight of the smoothness, > 0, for brightness scaled to a light of length 1.
     iterations : int
         On each grid.
     steepest : float
-        Least n_z, in (0, 1), from which slopes are taken; at the contour they would be infinite.
+        Smallest n_z, in (0, 1), for slopes; at the contour, they would be infinite.
     """
 
     weight: float = 1.0
@@ -101,7 +101,7 @@ def height_from_brightness(
     Returns
     -------
     (H, W) float64 ndarray
-        Pixels toward the viewer, mean 0 in the mask, continued beyond its rim by two pixels.
+        Pixels toward the viewer, mean 0 in the mask, extrapolated by two pixels beyond its rim.
 
     Raises
     ------
@@ -118,10 +118,10 @@ def height_from_brightness(
 
 
 def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) -> np.ndarray:
-    """Integrate normals in least squares.
+    """Integrate normals by least squares.
 
-    Two pixels beyond the mask the rim's slopes continue, so that differences across the rim are
-    meaningful; further out the height is constant.
+    The slopes at the rim are extrapolated by two pixels beyond the mask, so that differences across
+    the rim are meaningful; farther out, the height is constant.
 
     Parameters
     ----------
@@ -151,8 +151,8 @@ def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) 
 def _solve(
     shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options
 ) -> np.ndarray:
-    """Coordinates (2, H, W), 0 outside the mask; started from the same problem at half the size."""
-    if min(mask.shape) >= 2 * _COARSEST:
+    """Coordinates (2, H, W), 0 outside the mask, initialised from the solution at half the size."""
+    if min(mask.shape) >= 2 * _MIN_SIDE:
         smaller = _solve(_halved(shade, mask), _block_any(mask), light, options)
         start = (
             smaller.repeat(2, axis=1).repeat(2, axis=2)[:, : mask.shape[0], : mask.shape[1]] * mask
@@ -172,16 +172,16 @@ def _relax(
     contour = occluding_contour(mask)
     at = (contour.rows, contour.columns)
     rim = 2 * np.stack([contour.right, -contour.down])
-    known = ndimage.correlate(mask.astype(float), _AROUND, mode="constant")
+    known = ndimage.correlate(mask.astype(float), _NEIGHBOURS, mode="constant")
     scale = mask / np.maximum(known, 1e-12)
     for _ in range(options.iterations):
         uv[:, *at] = rim
-        mean = np.stack([ndimage.correlate(c, _AROUND, mode="constant") for c in uv]) * scale
+        mean = np.stack([ndimage.correlate(c, _NEIGHBOURS, mode="constant") for c in uv]) * scale
         reflected, slope = _reflect(mean, light)
-        # Linearised about the neighbours' mean, the step solves the pixel's own problem and cannot
-        # overshoot.
+        # Linearised about the neighbours' mean, the step is the exact minimum for each pixel and
+        # cannot overshoot.
         uv = mean + mask * (shade - reflected) / (options.weight + (slope**2).sum(axis=0)) * slope
-        # Beyond the circle of radius 2 normals would point away from the viewer.
+        # Outside the circle of radius 2, normals would point away from the viewer.
         uv *= np.minimum(1, 2 / np.maximum(np.hypot(*uv), 1e-12))
     uv[:, *at] = rim
     return uv

@@ -47,7 +47,7 @@ def estimate_light(brightness: np.ndarray, mask: np.ndarray, smoothing: float = 
         return np.array([0.0, 0.0, 1.0])
     tilt = _tilt(brightness, mask, smoothing)
     means, ratios = _sphere()
-    # Ratios fall with the slant, and interpolation wants them rising.
+    # Ratios decrease with the slant; `interp` needs increasing ones.
     slant = (
         float(np.interp(mean / np.sqrt(power), ratios[::-1], _SLANTS[::-1]))
         if np.hypot(*tilt) > 0
@@ -60,7 +60,7 @@ def estimate_light(brightness: np.ndarray, mask: np.ndarray, smoothing: float = 
 def _tilt(brightness: np.ndarray, mask: np.ndarray, smoothing: float) -> np.ndarray:
     """Unit vector (x right, y up) of the mean unit gradient, or zero.
 
-    Pixels whose window leaves the mask do not count.
+    Pixels whose window extends beyond the mask are ignored.
     """
     filled = np.where(mask, brightness, 0).astype(float)
     down, right = (

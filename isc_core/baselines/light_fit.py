@@ -1,8 +1,8 @@
-"""The light that fits a log shading and normals.
+"""Least-squares fit of a light to log shading and normals.
 
 Equation: L minimises the mean over the mask of |b(n) L - log shading|^2 + ridge * |L without its
-constant|^2, a channel at a time; b are the nine functions of the SIRFS reference. The ridge spares
-the constant, so a flat shape, whose normals carry no direction, gets a uniform light.
+constant|^2, for each channel; b are the nine functions of the SIRFS reference. The ridge excludes
+the constant, so a flat shape, whose normals do not determine a direction, has a uniform light.
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
@@ -44,8 +44,8 @@ def fit_light(
     count = functions.shape[1]
     penalty = ridge * np.eye(9)
     penalty[0, 0] = 1e-12
-    # Not as products of matrices, which a library shares among its threads and rounds accordingly.
-    own = np.einsum("kn,ln->kl", functions, functions) / count
+    # Without BLAS, whose rounding depends on the number of threads.
+    gram = np.einsum("kn,ln->kl", functions, functions) / count
     return np.linalg.solve(
-        own + penalty, np.einsum("kn,nc->kc", functions, log_shading[mask].astype(float)) / count
+        gram + penalty, np.einsum("kn,nc->kc", functions, log_shading[mask].astype(float)) / count
     )

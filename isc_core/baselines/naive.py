@@ -1,4 +1,4 @@
-"""The lower bound for every method: a flat shape without light, so that reflectance = image."""
+"""The trivial baseline: a flat shape without light, so that reflectance = image."""
 
 import numpy as np
 
@@ -20,7 +20,7 @@ def estimate(log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
     Raises
     ------
     InputError
-        For arrays that do not fit or an empty mask.
+        For arrays of wrong shapes or an empty mask.
     """
     check_log_image(log_image, mask)
     return BaselineEstimate(np.zeros(mask.shape), np.zeros(log_image.shape), np.zeros((9, 3)))

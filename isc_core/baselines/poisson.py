@@ -1,16 +1,17 @@
-"""Heights (or log images) from differences between neighbouring pixels, inside a mask.
+"""Integrates differences between neighbouring pixels inside a mask to heights (or log images).
 
 Problem: minimise the sum over pairs of 4-neighbours p, q in the mask of (z_q - z_p - d_pq)^2. The
-normal equations are a Poisson equation with natural borders: nothing outside the mask matters. Each
-connected part of the mask has mean zero.
+normal equations are a Poisson equation with natural boundary conditions: pixels outside the mask
+have no effect. Each connected part of the mask has mean zero.
 
 Equation: conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear
-interpolation and Galerkin coarse operators: about 15 iterations whatever the size. All sums are
-taken here, in one order: a library's would round differently on one thread than on two.
+interpolation and Galerkin coarse operators: about 15 iterations for any size. All sums are taken in
+a fixed order: BLAS would round differently on one thread than on two.
 
-Citation: least-squares integration of a field that need not be integrable: B. K. P. Horn and M. J.
-Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3; conjugate gradients: M. R.
-Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand. 49(6), 409-436 (1952), doi:10.6028/jres.049.044.
+Citation: least-squares integration of a field that is not necessarily integrable: B. K. P. Horn and
+M. J. Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3; conjugate gradients: M.
+R. Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand. 49(6), 409-436 (1952),
+doi:10.6028/jres.049.044.
 """
 
 from dataclasses import dataclass
@@ -22,10 +23,10 @@ from ..numerics.linear import solve_linear
 
 _COARSEST = 60
 _DAMPING = 0.7
-_MOST_STEPS = 200
-# Share of the coarsest diagonal that makes its inverse exist; the constants that it adds are
-# removed in the end.
-_LIFT = 1e-9
+_MAX_STEPS = 200
+# Fraction of the coarsest diagonal that is added to make the matrix invertible; the constants that
+# this introduces are removed at the end.
+_RIDGE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -57,14 +58,14 @@ class _Multigrid:
 def integrate(
     right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: float = 1e-6
 ) -> np.ndarray:
-    """Integrate differences in least squares.
+    """Integrate differences by least squares.
 
     Parameters
     ----------
     right, down : (H, W) or (H, W, C) ndarray
         Target of z[i, j+1] - z[i, j] and of z[i+1, j] - z[i, j].
     mask : (H, W) bool ndarray
-        Pairs that leave it are ignored.
+        Pairs that are not completely inside are ignored.
     tolerance : float
         Relative residual of the normal equations.
 
@@ -79,8 +80,8 @@ def integrate(
     difference, horizontal, vertical = _differences(mask)
     operator = (difference.T @ difference).tocsr()
     multigrid = _build(operator, mask)
-    wanted = np.concatenate([right[:, :-1][horizontal], down[:-1][vertical]]).astype(float)
-    columns = (difference.T @ wanted).reshape(operator.shape[0], -1)
+    target = np.concatenate([right[:, :-1][horizontal], down[:-1][vertical]]).astype(float)
+    columns = (difference.T @ target).reshape(operator.shape[0], -1)
     values = [_conjugate_gradients(operator, multigrid, b, tolerance) for b in columns.T]
     out[mask] = np.stack(values, axis=1).reshape(out[mask].shape)
     return _centred(out, mask)
@@ -93,18 +94,18 @@ def _conjugate_gradients(
     size = np.abs(right).max(initial=0)
     if size == 0:
         return np.zeros(len(right))
-    x, residual = np.zeros(len(right)), right / size  # squares of tiny differences would be zero
-    enough = tolerance**2 * _dot(residual, residual)
-    direction, before = np.zeros(len(right)), 1.0
-    for _ in range(_MOST_STEPS):
-        if _dot(residual, residual) <= enough:
+    x, residual = np.zeros(len(right)), right / size  # squares of tiny differences would underflow
+    threshold = tolerance**2 * _dot(residual, residual)
+    direction, previous = np.zeros(len(right)), 1.0
+    for _ in range(_MAX_STEPS):
+        if _dot(residual, residual) <= threshold:
             break
         z = multigrid.cycle(residual)
-        now = _dot(residual, z)
-        direction = z + now / before * direction
+        product = _dot(residual, z)
+        direction = z + product / previous * direction
         image = operator @ direction
-        step = now / _dot(direction, image)
-        x, residual, before = x + step * direction, residual - step * image, now
+        step = product / _dot(direction, image)
+        x, residual, previous = x + step * direction, residual - step * image, product
     return size * x
 
 
@@ -113,7 +114,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
-    """The matrix (pairs, pixels) of differences z_q - z_p, and which pairs it holds: (H, W-1) and
+    """The matrix (pairs, pixels) of differences z_q - z_p, and masks of its pairs: (H, W-1) and
     (H-1, W) bool.
     """
     index = np.full(mask.shape, -1)
@@ -133,7 +134,7 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
     levels = []
     while operator.shape[0] > _COARSEST:
         up, mask = _interpolation(mask)
-        # A lone pixel has no neighbours and nothing to solve; any diagonal serves.
+        # An isolated pixel has no equation to solve; any diagonal is valid.
         diagonal = operator.diagonal()
         levels.append(_Level(operator, 1 / np.where(diagonal > 0, diagonal, 1), up))
         operator = (up.T @ operator @ up).tocsr()
@@ -141,12 +142,12 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
     largest = coarsest.diagonal().max(initial=0) or 1.0
     return _Multigrid(
         levels,
-        solve_linear(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest))),
+        solve_linear(coarsest + _RIDGE * largest * np.eye(len(coarsest)), np.eye(len(coarsest))),
     )
 
 
 def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
-    """Interpolation (pixels, coarse pixels) from the grid of 2 x 2 blocks that hold any pixel of
+    """Interpolation (pixels, coarse pixels) from the grid of 2 x 2 blocks that contain any pixel of
     the mask, and that grid's mask.
     """
     padded = np.pad(mask, [(0, n % 2) for n in mask.shape])

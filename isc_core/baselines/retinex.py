@@ -1,18 +1,19 @@
-"""Colour Retinex, then shape from its shading (Grosse et al. 2009).
+"""Colour Retinex (Grosse et al. 2009), followed by shape from shading.
 
 Problem: split log image = log shading + log reflectance.
 
 Equation: a difference between neighbours belongs to reflectance where it is large in brightness
-(its mean over the channels) or in chromaticity (the remainder), else to shading; the shading image
-is the one whose differences fit those best in least squares. Its level in each channel, which
-differences do not determine, is set to median 0, so the overall colour stays in the reflectance.
+(its mean over the channels) or in chromaticity (the remainder), otherwise to shading; the shading
+image is the least-squares integral of its differences. Its level in each channel, which differences
+do not determine, is set to median 0, so the overall colour belongs to the reflectance.
 
 Citation: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman, "Ground truth dataset and baseline
 evaluations for intrinsic image algorithms", ICCV 2009, 2335-2342, doi:10.1109/ICCV.2009.5459428;
 after E. H. Land and J. J. McCann (1971), doi:10.1364/JOSA.61.000001. Shape by Ikeuchi & Horn 1981
 (`ikeuchi_horn_1981`).
 
-Limits: creases and shadow borders count as reflectance, gradual changes of reflectance as shading.
+Limits: creases and shadow borders are attributed to reflectance, gradual changes of reflectance to
+shading.
 """
 
 from dataclasses import dataclass, field
@@ -27,7 +28,7 @@ from .poisson import integrate
 
 @dataclass(frozen=True)
 class RetinexOptions:
-    """Which differences are reflectance edges, and how the shape is found.
+    """Options of the classification of edges, and of the shape.
 
     Attributes
     ----------
@@ -35,7 +36,7 @@ class RetinexOptions:
         Difference of natural logarithms above which a pair of neighbours is a reflectance edge, >=
         0.
     chromaticity_threshold : float
-        The same for the length of the channels' differences less their mean.
+        The same for the norm of the channels' differences minus their mean.
     shape : IkeuchiHorn1981Options
     """
 
@@ -75,7 +76,7 @@ def estimate(
 def log_shading(
     log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None
 ) -> np.ndarray:
-    """Split the log image; log reflectance is the remainder.
+    """Compute the log shading of a log image; the log reflectance is the remainder.
 
     Parameters
     ----------
@@ -91,7 +92,7 @@ def log_shading(
     Raises
     ------
     InputError
-        For arrays that do not fit or an empty mask.
+        For arrays of wrong shapes or an empty mask.
     """
     check_log_image(log_image, mask)
     options = options or RetinexOptions()

@@ -1,4 +1,4 @@
-"""Shape from shading by a local linear approximation in the height itself (Tsai & Shah 1994).
+"""Shape from shading by a local linear approximation in the height (Tsai & Shah 1994).
 
 Problem: E = R(p, q) = max(0, n . l), with slopes p, q taken as differences of neighbouring heights.
 
@@ -7,14 +7,15 @@ Newton step solves it, all pixels at once:
   z <- z + R' (E - R) / (W + R'^2),   R' = dR/dz,   starting at z = 0.
 
 Citation: P.-S. Tsai and M. Shah, "Shape from shading using linear approximation", Image and Vision
-Computing 12(8), 487-498 (1994), doi:10.1016/0262-8856(94)90002-7. Two things differ. Differences
-are taken toward the neighbours that lie away from the light, so that both slopes act on R with one
-sign; in a fixed direction R' vanishes for lights from one diagonal. And the damping stays, where
-the published gain shrinks with every step and ends before distant pixels have agreed.
+Computing 12(8), 487-498 (1994), doi:10.1016/0262-8856(94)90002-7. There are two changes.
+Differences are taken toward the neighbours on the side away from the light, so that both slopes
+affect R with the same sign; with a fixed direction, R' vanishes for lights from one diagonal. And
+the damping is constant, since the published gain decreases with every step and vanishes before
+distant pixels are consistent.
 
-Limits: local, so noise goes straight into the height, and convex and concave are distinguished by
-the start alone, where bright is high; insensitive under frontal light, where a flat surface has R'
-= 0 (the light is then tilted by `least_lean`).
+Limits: local, so noise directly affects the height, and convex and concave shapes are distinguished
+only by the start, which makes bright pixels high; insensitive under frontal light, where a flat
+surface has R' = 0 (the light is then tilted by `min_slant`).
 """
 
 from dataclasses import dataclass
@@ -28,25 +29,25 @@ from .from_shading import BaselineEstimate, from_log_shading, grey_log_shading
 
 @dataclass(frozen=True)
 class TsaiShah1994Options:
-    """How the height is found.
+    """Options of the estimate of the height.
 
     Attributes
     ----------
     steps : float
-        Newton steps per pixel of the object's longer side, > 0, since changes travel a pixel a
-        step.
+        Newton steps per pixel of the object's longer side, > 0, since changes propagate by one
+        pixel per step.
     damping : float
         W, > 0; larger is slower and less sensitive to noise.
-    least_lean : float
-        Least sine of the angle between light and line of sight, in (0, 1).
+    min_slant : float
+        Smallest sine of the angle between light and line of sight, in (0, 1).
     smoothing : float
-        Sigma of the Gaussian over the final height, as a share of the square root of the object's
-        area; 0 for none.
+        Sigma of the Gaussian filter of the final height, as a fraction of the square root of the
+        object's area; 0 for none.
     """
 
     steps: float = 1.6
     damping: float = 0.5
-    least_lean: float = 0.05
+    min_slant: float = 0.05
     smoothing: float = 0.03
 
 
@@ -98,7 +99,7 @@ def height_from_brightness(
     Returns
     -------
     (H, W) float64 ndarray
-        Pixels toward the viewer, mean 0 in the mask; beyond it the nearest rim height.
+        Pixels toward the viewer, mean 0 in the mask; outside, the height of the nearest rim pixel.
 
     Raises
     ------
@@ -109,9 +110,9 @@ def height_from_brightness(
     box = Box.of(mask)
     shade, inside = box.crop(brightness), box.crop(mask)
     strength = max(float(np.linalg.norm(light)), 1e-30)
-    x, y, z = _leaned(np.asarray(light, float) / strength, options.least_lean)
-    # Turned so that the light comes from the lower left; `_newton` then looks left and down alike.
-    flips = tuple(axis for axis, turned in ((0, y > 0), (1, x > 0)) if turned)
+    x, y, z = _tilted(np.asarray(light, float) / strength, options.min_slant)
+    # Flipped so that the light comes from the lower left; `_newton` uses left and lower neighbours.
+    flips = tuple(axis for axis, flipped in ((0, y > 0), (1, x > 0)) if flipped)
     shade = np.clip(np.flip(shade, flips) / strength, 0, 1)
     height = np.flip(_newton(shade, np.flip(inside, flips), (-abs(x), -abs(y), z), options), flips)
     sigma = options.smoothing * float(np.sqrt(inside.sum()))
@@ -120,12 +121,12 @@ def height_from_brightness(
     return box.place((smooth - smooth[inside].mean())[tuple(nearest)])
 
 
-def _leaned(light: np.ndarray, least: float) -> np.ndarray:
-    lean = float(np.hypot(light[0], light[1]))
-    if lean >= least:
+def _tilted(light: np.ndarray, min_slant: float) -> np.ndarray:
+    slant = float(np.hypot(light[0], light[1]))
+    if slant >= min_slant:
         return light
-    direction = light[:2] / lean if lean > 1e-9 else np.sqrt([0.5, 0.5])
-    return np.array([*(least * direction), np.sqrt(1 - least**2)])
+    direction = light[:2] / slant if slant > 1e-9 else np.sqrt([0.5, 0.5])
+    return np.array([*(min_slant * direction), np.sqrt(1 - min_slant**2)])
 
 
 def _newton(

@@ -1,1 +1,1 @@
-"""The neural networks: what they predict from a photo, their layers and their weights."""
+"""The neural networks: their predictions from a photo, their layers and their weights."""

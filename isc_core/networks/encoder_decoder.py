@@ -1,9 +1,9 @@
-"""What the networks share: an encoder, a decoder, and for some an answer about the photo.
+"""Parts common to the networks: an encoder, a decoder, and for some a global prediction.
 
-Equation: pixels go in and come out in blocks (space to depth). Each level down is two convolutions
-(`layers`) and half as fine as the one before; each level up sees the level below it, repeated,
-beside the encoder's map of its own size. Two dense layers answer about the photo as a whole from
-what is read of the coarse maps.
+Equation: inputs and outputs are blocks of pixels (space to depth). Each level of the encoder has
+two convolutions (`layers`) and half the resolution of the previous one; each level of the decoder
+receives the coarser level, upsampled by repetition, concatenated with the encoder's map of its own
+resolution. Two dense layers make a global prediction from statistics of the coarse maps.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28.
@@ -21,19 +21,20 @@ from ..imaging.blocks import block_means
 from .layers import conv_block, convolved, depth_to_space, is_chain, space_to_depth
 from .loader import Network, Parameters
 
-BLOCK = 4  # pixels of a block's side
+BLOCK = 4  # side of a block, pixels
 
 
 @dataclass(frozen=True)
 class EncoderDecoder(Network):
-    """A network that gives maps of a photo. Raises `InputError` where parts do not fit.
+    """A network that predicts maps from a photo. Raises `InputError` if the parts do not match.
 
     Attributes
     ----------
     inputs, outputs : int
-        Channels of a pixel.
+        Channels per pixel.
     weights : tuple of (9, inputs, outputs) float32 ndarray
-        Two for each level down, two for each level up from the coarsest, the output.
+        Two for each level of the encoder, two for each of the decoder from the coarsest, the
+        output.
     biases : tuple of (outputs,) float32 ndarray
     """
 
@@ -47,11 +48,11 @@ class EncoderDecoder(Network):
         if not self.fits():
             raise InputError(
                 f"these are not the weights of a {self.title} of this version: "
-                "fit them anew, or use the shipped ones"
+                "fit them again, or use the shipped ones"
             )
 
     def fits(self) -> bool:
-        """Return whether the parts fit each other."""
+        """Return whether the shapes of the parts match."""
         if len(self.weights) < 7 or len(self.weights) % 4 != 3:
             return False
         if any(w.ndim != 3 for w in self.weights):
@@ -71,7 +72,7 @@ class EncoderDecoder(Network):
 
     @classmethod
     def from_parameters(cls, parameters: Parameters) -> Self:
-        """Build a network that has no other parts than these.
+        """Build a network that has only these parts.
 
         Parameters
         ----------
@@ -86,22 +87,22 @@ class EncoderDecoder(Network):
         Raises
         ------
         InputError
-            If the parameters do not fit.
+            If the parameters do not match.
         """
         return cls(parameters.weights, parameters.biases)
 
     @property
     def depth(self) -> int:
-        """Levels down."""
+        """Number of levels."""
         return (len(self.weights) + 1) // 4
 
     @property
     def widths(self) -> list[int]:
-        """Channels of the levels down, the finest first."""
+        """Channels of the encoder's levels, finest first."""
         return [w.shape[-1] for w in self.weights[1 : 2 * self.depth : 2]]
 
-    def walked(self, channels: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Go down and up again.
+    def forward(self, channels: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Apply encoder and decoder.
 
         Parameters
         ----------
@@ -112,7 +113,7 @@ class EncoderDecoder(Network):
         -------
         maps : (H, W, outputs) float32 ndarray
         levels : list of ndarray
-            The encoder's maps, the finest first.
+            The encoder's maps, finest first.
         """
         layer = space_to_depth(channels, BLOCK)
         steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
@@ -120,27 +121,28 @@ class EncoderDecoder(Network):
             layer = conv_block(layer if level == 0 else block_means(layer, 2), steps)
             levels.append(layer)
         for skip in levels[-2::-1]:
-            layer = conv_block(_beside(skip, layer), steps)
+            layer = conv_block(_concatenated(skip, layer), steps)
         return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
 
 
 @dataclass(frozen=True)
 class PhotoNetwork(EncoderDecoder):
-    """A network that also answers about the photo as a whole.
+    """A network that also makes a global prediction for the photo.
 
     Attributes
     ----------
     coarse : int
-        Levels that the answer is read from, the coarsest ones: two numbers for each channel.
+        Number of levels, the coarsest ones, that the global prediction uses: two features per
+        channel.
     answers : int
-        Numbers of the answer.
+        Number of global outputs.
     stored : tuple of str
-        Names in the archive: of the answer's second layer, and of the calibration.
+        Names in the archive: of the second dense layer, and of the calibration.
     dense : tuple of (inputs, outputs) ndarray
-        The two layers of the answer.
+        The two dense layers.
     offsets : tuple of (outputs,) ndarray
     calibration : (n,) ndarray
-        What is fitted after the training.
+        Parameters that are fitted after training.
     """
 
     coarse: ClassVar[int]
@@ -168,7 +170,7 @@ class PhotoNetwork(EncoderDecoder):
         Raises
         ------
         InputError, KeyError
-            If the parameters do not fit.
+            If the parameters do not match.
         """
         others, (answer, calibration) = parameters.others, cls.stored
         return cls(
@@ -180,7 +182,7 @@ class PhotoNetwork(EncoderDecoder):
         )
 
     def fits(self) -> bool:
-        """Return whether the parts fit each other."""
+        """Return whether the shapes of the parts match."""
         if not super().fits() or any(m.ndim != 2 for m in self.dense):
             return False
         hidden = self.dense[0].shape[-1]
@@ -189,8 +191,8 @@ class PhotoNetwork(EncoderDecoder):
             s[1:] for s in answer
         ]
 
-    def answer(self, features: list[np.ndarray]) -> np.ndarray:
-        """Answer about the photo as a whole.
+    def predict_global(self, features: list[np.ndarray]) -> np.ndarray:
+        """Compute the global prediction.
 
         Parameters
         ----------
@@ -205,8 +207,8 @@ class PhotoNetwork(EncoderDecoder):
         return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]
 
 
-def _beside(skip: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """The encoder's map (H, W, C) and beside it the map (H / 2, W / 2, D) below it, repeated."""
+def _concatenated(skip: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """The map (H, W, C) of the encoder with the coarser one (H / 2, W / 2, D), upsampled."""
     both = np.empty((*skip.shape[:2], skip.shape[2] + coarse.shape[2]), np.float32)
     both[..., : skip.shape[2]] = skip
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):

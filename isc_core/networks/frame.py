@@ -1,7 +1,7 @@
-"""The frame in which a network sees an object, and the way back to the photo.
+"""The input frame of a network, and the transformation of its output to the photo.
 
-The object's box is averaged down to a fixed length and placed in the middle of a square; smaller
-objects stay as they are. Maps of the frame are enlarged to the photo's pixels.
+The object's bounding box is downsampled to a fixed length by averaging, and placed at the centre of
+a square; smaller objects are not resampled. Maps of the frame are upsampled to the photo's pixels.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from ..imaging.upsampling import enlarge_inside
 
 @dataclass(frozen=True)
 class NetworkFrame:
-    """A photo as the network sees it.
+    """The input of a network.
 
     Attributes
     ----------
@@ -24,9 +24,9 @@ class NetworkFrame:
         Linear light, 0 outside the object.
     mask : (side, side) bool ndarray
     place : tuple of slice
-        Rows and columns of the object's box.
+        Rows and columns of the object's bounding box.
     factor : float
-        Size of the object over that in the photo.
+        Size of the object in the frame over that in the photo.
     """
 
     image: np.ndarray
@@ -36,7 +36,7 @@ class NetworkFrame:
 
 
 def framed(image: np.ndarray, mask: np.ndarray, side: int, long_side: int) -> NetworkFrame:
-    """Place an object in the middle of a frame.
+    """Place an object at the centre of a frame.
 
     Parameters
     ----------
@@ -44,9 +44,9 @@ def framed(image: np.ndarray, mask: np.ndarray, side: int, long_side: int) -> Ne
         Linear, not negative inside the mask.
     mask : (H, W) bool ndarray
     side : int
-        Of the frame, pixels.
+        Side of the frame, pixels.
     long_side : int
-        Most pixels of the object, at most `side`.
+        Maximum length of the object, pixels, at most `side`.
 
     Returns
     -------
@@ -62,15 +62,15 @@ def framed(image: np.ndarray, mask: np.ndarray, side: int, long_side: int) -> Ne
 
 
 def at_full_size(maps: np.ndarray, frame: NetworkFrame, mask: np.ndarray) -> np.ndarray:
-    """Bring maps of the frame to the photo's pixels.
+    """Upsample maps of the frame to the photo's pixels.
 
     Parameters
     ----------
     maps : (side, side, C) ndarray
-        Valid on the object; its values are continued beyond it before they are enlarged.
+        Valid on the object; they are extrapolated beyond it before upsampling.
     frame : NetworkFrame
     mask : (H, W) bool ndarray
-        The photo's.
+        The object in the photo.
 
     Returns
     -------

@@ -1,24 +1,25 @@
-"""Which bright details of a photo are highlights, and which are paint.
+"""Classification of a photo's bright details as highlights or paint.
 
-Problem: colour tells a highlight on saturated paint, and nothing on white, grey or black. What a
-person sees there is form: a highlight is peaked, follows the shape, and crosses the paint.
+Problem: colour identifies a highlight on saturated paint, but not on white, grey or black. There,
+people use shape cues: a highlight is peaked, follows the surface, and crosses the paint.
 
 Equation: with m the smallest channel, its bright details b_k by size (`imaging.brightness_bands`)
-hold nearly all of a visible highlight, and all white print. An encoder and a decoder of
-convolutions (`encoder_decoder`) see the photo and the b_k, and give for each pixel and size the log
+contain nearly all of a visible highlight, and all white print. A convolutional encoder-decoder
+(`encoder_decoder`) receives the photo and the b_k, and predicts for each pixel and size the log
 odds o_k that the detail is specular light:
 
     s = sum_k b_k / (1 + exp(-o_k)).
 
-Photo and mirror image are averaged. On photos finer than the network's frame the b_k are those of
-the photo, of as large sizes, so that edges are the photo's.
+The predictions for the photo and its mirror image are averaged. On photos of a higher resolution
+than the network's frame, the b_k are computed from the photo, at sizes scaled accordingly, so that
+edges are those of the photo.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
-doi:10.1007/978-3-319-24574-4_28. Weights, training pictures and losses are our own: `python -m
+doi:10.1007/978-3-319-24574-4_28. Weights, training images and losses are our own: `python -m
 training.networks.highlight_network`.
 
 Limits: measured in docs/methods/highlight_network.md. Specular light without bright details, such
-as a veil over the whole body, is not seen. The light is taken for white.
+as broad sheen over the whole body, is not detected. The light is assumed to be white.
 """
 
 from dataclasses import dataclass
@@ -34,9 +35,9 @@ from .layers import DARK
 from .scene_network import LONG_SIDE, SIDE
 from .scene_network import channels_of as photo_channels_of
 
-REACHES = (2, 5, 11)  # of the sizes, pixels of a frame of `SIDE`
+REACHES = (2, 5, 11)  # sizes of details, pixels of a frame of `SIDE`
 INPUTS = 7 + len(REACHES)
-_SMOOTH = 0.35  # pixels of the frame: noise has bright details, too
+_SMOOTH = 0.35  # pixels of the frame: suppresses bright details of noise
 _LARGEST_ODDS = 30.0  # logarithm
 _LEAST = 1e-6
 
@@ -51,14 +52,14 @@ class HighlightNetwork(EncoderDecoder):
 
 @dataclass(frozen=True)
 class HighlightPrediction:
-    """What the network says of a photo's highlights.
+    """The network's prediction of a photo's highlights.
 
     Attributes
     ----------
     specular : (H, W) float32 ndarray
-        s, in every channel; at most the photo's smallest channel, 0 outside the mask.
+        s, equal in all channels; at most the photo's smallest channel, 0 outside the mask.
     deviation : (H, W) float32 ndarray
-        Of s: with p_k = 1 / (1 + exp(-o_k)), the root of sum_k b_k^2 p_k (1 - p_k).
+        Standard deviation of s: with p_k = 1 / (1 + exp(-o_k)), sqrt(sum_k b_k^2 p_k (1 - p_k)).
     share : (H, W) float32 ndarray
         s over the sum of the b_k, in [0, 1]; 0 where there are no details.
     """
@@ -82,19 +83,19 @@ def predict_highlights(
         Linear, not negative inside the mask.
     mask : (H, W) ndarray of bool
     doubt : float
-        Subtracted from the log odds.
+        Bias against highlights: subtracted from the log odds.
     network : HighlightNetwork, optional
         By default the shipped one.
 
     Returns
     -------
     HighlightPrediction
-        That of the mirrored photo is mirrored.
+        Equivariant: the prediction for a mirrored photo is mirrored.
     """
     network = network or HighlightNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    direct, _ = network.walked(channels_of(frame.image, frame.mask))
-    mirrored, _ = network.walked(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
+    direct, _ = network.forward(channels_of(frame.image, frame.mask))
+    mirrored, _ = network.forward(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
     odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
     scale = 1 / frame.factor
     values = least = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)
@@ -123,8 +124,8 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, INPUTS) float32 ndarray
-        Those of the scene network, log(1 + b_k / (.03 mean light)), and log(C / mean light + .03)
-        with the chroma C, the largest less the smallest channel.
+        The channels of the scene network, log(1 + b_k / (.03 mean light)), and log(C / mean light +
+        .03) with the chroma C, the largest minus the smallest channel.
     """
     photo = photo_channels_of(image, mask)
     mean = float(image[mask].mean(dtype=float)) if mask.any() else 0.0

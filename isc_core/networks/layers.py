@@ -1,15 +1,15 @@
 """The layers of the networks: convolutions whose results are identical on any number of threads.
 
 Equation: the input is log(I / mean I + .03) and the mask, in blocks of pixels (space to depth);
-each level is two 3 x 3 convolutions with max(0, .) and zero padding, and half as fine as the one
-before.
+each level has two 3 x 3 convolutions with max(0, .) and zero padding, and half the resolution of
+the previous one.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
 
-Limits: one matrix product of doubles a layer: made for networks of some hundred thousand weights. A
-library such as onnxruntime would be faster, but cannot be shipped in a Blender extension that runs
-on every version, and sums in an order of its own.
+Limits: one matrix product in float64 per layer: designed for networks of up to a few million
+weights. A library such as onnxruntime would be faster, but cannot be shipped in a Blender extension
+for all versions, and its order of summation is not defined.
 """
 
 from collections.abc import Iterator, Mapping
@@ -18,7 +18,7 @@ import numpy as np
 
 DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
-_BLOCK_BYTES = 16_000_000  # of neighbourhoods at a time
+_BLOCK_BYTES = 16_000_000  # of the neighbourhoods that are processed at a time
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
@@ -58,7 +58,7 @@ def weights_in(
 def is_chain(
     weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...], shapes: list[tuple[int, ...]]
 ) -> bool:
-    """Return whether convolutions have these shapes, and biases that fit.
+    """Return whether convolutions and biases have these shapes.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def space_to_depth(layer: np.ndarray, block: int) -> np.ndarray:
     Returns
     -------
     (H / b, W / b, b b C) ndarray
-        The pixels of a channel follow each other, row by row; channels come first in the order.
+        Ordered by channel, then by the row and column of the pixel in its block.
     """
     rows, columns, channels = layer.shape
     blocks = layer.reshape(rows // block, block, columns // block, block, channels)
@@ -158,9 +158,9 @@ def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
 def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
     """Convolve with a 3 x 3 kernel and zero padding, as matrix products of neighbourhoods.
 
-    Both factors are rounded to whole multiples of a power of two, small enough for doubles to hold
-    every sum of their products exactly: the order of summation, which libraries choose by the
-    number of threads, does not change a bit.
+    Both factors are rounded to integer multiples of a power of two, such that float64 represents
+    every sum of their products exactly: the order of summation, which in libraries depends on the
+    number of threads, does not affect the result.
 
     Parameters
     ----------
@@ -196,19 +196,19 @@ def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.nda
 
 
 def _to_multiples(values: np.ndarray, step: float) -> None:
-    """Count values in whole steps, a power of two."""
+    """Convert values to integer multiples of a step, a power of two."""
     values /= values.dtype.type(step)
     np.rint(values, out=values)
 
 
 def _step_of(values: np.ndarray) -> float:
-    """A power of two of which the values are at most 2^20 multiples."""
-    most = max(float(values.max()), -float(values.min()))
-    return float(2.0 ** (np.ceil(np.log2(most)) - _BITS)) if most > 0 else 1.0
+    """A power of two such that the values are at most 2^20 multiples of it."""
+    largest = max(float(values.max()), -float(values.min()))
+    return float(2.0 ** (np.ceil(np.log2(largest)) - _BITS)) if largest > 0 else 1.0
 
 
 def softmax(score: np.ndarray) -> np.ndarray:
-    """Turn scores into probabilities.
+    """Convert scores to probabilities.
 
     Parameters
     ----------

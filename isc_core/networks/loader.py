@@ -1,7 +1,7 @@
-"""Reading networks from archives of weights: one loader for all of them.
+"""The loader of all networks from archives of weights.
 
-An archive (.npz) holds float16 or float32 arrays: `weight00`, `bias00`, `weight01`, ... are the
-convolutions in the order of the data; all other arrays are parameters of the network's own.
+An archive (.npz) contains float16 or float32 arrays: `weight00`, `bias00`, `weight01`, ... are the
+convolutions in order of execution; all other arrays are specific to the network.
 """
 
 import importlib.resources
@@ -27,7 +27,7 @@ class Parameters:
     Attributes
     ----------
     weights : tuple of (9, inputs, outputs) float32 ndarray
-        Of the convolutions; rows of the 3 x 3 kernel first.
+        Of the convolutions; kernels in row-major order.
     biases : tuple of (outputs,) float32 ndarray
     others : mapping of str to float64 ndarray
     """
@@ -38,7 +38,7 @@ class Parameters:
 
 
 class Network:
-    """Base of the networks: how they are read.
+    """Base class of the networks, with their loader.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Network:
         Raises
         ------
         InputError, KeyError
-            If the parameters do not fit.
+            If the parameters do not match.
         """
         raise NotImplementedError
 
@@ -87,7 +87,7 @@ class Network:
         Raises
         ------
         InputError
-            If the file is missing or holds no such network.
+            If the file is missing or does not contain such a network.
         """
         try:
             return cls.from_parameters(_parameters(read_arrays(path)))

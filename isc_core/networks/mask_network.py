@@ -77,12 +77,12 @@ class MaskNetwork(PhotoNetwork):
         counts : (3,) ndarray
             Log odds of `Count`.
         """
-        maps, levels = self.walked(channels)
+        maps, levels = self.forward(channels)
         features = []
         for layer in levels[-COARSE:]:
             values = layer.astype(np.float64)
             features += [values.mean(axis=(0, 1)), values.max(axis=(0, 1))]
-        return maps[..., 0], self.answer(features)
+        return maps[..., 0], self.predict_global(features)
 
 
 @dataclass(frozen=True)

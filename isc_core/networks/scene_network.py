@@ -1,27 +1,28 @@
-"""Prediction of all that a photo shows of its scene, before any model explains it.
+"""Joint prediction of shape, layers, shading and light from a photo.
 
-Problem: shape, layers, shading and light are ambiguous pixel by pixel. Having seen many things in
-many lights helps with all of them, and what helps one helps the others: one network predicts them
-together, each with its uncertainty.
+Problem: shape, layers, shading and light cannot be determined from single pixels. Experience with
+many objects under many lights resolves some of the ambiguity, and the quantities share features:
+one network predicts all of them, each with its uncertainty.
 
-Equation: an encoder of convolutions computes feature maps of the photo, each half as fine as the
-one before; a decoder goes back up with the encoder's maps beside it (`encoder_decoder`). Each pixel
-gets m (3,), the mean of the probable unit normals, and the deviation of n_x and n_y from it; the
-log ratio y (3,) of image and diffuse image, and its scale; the log shading (3,) of a photo whose
-mean light is 1, and its scale; and the log odds of a depth edge. The coarse feature maps, averaged
-over the object, and their maxima give the light: mean l and covariance D^2 + F F' of the 27
-coefficients of the log shading, the number of lamps, the direction of the strongest, and what the
-object is made of. Photo and mirror image are averaged. y and the shading have Laplace
-distributions, the normals and the light normal ones. Each scale is multiplied by a factor fitted on
-bodies that the weights have not seen.
+Equation: a convolutional encoder computes feature maps of the photo, each with half the resolution
+of the previous one; a decoder with skip connections returns to full resolution (`encoder_decoder`).
+The outputs at each pixel are m (3,), the mean of the probable unit normals, and the deviation of
+n_x and n_y from it; the log ratio y (3,) of image and diffuse image, and its scale; the log shading
+(3,) of a photo whose mean light is 1, and its scale; and the log odds of a depth edge. The means
+and maxima of the coarse feature maps over the object determine the light: mean l and covariance D^2
++ F F' of the 27 coefficients of the log shading, the number of lamps, the direction of the
+strongest, and the material of the object. The predictions for the photo and its mirror image are
+averaged. y and the shading have Laplace distributions, the normals and the light Gaussian ones.
+Each scale is multiplied by a factor fitted on held-out bodies.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; uncertainties: A. Kendall, Y. Gal, "What uncertainties do we need
 in Bayesian deep learning for computer vision?", 2017, arXiv:1703.04977; their factors: C. Guo et
-al., "On calibration of modern neural networks", 2017, arXiv:1706.04599. Weights, training pictures
+al., "On calibration of modern neural networks", 2017, arXiv:1706.04599. Weights, training images
 and losses are our own: `python -m training.networks.scene_network`.
 
-Limits: measured in docs/methods/scene_network.md. It sees the object 112 pixels long.
+Limits: measured in docs/methods/scene_network.md. Objects are downsampled to a length of 112
+pixels.
 """
 
 from collections.abc import Mapping
@@ -39,20 +40,20 @@ from .encoder_decoder import PhotoNetwork
 from .frame import NetworkFrame, at_full_size, framed
 from .layers import inputs_of, softmax
 
-SIDE, LONG_SIDE = 128, 112  # pixels of the network's frame, and of the object in it
+SIDE, LONG_SIDE = 128, 112  # sides of the network's frame and of the object in it, pixels
 INPUTS = 6
 LIGHT, FACTORS = 27, 3
-FACTOR_SCALE = 0.1  # of the covariance's factors, so that they begin small
+FACTOR_SCALE = 0.1  # of the covariance's factors, so that they are small initially
 COUNTS, PLACE_COUNT, KIND_COUNT = 3, 256, 3
 GLOBAL = LIGHT * (2 + FACTORS) + COUNTS + PLACE_COUNT + KIND_COUNT
 MIN_LOG_SCALE, MAX_LOG_SCALE = -5.0, 1.5
-COARSE = 3  # levels that the light is read from, the coarsest ones
-MARGIN = 2.0  # offset of the log ratio: its prior is a small one
+COARSE = 3  # number of levels, the coarsest ones, that the light is predicted from
+MARGIN = 2.0  # offset of the log ratio: favours small ones
 _LEAST = 1e-6
 
 
 class Head(StrEnum):
-    """What is predicted at each pixel."""
+    """Outputs at each pixel."""
 
     NORMAL = "normal"
     NORMAL_SCALE = "normal_scale"
@@ -76,7 +77,7 @@ CHANNELS = 13
 
 
 class Kind(StrEnum):
-    """What an object is made of, in the order of `ScenePrediction.kinds`."""
+    """Material of an object, in the order of `ScenePrediction.kinds`."""
 
     OPAQUE = "opaque"
     MIRROR = "mirror"
@@ -88,14 +89,14 @@ TEMPERATURES = ("normal", "ratio", "shading", "light")
 
 @dataclass(frozen=True)
 class RawPrediction:
-    """What the network gives, on its own frame.
+    """Output of the network in its own frame.
 
     Attributes
     ----------
     maps : (H, W, CHANNELS) float32 ndarray
-        By `HEADS`; scales as logarithms.
+        Ordered by `HEADS`; scales as logarithms.
     vector : (GLOBAL,) ndarray
-        The light's mean, log deviations and factors, scores of lamps, places and kinds.
+        Mean, log deviations and factors of the light; scores of lamp counts, places and kinds.
     """
 
     maps: np.ndarray
@@ -104,7 +105,7 @@ class RawPrediction:
 
 @dataclass(frozen=True)
 class SceneNetwork(PhotoNetwork):
-    """The scene network; its answer is the light."""
+    """The scene network; its global prediction is the light."""
 
     title = "scene network"
     file = "scene_network.npz"
@@ -113,11 +114,11 @@ class SceneNetwork(PhotoNetwork):
 
     @property
     def temperatures(self) -> np.ndarray:
-        """Factors (4,) of the scales, by `TEMPERATURES`."""
+        """Factors (4,) of the scales, ordered by `TEMPERATURES`."""
         return self.calibration
 
     def fits(self) -> bool:
-        """Return whether the parts fit each other."""
+        """Return whether the shapes of the parts match."""
         return (
             super().fits()
             and self.temperatures.shape == (len(TEMPERATURES),)
@@ -125,7 +126,7 @@ class SceneNetwork(PhotoNetwork):
         )
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
-        """Predict maps and light for an input of `framed`.
+        """Predict maps and light from the image of a `NetworkFrame`.
 
         Parameters
         ----------
@@ -136,7 +137,7 @@ class SceneNetwork(PhotoNetwork):
         -------
         RawPrediction
         """
-        maps, levels = self.walked(channels_of(image, mask))
+        maps, levels = self.forward(channels_of(image, mask))
         return RawPrediction(maps, self._light(levels, mask))
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
@@ -150,7 +151,7 @@ class SceneNetwork(PhotoNetwork):
             weight = cover[..., 0] / max(float(cover.sum()), _LEAST)
             features.append(np.einsum("ij,ijc->c", weight, values))
             features.append((values * np.minimum(2 * cover, 1)).max(axis=(0, 1)))
-        return self.answer(features)
+        return self.predict_global(features)
 
 
 def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -164,8 +165,8 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, INPUTS) float32 ndarray
-        Log light over the object's mean and the mask; right and up from the middle of the frame,
-        half its side being 1. All are 0 outside the mask.
+        Log light over the object's mean, the mask, and the coordinates right and up from the centre
+        of the frame, in units of half its side. All are 0 outside the mask.
     """
     rows, columns = mask.shape
     right = ((np.arange(columns) + 0.5) * (2 / columns) - 1).astype(np.float32)
@@ -176,7 +177,7 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LayerPrediction:
-    """What the network says of a photo's layers.
+    """The network's prediction of a photo's layers.
 
     Attributes
     ----------
@@ -194,7 +195,7 @@ class LayerPrediction:
 
 @dataclass(frozen=True)
 class ScenePrediction:
-    """What the network says of a photo.
+    """The network's prediction for a photo.
 
     Attributes
     ----------
@@ -212,7 +213,7 @@ class ScenePrediction:
     kinds : (3,) ndarray
         Probabilities of `Kind`.
     edge : (H, W) ndarray
-        Probability that the depth jumps.
+        Probability of a depth edge.
     """
 
     normals: NormalEstimate
@@ -232,7 +233,7 @@ class ScenePrediction:
 
     @property
     def lamps(self) -> LightEstimate:
-        """What is known of the lamps."""
+        """The prediction of the lamps."""
         none, one, several = (float(share) for share in self.counts)
         return LightEstimate(none, one, several, self.places)
 
@@ -256,7 +257,7 @@ def predict_scene(
     """
     network = network or SceneNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    small, direct, mirrored = _asked(frame, network)
+    small, direct, mirrored = _run(frame, network)
     factors = dict(zip(TEMPERATURES, network.temperatures, strict=True))
     full = at_full_size(small, frame, mask)
     part = {head: full[..., place] for head, place in HEADS.items()}
@@ -277,7 +278,7 @@ def predict_scene(
 def predict_layers(
     image: np.ndarray, mask: np.ndarray, network: SceneNetwork | None = None
 ) -> LayerPrediction:
-    """Predict the layers and the shading of a photo: half of the memory of `predict_scene`.
+    """Predict the layers and the shading of a photo, with half of the memory of `predict_scene`.
 
     Parameters
     ----------
@@ -293,7 +294,7 @@ def predict_layers(
     """
     network = network or SceneNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    small, _, _ = _asked(frame, network)
+    small, _, _ = _run(frame, network)
     factor = network.temperatures[TEMPERATURES.index("ratio")]
     ratio, log_scale, shading = (
         at_full_size(small[..., HEADS[head]], frame, mask)
@@ -302,11 +303,11 @@ def predict_layers(
     return LayerPrediction(ratio, _scale(log_scale, mask, factor), shading)
 
 
-def _asked(frame: NetworkFrame, network: SceneNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The maps (SIDE, SIDE, CHANNELS), and the vectors of the photo and of its mirror image."""
+def _run(frame: NetworkFrame, network: SceneNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The mean maps (SIDE, SIDE, CHANNELS), and the vectors for the photo and its mirror image."""
     direct = network(frame.image, frame.mask)
     mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
-    maps = _settled(direct.maps), _settled(mirrored.maps[:, ::-1]) * _MIRRORED
+    maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED
     return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 
 
@@ -314,8 +315,10 @@ _MIRRORED = np.ones(CHANNELS, np.float32)
 _MIRRORED[HEADS[Head.NORMAL].start] = -1
 
 
-def _settled(maps: np.ndarray) -> np.ndarray:
-    """Maps with the log ratio as it is meant, so that they can be averaged."""
+def _activated(maps: np.ndarray) -> np.ndarray:
+    """Maps with the log ratio transformed to its final, non-negative form, so that they can be
+    averaged.
+    """
     found = maps.copy()
     ratio = HEADS[Head.RATIO]
     found[..., ratio] = np.logaddexp(0, maps[..., ratio] - np.float32(MARGIN))
@@ -327,14 +330,14 @@ def _scale(log_scale: np.ndarray, mask: np.ndarray, factor: float) -> np.ndarray
     return np.where(mask, scale, 0)
 
 
-_FLIPPED = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])  # signs of the harmonics in a mirror
+_MIRROR_SIGNS = np.array([1, 1, 1, -1, -1, 1, 1, -1, 1.0])  # signs of the harmonics under mirroring
 
 
 def _light_of(
     direct: np.ndarray, mirrored: np.ndarray, factor: float
 ) -> tuple[LightCoefficientsEstimate, np.ndarray, np.ndarray, np.ndarray]:
-    """The light, the lamps' counts and places, and the kinds, of both predictions."""
-    signs = np.tile(_FLIPPED, 3)
+    """The light, the lamps' counts and places, and the kinds, averaged over both predictions."""
+    signs = np.tile(_MIRROR_SIGNS, 3)
     first, second = _split_vector(direct), _split_vector(mirrored)
     mean = (first[0] + signs * second[0]) / 2
     covariance = (_covariance(first) + signs[:, None] * _covariance(second) * signs) / 2

@@ -1,7 +1,7 @@
-"""Multilevel thresholds: Otsu's objective, its exact maximum, and the optimisers of the thesis.
+"""Multilevel thresholding: Otsu's objective, its exact maximum, and the optimisers of the thesis.
 
 Each optimiser is a module with `maximise(objective, count, evaluations, seed, options) -> Optimum`;
-`exact` needs no search.
+`exact` computes the maximum by dynamic programming.
 """
 
 from ..errors import InputError
@@ -47,7 +47,7 @@ def maximise(
     """
     if not 1 <= count < LEVELS - 1:
         raise InputError(
-            f"the number of thresholds must lie between 1 and {LEVELS - 2}, not {count}"
+            f"the number of thresholds must be between 1 and {LEVELS - 2}, not {count}"
         )
     if seed < 0:
         raise InputError(f"the seed must be 0 or more, not {seed}")

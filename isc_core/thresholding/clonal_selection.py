@@ -4,21 +4,21 @@ Problem: maximise a function of K ascending integer thresholds within a budget o
 
 Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones'
 thresholds by at most s = 254 exp(-rho f) levels, f in [0, 1] being the antibody's affinity. Each
-antibody gives way to the best of its clones if that is no worse, and the d worst antibodies to new
-ones.
+antibody is replaced by the best of its clones if that is not worse, and the d worst antibodies by
+new ones.
 
 Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection
 principle", IEEE Trans. Evolutionary Computation 6(3), 239-251 (2002),
-doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they
-propose for optimisation; N, beta, rho and d are usual values of theirs. Two choices are ours, and
-the search succeeds because of them. The affinity is the rank, scaled to [0, 1]: scaled values are
-nearly 1 for all but the newest antibodies, and nothing would move far. A clone moves a run of
-neighbouring thresholds by one common step of at least one level, then sorts them: good sets of
-thresholds lie on ridges along which neighbours move together; independent steps rarely follow them,
-and end one level short of the maximum.
+doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have the same number of clones, as
+they propose for optimisation; N, beta, rho and d are typical values of theirs. Two choices are
+ours, and essential for the search. The affinity is the rank, scaled to [0, 1]: scaled objective
+values are nearly 1 for all but the newest antibodies, so that mutations would be small. A mutation
+moves a run of adjacent thresholds by one common step of at least one level, then sorts them: good
+sets of thresholds lie on ridges along which adjacent thresholds move together; independent steps
+rarely follow these, and stop one level from the maximum.
 
 Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of
-randomness, so that another source can be tried with nothing else changed: see `chaotic_clonal`.
+randomness, so that sources can be compared with all else equal: see `chaotic_clonal`.
 """
 
 from dataclasses import dataclass
@@ -42,11 +42,11 @@ class ClonalOptions:
     population : int
         Number of antibodies N, at least 2.
     clone_share : float
-        Clones of each as a share beta of N, greater than 0.
+        Clones of each antibody as a fraction beta of N, greater than 0.
     decay : float
-        rho, how fast mutations shrink with affinity, greater than 0.
+        rho, the decay of mutations with affinity, greater than 0.
     replaced_share : float
-        Share d / N of the worst antibodies that each generation replaces, in [0, 1).
+        Fraction d / N of the worst antibodies that each generation replaces, in [0, 1).
     """
 
     population: int = 50
@@ -55,7 +55,7 @@ class ClonalOptions:
     replaced_share: float = 0.1
 
 
-class Numbers(Protocol):
+class NumberSource(Protocol):
     """A source of random numbers for an optimiser."""
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
@@ -128,7 +128,11 @@ def maximise(
 
 
 def search(
-    objective: OtsuObjective, count: int, evaluations: int, numbers: Numbers, options: ClonalOptions
+    objective: OtsuObjective,
+    count: int,
+    evaluations: int,
+    numbers: NumberSource,
+    options: ClonalOptions,
 ) -> Optimum:
     """Maximise by ClonalG with any source of numbers.
 
@@ -136,7 +140,7 @@ def search(
     ----------
     objective : OtsuObjective
     count, evaluations : int
-    numbers : Numbers
+    numbers : NumberSource
     options : ClonalOptions
 
     Returns
@@ -194,10 +198,10 @@ def _check(options: ClonalOptions) -> None:
     if options.population < 2 or not options.clone_share > 0 or not options.decay > 0:
         raise InputError("population must be at least 2, clone_share and decay above 0")
     if not 0 <= options.replaced_share < 1:
-        raise InputError("replaced_share must lie within [0, 1)")
+        raise InputError("replaced_share must be within [0, 1)")
 
 
-def _new(numbers: Numbers, size: int, count: int) -> np.ndarray:
+def _new(numbers: NumberSource, size: int, count: int) -> np.ndarray:
     return np.sort((numbers.uniform((size, count)) * (_TOP + 1)).astype(np.int64), axis=1)
 
 
@@ -208,9 +212,9 @@ def _steps(values: np.ndarray, decay: float) -> np.ndarray:
     return np.maximum(1, _TOP * mutation_rate(affinity, decay))
 
 
-def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers) -> np.ndarray:
-    """The `clones` (n, K), with a run of thresholds of each moved by one step of at most its entry
-    of `steps` (n,), sorted.
+def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: NumberSource) -> np.ndarray:
+    """The `clones` (n, K), each with a run of thresholds moved by one step of at most its entry of
+    `steps` (n,), sorted.
     """
     size, count = clones.shape
     chance = numbers.uniform((size, 3))

@@ -1,21 +1,21 @@
-"""The logistic map x <- r x (1 - x): orbits, bifurcation, and uniform numbers from it.
+"""The logistic map x <- r x (1 - x): orbits, bifurcation, and uniform numbers.
 
-Problem: a chaotic sequence is to replace pseudo-random numbers, which must be uniform on [0, 1) and
-independent.
+Problem: a chaotic sequence is to replace pseudo-random numbers, which have to be uniform on [0, 1)
+and independent.
 
 Equation: at r = 4 the map is chaotic on [0, 1] and its orbits have the density 1 / (pi sqrt(x (1 -
-x))), which is U-shaped. The arcsine u = (2 / pi) asin(sqrt(x)) makes it uniform. In u the map is
-the tent u <- 1 - |1 - 2u|: the next number is a function of the last one, so consecutive numbers
-fill a line of the unit square. After `stride` steps that line has 2^stride branches: taking every
-stride-th value of an orbit, and consecutive values from different orbits, leaves no trace of it at
-the resolution at which the numbers are used.
+x))), which is U-shaped. The transformation u = (2 / pi) asin(sqrt(x)) makes it uniform. In u, the
+map is the tent map u <- 1 - |1 - 2u|: the next number is a function of the last one, so consecutive
+numbers lie on a line in the unit square. After `stride` steps, that line has 2^stride branches:
+with every stride-th value of an orbit, and consecutive values from different orbits, the dependence
+is not detectable at the resolution at which the numbers are used.
 
 Citation: S. M. Ulam and J. von Neumann, "On combination of stochastic and deterministic processes",
 Bulletin of the American Mathematical Society 53(11), 1120 (1947) (the density). R. M. May, "Simple
 mathematical models with very complicated dynamics", Nature 261, 459-467 (1976),
 doi:10.1038/261459a0 (the bifurcation).
 
-Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating
+Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead to them. An orbit in floating
 point can round to 1 and then to 0 (about once in 10^8 steps): such orbits are restarted.
 """
 
@@ -24,7 +24,7 @@ import numpy as np
 from ..errors import InputError
 
 DEGENERATE = (0.0, 0.25, 0.5, 0.75, 1.0)
-_BURN_IN = 64  # steps after which rounding has replaced every digit of the start
+_BURN_IN = 64  # steps after which no digit of the start remains
 
 
 def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarray:
@@ -65,7 +65,7 @@ def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarr
 
 
 def bifurcation(rates: np.ndarray, settle: int = 1000, keep: int = 200) -> np.ndarray:
-    """Return where orbits end at each rate.
+    """Return the values of orbits at each rate after a transient.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def density(x: np.ndarray) -> np.ndarray:
 
 
 def uniformised(x: np.ndarray) -> np.ndarray:
-    """Map values that have the density of rate 4 to uniform ones.
+    """Transform values with the invariant density of rate 4 to uniform ones.
 
     Parameters
     ----------
@@ -125,9 +125,9 @@ class ChaoticNumbers:
     """A source of uniform numbers in [0, 1) from many orbits of the map at rate 4."""
 
     def __init__(self, seed: int, orbits: int = 1024, stride: int = 8) -> None:
-        """`seed` >= 0 chooses where the `orbits` start;
+        """`seed` >= 0 determines the starting points of the `orbits`;
 
-        `stride`: how many steps of an orbit lie between two numbers taken from it.
+        `stride`: number of steps of an orbit between two numbers taken from it.
         """
         if seed < 0 or orbits < 1 or stride < 1:
             raise InputError(
@@ -164,7 +164,7 @@ class ChaoticNumbers:
         return numbers[:count].reshape(shape)
 
     def _starts(self, which: np.ndarray) -> np.ndarray:
-        """Starts of the orbits `which` (n,), spread over (0, 1) by multiples of two irrational
+        """Starting points of the orbits `which` (n,), spread over (0, 1) by multiples of irrational
         numbers; none is degenerate.
         """
         turns = (
@@ -179,7 +179,7 @@ class ChaoticNumbers:
         x = self._x
         for _ in range(steps):
             x = 4 * x * (1 - x)
-        stuck = np.isin(x, DEGENERATE)  # an orbit that has reached such a point stays on one
+        stuck = np.isin(x, DEGENERATE)  # from such a point, an orbit reaches a fixed point
         if stuck.any():
             self._restarts += 1
             x[stuck] = self._starts(np.flatnonzero(stuck))

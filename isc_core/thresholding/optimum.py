@@ -15,14 +15,14 @@ class Optimum:
     Attributes
     ----------
     thresholds : (K,) ndarray
-        Integer levels, ascending; class 0 is everything up to the first; equal ones leave the class
-        between them empty.
+        Integer levels, ascending; class 0 contains all levels up to the first; the class between
+        equal ones is empty.
     value : float
         The objective.
     evaluations : int
         Number of candidates evaluated.
     history : (m, 2) ndarray
-        After each batch of candidates, the evaluations so far and the best value so far.
+        Number of evaluations and best value after each batch of candidates.
     """
 
     thresholds: np.ndarray
@@ -35,16 +35,16 @@ class Budget:
     """Evaluates candidates within a budget and records the best one and the history."""
 
     def __init__(
-        self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int
+        self, objective: Callable[[np.ndarray], np.ndarray], budget: int, minimum: int
     ) -> None:
         """`objective`: values (n,) of candidates (n, K).
 
-        `budget`: how many of them are allowed; `InputError` if fewer than `least`.
+        `budget`: maximum number of evaluations; `InputError` if fewer than `minimum`.
         """
-        if budget < least:
+        if budget < minimum:
             raise InputError(
-                f"the search needs at least {least} evaluations, not {budget}: raise the budget or "
-                "reduce the population"
+                f"the search needs at least {minimum} evaluations, not {budget}: raise the budget "
+                "or reduce the population"
             )
         self._objective = objective
         self.left = budget

@@ -1,21 +1,21 @@
 """Multilevel Otsu thresholds: the between-class variance, and its exact maximum (Otsu 1979).
 
 Problem: K thresholds t_1 <= ... <= t_K split the levels 0..255 of an image into K + 1 classes,
-class 0 being all levels <= t_1. Find those whose classes are furthest apart.
+class 0 being all levels <= t_1. Find the thresholds that maximise the separation of the classes.
 
 Equation: with w_k the share of pixels in class k and m_k its mean, maximise sum_k w_k (m_k - m)^2.
-Each class adds a term that depends on its two ends alone, so a table of 257 x 257 terms holds every
-objective, and dynamic programming over the classes' ends finds the maximum: best_k(b) = max_a
-best_{k-1}(a) + term(a, b).
+Each class contributes a term that depends only on its two ends, so the objective is a sum of
+entries of a table of 257 x 257 terms, and dynamic programming over the ends of the classes finds
+the maximum: best_k(b) = max_a best_{k-1}(a) + term(a, b).
 
 Citation: N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. Systems,
 Man, and Cybernetics 9(1), 62-66 (1979), doi:10.1109/TSMC.1979.4310076. P.-S. Liao, T.-S. Chen and
 P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of Information Science and
 Engineering 17(5), 713-727 (2001) (the table of terms).
 
-Limits: several sets of thresholds share the maximum where levels are empty; the exact search
-returns the lowest ones. The objective ignores the positions of pixels. Few bright pixels move
-thresholds little: a class of 1 % of the pixels weighs 1 %.
+Limits: where levels are empty, several sets of thresholds attain the maximum; the exact search
+returns the lowest. The objective ignores the positions of pixels. A few bright pixels hardly affect
+thresholds: a class of 1 % of the pixels has a weight of 1 %.
 """
 
 import numpy as np
@@ -60,9 +60,9 @@ class OtsuObjective:
     """
 
     def __init__(self, counts: np.ndarray) -> None:
-        """`counts` (256,): how many pixels have each level, or any weights >= 0.
+        """`counts` (256,): number of pixels of each level, or any weights >= 0.
 
-        Raises `InputError` where they are unfit or all zero.
+        Raises `InputError` if they are invalid or all zero.
         """
         counts = np.asarray(counts, np.float64)
         if (
@@ -122,7 +122,7 @@ class OtsuObjective:
 
 
 def exact(objective: OtsuObjective, count: int) -> Optimum:
-    """Return the maximum by dynamic programming; of several, the lowest thresholds.
+    """Compute the maximum by dynamic programming; of several, the lowest thresholds.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def exact(objective: OtsuObjective, count: int) -> Optimum:
     -------
     Optimum
     """
-    best = objective.terms[0].copy()  # of the first class alone, by its end
+    best = objective.terms[0].copy()  # for the first class only, by its end
     best[0] = -np.inf  # the first class contains at least level 0
     choices = []
     for _ in range(count):

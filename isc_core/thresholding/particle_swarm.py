@@ -2,19 +2,19 @@
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
-Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g
+Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best position, g
 the best of all, u uniform in [0, 1) for each coordinate, and the constriction w = .7298, c =
-1.49618. Places are real; thresholds are their rounded, sorted values.
+1.49618. Positions are real; thresholds are their rounded, sorted values.
 
 Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948
 (1995), doi:10.1109/ICNN.1995.488968. M. Clerc and J. Kennedy, "The particle swarm: explosion,
 stability, and convergence in a multidimensional complex space", IEEE Trans. Evolutionary
 Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
 
-An inertia that falls from .9 to .4 with c = 2 is the other usual setting: `FALLING`. It searches
-longer before it converges.
+An inertia that decreases from .9 to .4, with c = 2, is the other common setting:
+`DECREASING_INERTIA`. It searches longer before it converges.
 
-Limits: a swarm that has converged to a lesser maximum stays there; the rest of its budget is lost.
+Limits: a swarm that has converged to a local maximum stays there; the rest of its budget is wasted.
 """
 
 from dataclasses import dataclass
@@ -37,10 +37,10 @@ class SwarmOptions:
     particles : int
         At least 2.
     inertia, last_inertia : float
-        Share w of a velocity that is kept, at the start and at the end of the budget, linear
-        between; in [0, 1).
+        Fraction w of the velocity that is kept, at the start and at the end of the budget, linear
+        in between; in [0, 1).
     attraction : float
-        c, the strength of both pulls, greater than 0.
+        c, the strength of both attractions, greater than 0.
     top_speed : float
         Largest move of a threshold in one step, in levels, greater than 0.
     """
@@ -52,7 +52,7 @@ class SwarmOptions:
     top_speed: float = 64.0
 
 
-FALLING = SwarmOptions(inertia=0.9, last_inertia=0.4, attraction=2.0)
+DECREASING_INERTIA = SwarmOptions(inertia=0.9, last_inertia=0.4, attraction=2.0)
 
 
 def maximise(
@@ -95,14 +95,16 @@ def maximise(
     best = positions.copy()
     best_values = budget.evaluate(_thresholds(positions))
     while budget.left >= options.particles:
-        leader = best[np.argmax(best_values)]
-        pulls = generator.random((2, *shape)) * options.attraction
+        global_best = best[np.argmax(best_values)]
+        attractions = generator.random((2, *shape)) * options.attraction
         inertia = (
             options.last_inertia
             + (options.inertia - options.last_inertia) * budget.left / evaluations
         )
         velocities = (
-            inertia * velocities + pulls[0] * (best - positions) + pulls[1] * (leader - positions)
+            inertia * velocities
+            + attractions[0] * (best - positions)
+            + attractions[1] * (global_best - positions)
         )
         velocities = np.clip(velocities, -options.top_speed, options.top_speed)
         positions = np.clip(positions + velocities, 0, _TOP)
@@ -117,7 +119,7 @@ def _check(options: SwarmOptions) -> None:
     if options.particles < 2 or not options.attraction > 0 or not options.top_speed > 0:
         raise InputError("particles must be at least 2, attraction and top_speed above 0")
     if not 0 <= options.inertia < 1 or not 0 <= options.last_inertia < 1:
-        raise InputError("inertia and last_inertia must lie within [0, 1)")
+        raise InputError("inertia and last_inertia must be within [0, 1)")
 
 
 def _thresholds(positions: np.ndarray) -> np.ndarray:

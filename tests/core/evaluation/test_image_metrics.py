@@ -190,5 +190,5 @@ def test_rows_must_fit(measure: object) -> None:
         (np.ones(0), np.ones(0)),
         (np.ones((2, 2)), np.ones((2, 2))),
     ):
-        with pytest.raises(ValueError, match="rows"):
+        with pytest.raises(ValueError, match="vectors"):
             measure(a, b)  # type: ignore[operator]

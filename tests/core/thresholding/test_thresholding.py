@@ -24,7 +24,7 @@ from isc_core.thresholding.clonal_selection import (
     mutation_rate,
     search,
 )
-from isc_core.thresholding.particle_swarm import FALLING, SwarmOptions
+from isc_core.thresholding.particle_swarm import DECREASING_INERTIA, SwarmOptions
 
 # Exact optima for 3, 4 and 5 thresholds, of an independent program.
 OPTIMA = {
@@ -160,7 +160,7 @@ def test_swarm_with_falling_inertia_gathers_later() -> None:
             np.mean([f.history[np.argmax(f.history[:, 1] >= best * (1 - 1e-12)), 0] for f in found])
         )
 
-    assert needed(FALLING) > 2 * needed(SwarmOptions())
+    assert needed(DECREASING_INERTIA) > 2 * needed(SwarmOptions())
 
 
 class FirstAntibody:
