@@ -12,7 +12,7 @@ Citation: Q. Zheng and R. Chellappa, "Estimation of illuminant direction, albedo
 shading", IEEE TPAMI 13(7), 680-702 (1991), doi:10.1109/34.85658.
 
 Limits: one light, one albedo, a rounded object: a shallow relief does not have the normals of a
-sphere, and texture looks like slant.
+sphere, and texture biases the slant.
 """
 
 from functools import cache

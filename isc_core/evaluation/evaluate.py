@@ -269,12 +269,12 @@ def evaluate(
         If the monitor cancels; between objects.
     """
     monitor = monitor or Monitor()
-    wanted = [
+    pairs = [
         (light, name)
         for light in illuminations
         for name in (list_objects(root, light) if objects is None else objects)
     ]
-    jobs = list(dict.fromkeys(wanted))
+    jobs = list(dict.fromkeys(pairs))
     if not jobs:
         raise InputError("nothing to evaluate: name at least one object and one illumination")
     for light, name in jobs:

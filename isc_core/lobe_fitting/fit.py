@@ -375,8 +375,7 @@ def _coloured(
         root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + lamps.base[0]
     else:
         mirrored = lamps.base @ problem.basis(pixels.normal)
-        # The environment map is too weak to estimate its colour: it gets the mean colour of the
-        # lamps.
+        # The environment map is too weak to estimate its colour: the lamps' mean colour is used.
         colour = pixels.colour - mirrored[:, None] * _mean_colour(pixels)
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
     cells = np.argwhere(observed.mask)

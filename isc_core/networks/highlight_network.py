@@ -39,7 +39,7 @@ REACHES = (2, 5, 11)  # sizes of details, pixels of a frame of `SIDE`
 INPUTS = 7 + len(REACHES)
 _SMOOTH = 0.35  # pixels of the frame: suppresses bright details of noise
 _LARGEST_ODDS = 30.0  # logarithm
-_LEAST = 1e-6
+_EPSILON = 1e-6
 
 
 class HighlightNetwork(EncoderDecoder):
@@ -98,7 +98,7 @@ def predict_highlights(
     mirrored, _ = network.forward(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
     odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
     scale = 1 / frame.factor
-    values = least = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)
+    values = smallest_channel = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)
     if scale > 1:
         values = masked_gaussian(values, mask, _SMOOTH * scale)
     light, details, variance = (np.zeros_like(values) for _ in range(3))
@@ -108,8 +108,8 @@ def predict_highlights(
         light += band * probability
         details += band
         variance += np.square(band) * (probability * (1 - probability))
-    share = light / np.maximum(details, _LEAST * max(float(values.max()), _LEAST))
-    return HighlightPrediction(np.minimum(light, least), np.sqrt(variance), share)
+    share = light / np.maximum(details, _EPSILON * max(float(values.max()), _EPSILON))
+    return HighlightPrediction(np.minimum(light, smallest_channel), np.sqrt(variance), share)
 
 
 def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -131,7 +131,7 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     mean = float(image[mask].mean(dtype=float)) if mask.any() else 0.0
     values = smallest(image).astype(np.float32)
     bands = np.stack(list(brightness_bands(values, mask, REACHES)), axis=2)
-    unit = np.float32(max(mean, _LEAST))
+    unit = np.float32(max(mean, _EPSILON))
     details = np.log1p(bands / (np.float32(DARK) * unit))
     chroma = np.log((largest(image) - values) / unit + np.float32(DARK)) * mask
     return np.concatenate([photo, details, chroma[..., None]], axis=2, dtype=np.float32)

@@ -49,7 +49,7 @@ GLOBAL = LIGHT * (2 + FACTORS) + COUNTS + PLACE_COUNT + KIND_COUNT
 MIN_LOG_SCALE, MAX_LOG_SCALE = -5.0, 1.5
 COARSE = 3  # number of levels, the coarsest ones, that the light is predicted from
 MARGIN = 2.0  # offset of the log ratio: favours small ones
-_LEAST = 1e-6
+_EPSILON = 1e-6
 
 
 class Head(StrEnum):
@@ -148,7 +148,7 @@ class SceneNetwork(PhotoNetwork):
             if level < len(skips) - COARSE:
                 continue
             values = layer.astype(np.float64)
-            weight = cover[..., 0] / max(float(cover.sum()), _LEAST)
+            weight = cover[..., 0] / max(float(cover.sum()), _EPSILON)
             features.append(np.einsum("ij,ijc->c", weight, values))
             features.append((values * np.minimum(2 * cover, 1)).max(axis=(0, 1)))
         return self.predict_global(features)

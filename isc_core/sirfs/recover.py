@@ -156,7 +156,7 @@ def recover(
     Raises
     ------
     Cancelled
-        If the user asked to stop.
+        If the monitor cancels.
     """
     options, monitor = options or RecoverOptions(), monitor or Monitor()
     known, base = _with_centred_depth(known or SceneConstraints(), mask)

@@ -313,7 +313,7 @@ class ParameterVector:
         return unstack(stacked, self.channels)
 
     def at(self, start: Start) -> np.ndarray:
-        """Return the vector of a start; the dome is left out if depth was observed.
+        """Return the vector of a start; its shape is flat if depth was observed.
 
         Parameters
         ----------
@@ -392,7 +392,7 @@ def solve(
 ) -> SirfsResult:
     """Minimise the objective of a problem.
 
-    Progress reports carry the loss as their detail.
+    The detail of progress reports is the loss.
 
     Parameters
     ----------
@@ -416,7 +416,7 @@ def solve(
     InputError
         If a known shape or light is not finite, or the engine is not available.
     Cancelled
-        If the user asked to stop.
+        If the monitor cancels.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
     for given in (known_height, known_light):

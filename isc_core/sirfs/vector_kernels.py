@@ -49,7 +49,7 @@ def _combine(first, last, coefficients, vectors, out):
 class CompiledAlgebra:
     """`lbfgs.Algebra` on compiled kernels.
 
-    Sums are taken over a fixed number of parts, whatever the number of threads.
+    Sums are taken over a fixed number of parts, regardless of the number of threads.
 
     Parameters
     ----------

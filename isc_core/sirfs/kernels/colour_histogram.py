@@ -19,7 +19,7 @@ _CELLS = "Cells(i4[2] r[3])"
 
 
 class Grid(NamedTuple):
-    """One axis of the table of absolute colour; all three are alike."""
+    """One axis of the table of absolute colour; all three are equal."""
 
     low: float
     high: float

@@ -27,7 +27,7 @@ class CoarseTable:
     Attributes
     ----------
     coarse : (ceil(n / 2), ...) ndarray
-        One or three equal axes; least value 0.
+        One or three axes of equal length; minimum 0.
     base : float
         What was subtracted from the coarse values.
     nodes : int

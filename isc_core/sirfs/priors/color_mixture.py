@@ -86,8 +86,8 @@ class ColorCells:
 
 
 def _cell_index(x: np.ndarray) -> np.ndarray:
-    """Cell of each sample: a face of the cube (of three, since x and -x are alike), two steps on
-    it, and a step of log length.
+    """Cell of each sample: a face of the cube (of three, since x and -x are equivalent), two steps
+    on it, and a step of log length.
     """
     rows = np.arange(len(x))
     face = np.abs(x).argmax(axis=1)
