@@ -172,7 +172,7 @@ def test_a_mirrored_photo_has_mirrored_truth() -> None:
         towards = torch.tensor(PLACES)[seen.place[lit]] * torch.tensor([-1.0, 1, 1])
         again = torch.tensor(PLACES)[mirrored.place[lit]]
         assert ((towards * again).sum(1) > math.cos(math.radians(12))).all()
-    np.testing.assert_array_equal(core._FLIPPED, flips[:9])
+    np.testing.assert_array_equal(core._MIRROR_SIGNS, flips[:9])
 
 
 def test_lamps_turn_with_the_picture() -> None:
