@@ -2,8 +2,8 @@
 
 The Python interface consists of `decompose`, `separate`, `save` and `load`. They accept `Settings`,
 `KnownInputs` and `Monitor`, work on `Photo`, `Decomposition` and `Separation`, and raise
-`InputError` and `Cancelled`. Nothing is imported before it is used, not even `typing`, because this
-module runs before the command can handle Ctrl-C.
+`InputError` and `Cancelled`. Nothing is imported before its first use, not even `typing`, because
+this module runs before the command can handle Ctrl-C.
 """
 
 TYPE_CHECKING = False  # type checkers know the name
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .scene.decomposition import Decomposition, Separation
     from .scene.known_inputs import KnownInputs
 
-_HOMES = {
+_MODULES = {
     "Cancelled": ".errors",
     "Decomposition": ".scene.decomposition",
     "InputError": ".errors",
@@ -36,7 +36,7 @@ _HOMES = {
 def __getattr__(name: str) -> object:
     from .lazy import exports
 
-    return exports(__name__, _HOMES)(name)
+    return exports(__name__, _MODULES)(name)
 
 
 __version__ = "0.1.0"

@@ -1,14 +1,15 @@
-"""Start of the process: `python -m isc_core`, and the script `isc`.
+"""Entry point of the process: `python -m isc_core`, and the script `isc`.
 
-Importing the libraries takes longer than a user takes to press Ctrl-C, and some of them catch the
+Importing the libraries takes long enough for a user to press Ctrl-C, and some of them catch the
 exception that it raises. Until `cli.main` takes over, nothing has been written, so Ctrl-C ends the
-process at once. The handler is installed before anything else is imported. Python's search for
-unreachable objects, a tenth of the time of imports that leave none, begins after them. BLAS works
-on one thread unless the environment says otherwise: its threads wait for work by spinning, which
-takes the cores from ISC's own.
+process at once. The handler is installed before anything else is imported. Garbage collection,
+which takes a tenth of the time of imports and frees nothing, is enabled after them. BLAS runs on
+one thread unless the environment sets another number: its threads wait for work by spinning, which
+takes cores from ISC's own threads.
 
-Dismantling the interpreter after a decomposition takes a third of a second, which frees memory that
-the system takes back anyway. So the process ends itself, after what was registered with `atexit`.
+Finalising the interpreter after a decomposition takes a third of a second and only frees memory
+that the system reclaims anyway. So the process calls the functions registered with `atexit` and
+exits at once.
 """
 
 import atexit
@@ -20,9 +21,9 @@ from contextlib import suppress
 from typing import NoReturn
 
 _CANCELLED = 130
-# Seconds (Python's own are 5e-3) that a thread waits, after each array operation, for one that
-# imports.
-_SWITCH = 5e-4
+# Seconds (Python's default is 5e-3) that a thread waits, after each array operation, for a thread
+# that imports.
+_SWITCH_INTERVAL = 5e-4
 
 
 def _end(number: int, frame: object) -> None:
@@ -39,7 +40,7 @@ def start() -> NoReturn:
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
     gc.disable()  # until `cli.main` has imported the command
-    sys.setswitchinterval(_SWITCH)
+    sys.setswitchinterval(_SWITCH_INTERVAL)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from .cli.main import main
 

@@ -6,8 +6,8 @@
     isc_core.save(result, "cup")
 
 An image is a file, an array or a `Photo`. Arrays of uint8 and uint16 are sRGB codes, arrays of
-floats are linear light. What the functions return are frozen dataclasses of float32 arrays;
-docs/concepts.md defines their frames and units.
+floats are linear light. The functions return frozen dataclasses of float32 arrays; docs/concepts.md
+defines their frames and units.
 """
 
 from dataclasses import replace
@@ -165,7 +165,7 @@ def load(folder: str | Path) -> Decomposition:
     Raises
     ------
     InputError
-        If something is missing, damaged, or inconsistent.
+        If a file is missing, damaged, or inconsistent.
     """
     return result_folder.load(folder)
 
@@ -191,7 +191,7 @@ def _photo(
 
 
 def _raster(image: str | Path | np.ndarray, name: str) -> tuple[Raster, str]:
-    """The image, and what error messages call it."""
+    """The image, and its name in error messages."""
     if isinstance(image, np.ndarray):
         return raster_from_array(image, name), name
     return read_raster(image), str(image)

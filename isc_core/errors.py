@@ -1,14 +1,14 @@
-"""The ways in which ISC ends on purpose other than by success."""
+"""Exceptions by which ISC ends deliberately without success."""
 
 from collections.abc import Sequence
 
 
 class InputError(ValueError):
-    """Something the user gave cannot be used.
+    """An input of the user cannot be used.
 
     The message is one line: what is wrong and what to do about it. The command line prints it and
-    exits with 2. Names that files bring along may stand in it: what would break the line or steer a
-    terminal (line ends, escapes, marks of direction) is written as its code.
+    exits with 2. The message may contain names from files: characters that would break the line or
+    control a terminal (line ends, escapes, bidirectional marks) are escaped.
     """
 
     def __init__(self, message: str) -> None:
@@ -16,20 +16,20 @@ class InputError(ValueError):
 
 
 class Cancelled(Exception):
-    """The user asked to stop. The command line exits with 130; nothing half-written is left."""
+    """The user cancelled. The command line exits with 130; no file is left incomplete."""
 
 
 class Rejected(Exception):
-    """The work was done and its result is written, but what was measured breaks a bound.
+    """The work was done and its result is written, but a measurement violates a bound.
 
-    The message says which, a line each. The command line prints it and exits with 1. Also where
-    some of several inputs failed, and the others are done.
+    The message names each, one per line. The command line prints it and exits with 1. Also raised
+    where some of several inputs failed and the others succeeded.
 
     Parameters
     ----------
     message : str
     lines : sequence of str, optional
-        What is printed of that which is done.
+        Lines to print about the completed inputs.
     """
 
     def __init__(self, message: str, lines: Sequence[str] = ()) -> None:

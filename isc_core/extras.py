@@ -1,11 +1,11 @@
-"""What to type to install an optional dependency that is missing.
+"""The command that installs a missing optional dependency.
 
 Problem: the distribution is on no package index, so pip cannot install its extras by name. The
-metadata of the installed distribution, whether it came from a wheel or a clone, list what each
-extra requires. The command names these packages themselves.
+metadata of the installed distribution, whether from a wheel or a clone, list the requirements of
+each extra. The command names these packages themselves.
 
-Limits: markers of a requirement (version of Python, platform) are left out: pip reports a package
-that has no build for this Python.
+Limits: environment markers of a requirement (version of Python, platform) are ignored: pip reports
+a package that has no build for this Python.
 """
 
 import re
@@ -15,7 +15,7 @@ _DISTRIBUTION = "isc3d"
 
 
 def install_command(extra: str) -> str:
-    """Return the command that installs what an extra requires.
+    """Return the command that installs the requirements of an extra.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def install_command(extra: str) -> str:
     -------
     str
         A shell command with the requirements of the extra. Without metadata (a clone that is not
-        installed, an add-on inside Blender): the command for the folder of the source.
+        installed, an add-on inside Blender): the command to run in the source folder.
     """
     requirements = _requirements(extra) or [f".[{extra}]"]
     return shlex.join(["pip", "install", *requirements])

@@ -1,7 +1,7 @@
 """Progress and cancellation of long work.
 
-The core receives one `Monitor`: it sends `ProgressEvent` objects and asks whether to stop.
-Terminals, Blender's panels and batch runners adapt it.
+The core receives one `Monitor`, to which it reports `ProgressEvent` objects and which it polls for
+cancellation. Terminals, Blender's panels and batch runners adapt it.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,7 @@ from .errors import Cancelled
 
 @dataclass(frozen=True)
 class ProgressEvent:
-    """How far a job is.
+    """The progress of a job.
 
     Attributes
     ----------
@@ -21,9 +21,9 @@ class ProgressEvent:
     fraction : float
         Completed share of the whole job, in [0, 1].
     detail : str
-        What changes within the stage, such as the loss or the time left; may be empty.
+        Details that change within the stage, such as the loss or the time left; may be empty.
     part : (int, int) or None
-        Which of several photos or objects this is about, from 1 on, and of how many.
+        For several photos or objects: the number of the current one, from 1, and the total.
     """
 
     stage: str
@@ -45,14 +45,14 @@ def _never() -> bool:
 
 @dataclass(frozen=True)
 class Monitor:
-    """The pair of callbacks that goes through the core.
+    """The pair of callbacks that is passed through the core.
 
     Attributes
     ----------
     progress : callable
         Receives a `ProgressEvent`.
     cancelled : callable
-        Returns True once the user asks to stop.
+        Returns True once the user has cancelled.
     """
 
     progress: Callable[[ProgressEvent], None] = _ignore
@@ -69,7 +69,7 @@ class Monitor:
         Raises
         ------
         Cancelled
-            If the user asked to stop.
+            If the user has cancelled.
         """
         if self.cancelled():
             raise Cancelled(stage)
@@ -81,7 +81,7 @@ class Monitor:
         Parameters
         ----------
         start, end : float
-            Fractions of this monitor that are the part's 0 and 1.
+            Fractions of this monitor that correspond to 0 and 1 of the part.
 
         Returns
         -------

@@ -26,7 +26,7 @@ from benchmarks.refinement.scenes import photo_of, rendered
 from isc_core.decomposition.pipeline import decompose
 from isc_core.evaluation.evaluate import paired_bootstrap
 from isc_core.evaluation.metrics import scaled_mse
-from isc_core.imaging.area_resize import AreaFilter, resize_apart
+from isc_core.imaging.area_resize import AreaFilter, resize_separately
 from isc_core.photo import Photo
 from isc_core.scene.decomposition import Decomposition
 
@@ -76,7 +76,7 @@ def reduced(truth: Mapping[str, np.ndarray], photo: Photo, small: Photo) -> dict
     if small.scale == photo.scale:
         return {name: truth[name] for name in ERRORS}
     area = AreaFilter.of(photo.mask.shape, small.scale / photo.scale)
-    return {name: resize_apart(truth[name], photo.mask, small.mask, area) for name in ERRORS}
+    return {name: resize_separately(truth[name], photo.mask, small.mask, area) for name in ERRORS}
 
 
 def row_of(folder: Path, number: int, sizes: Sequence[int]) -> dict[str, Any]:

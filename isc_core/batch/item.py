@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..decomposition.settings import Settings
 from ..errors import InputError
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..photo import TRANSFERS
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
@@ -125,7 +125,7 @@ class RunPlan:
     output: Path
     run: str
     version: str
-    limits: Limits = USUAL
+    limits: Limits = DEFAULT_LIMITS
     timeout: float = 0.0
     arrays: bool = False
     priors: str = ""

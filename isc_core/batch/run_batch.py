@@ -10,7 +10,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import Cancelled, InputError
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..progress import Monitor
 from ..sirfs.priors.prior_file import load_prior_set
 from .engine import Crew, connected, dashboard, require_dask, run_jobs
@@ -54,7 +54,7 @@ class Batch:
     masks: str | None = None
     recipe: ImageRecipe = field(default_factory=ImageRecipe)
     crew: Crew = field(default_factory=Crew)
-    limits: Limits = USUAL
+    limits: Limits = DEFAULT_LIMITS
     timeout: float = 0.0
     arrays: bool = False
     priors: Path | None = None

@@ -26,7 +26,7 @@ from ..io.regular_files import read_regular
 from .commands.registry import all_commands, find_command
 from .interface.parser import GENERAL, actions_of
 
-USUAL = Path("isc.toml")
+DEFAULT_LIMITS = Path("isc.toml")
 _ONLY_IF_NAMED = frozenset({"scheduler"})
 _MAX_BYTES = 1 << 20
 
@@ -80,7 +80,7 @@ def _find(arguments: Sequence[str]) -> tuple[Path | None, bool]:
     known, _ = finder.parse_known_args(arguments)
     if known.config is not None:
         return Path(known.config), True
-    return (None if known.no_config or not USUAL.is_file() else USUAL), False
+    return (None if known.no_config or not DEFAULT_LIMITS.is_file() else DEFAULT_LIMITS), False
 
 
 def _read(path: Path) -> dict[str, object]:

@@ -1,10 +1,10 @@
-"""Photos with known diffuse and specular layers, on which separations are measured.
+"""Photos with known diffuse and specular layers, on which separations are evaluated.
 
 Shen & Zheng's photographs with ground truth: H.-L. Shen, Z.-H. Zheng (2013),
-doi:10.1364/AO.52.004483. Their figures, and all published since, use the stored values / 255 as
-they are, without linearising, over the whole frame. The laboratory objects: R. Grosse, M. K.
-Johnson, E. H. Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428: 16 bits, linear, inside
-the mask. Rendered scenes: multilayer EXR files with the channel names of `maps.exr`.
+doi:10.1364/AO.52.004483. Their figures, and all published since, use the stored values / 255
+without linearising, over the whole frame. The laboratory objects: R. Grosse, M. K. Johnson, E. H.
+Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428: 16 bits, linear, inside the mask.
+Rendered scenes: multilayer EXR files with the channel names of `maps.exr`.
 
 Limits: in Shen & Zheng's set the specular layer is the photo less the diffuse one, rounded to 8
 bits; the laboratory's light is white to about ten per cent.
@@ -38,8 +38,8 @@ class SeparationTruth:
     clipped : (H, W) ndarray of bool
         Some channel is at the coding's maximum.
     coded : bool
-        The values are a camera's sRGB codes, not linear light. For display only; methods do not
-        know it.
+        The values are a camera's sRGB codes, not linear light. For display only; methods do not use
+        it.
     """
 
     name: str
@@ -194,8 +194,8 @@ def _image(folder: Path, layer: str) -> Path:
     )
     if found is None:
         raise InputError(
-            f"{folder} has neither {' nor '.join(_MULTILAYER)} nor an image named {layer}: it is "
-            "no rendered scene"
+            f"{folder} has neither {' nor '.join(_MULTILAYER)} nor an image named {layer}: "
+            "it is not a rendered scene"
         )
     return found
 

@@ -211,7 +211,7 @@ def _check_option(what: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _folder(root: Path, illumination: str) -> Path:
-    """The illumination's folder, by either of its two names."""
+    """The illumination's folder, under either of its two names."""
     _check_option("illumination", illumination, ILLUMINATIONS)
     for name in _FOLDERS[illumination]:
         if (root / name).is_dir():
@@ -251,7 +251,7 @@ def _shading(folder: Path, illumination: str, crop: tuple[np.ndarray, np.ndarray
 
 
 def _crop(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """The rows and columns of the evaluation crop, from 1-based lists to 0-based ones."""
+    """The rows and columns of the evaluation crop, converted from 1-based to 0-based indices."""
     with np.errstate(invalid="ignore"):  # NaN becomes an index outside any image
         rows, columns = (
             np.atleast_1d(_matrix(path, key)).ravel().astype(np.int64) - 1
@@ -263,7 +263,7 @@ def _crop(path: Path) -> tuple[np.ndarray, np.ndarray]:
 def _cut(
     full: np.ndarray, crop: tuple[np.ndarray, np.ndarray], channels: int, path: Path
 ) -> np.ndarray:
-    """The crop of a file's whole array, (h, w) for one channel, (h, w, 3) for three."""
+    """The evaluation crop of a file's array, (h, w) for one channel, (h, w, 3) for three."""
     if full.shape[2:] != ((channels,) if channels > 1 else ()) or full.ndim < 2:
         raise InputError(
             f"{path}: shape {full.shape} where {channels} channel(s) were expected: is it the file "

@@ -1,21 +1,21 @@
-"""Enlarging an object by an interpolation that keeps the averages over its pixels.
+"""Upsampling of an object by an interpolation that preserves the averages over its pixels.
 
-Problem: pixels are averages over their areas. Linear interpolation between their centres averages
-once more, here more and there less, as the new centres fall between the old ones. What is solved
-from the differences of neighbouring pixels then depends on the size of the photo.
+Problem: pixels are averages over their areas. Linear interpolation between their centres blurs once
+more, by an amount that varies with the position of the new centres between the old ones. A solution
+from differences of neighbouring pixels then depends on the size of the photo.
 
-Equation: the light is a quadratic spline f(x) = sum_k c_k B2(x - k) with the pixels' averages,
-(c * B3)(k) = v_k, since averages of the B-spline B2 over pixels are values of B3. A new pixel is
-the average of f over its area, so the averages of the new pixels over each old one are v, where
-whole numbers of them make one.
+Equation: the light is a quadratic spline f(x) = sum_k c_k B2(x - k) with the pixels' averages, (c *
+B3)(k) = v_k, since averages of the B-spline B2 over pixels are values of B3. A new pixel is the
+average of f over its area, so the averages of the new pixels over each old one are v, where an old
+pixel is a whole number of new ones.
 
 Citation: histosplines: L. I. Boneva, D. G. Kendall, I. Stefanov, "Spline transformations", Journal
 of the Royal Statistical Society B 33, 1971, 1-70; B-splines of images: M. Unser, "Splines: a
 perfect fit for signal and image processing", IEEE Signal Processing Magazine 16(6), 1999,
 doi:10.1109/79.799930.
 
-Limits: enlarging only. What the photo does not resolve is not made up. Near edges the spline
-overshoots; what falls below the darkest of the old pixels around is raised to it.
+Limits: enlarging only; no detail is added beyond the photo's resolution. Near edges the spline
+overshoots; values below the darkest of the neighbouring old pixels are raised to it.
 """
 
 import numpy as np
@@ -23,14 +23,14 @@ from scipy import ndimage, sparse
 
 
 def enlarge_averages(values: np.ndarray, inside: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Enlarge an image of an object, each axis by itself.
+    """Enlarge an image of an object, one axis after the other.
 
     Parameters
     ----------
     values : (H, W, C) ndarray
         Averages over pixels.
     inside : (H, W) bool ndarray
-        The object; its values go on beyond it. Some pixel is inside.
+        The object, with at least one pixel; its values are extended beyond it.
     shape : tuple of int
         (h, w) of the result, neither side shorter.
 
@@ -52,7 +52,7 @@ def enlarge_averages(values: np.ndarray, inside: np.ndarray, shape: tuple[int, .
 
 
 def _nearest(size: int, new: int) -> np.ndarray:
-    """Which of `size` old pixels has the centre of each new one."""
+    """Index of the old pixel, of `size`, that contains the centre of each new one."""
     return (2 * np.arange(new) + 1) * size // (2 * new)
 
 
@@ -72,6 +72,6 @@ def _overlaps(size: int, new: int) -> sparse.csr_array:
 
 
 def _integral(x: np.ndarray) -> np.ndarray:
-    """The integral of the B-spline of degree 2 up to x, its middle being 0."""
+    """The integral of the B-spline of degree 2, centred at 0, up to x."""
     powers = [np.maximum(x + knot, 0) ** 3 for knot in (1.5, 0.5, -0.5, -1.5)]
     return (powers[0] - 3 * powers[1] + 3 * powers[2] - powers[3]) / 6

@@ -20,7 +20,7 @@ from .bounding_box import mask_slices
 class AreaFilter:
     """Integrate an (H, W) array over square pixels of side 1 / factor, exactly.
 
-    The last row and column may reach past the image.
+    The last row and column may extend past the image.
 
     Attributes
     ----------
@@ -104,14 +104,14 @@ def averaged(
         Linear light.
     mask : (H, W) bool ndarray
     factor : float
-        New size over old size; from 1 on nothing is resized.
+        New size over old size; from 1 the image keeps its size.
 
     Returns
     -------
     image : (h, w, 3) float32 ndarray
         0 outside the new mask.
     mask : (h, w) bool ndarray
-        Pixels of which the mask covers half, or any if that leaves none.
+        Pixels at least half covered by the mask; if there are none, all that it touches.
     factor : float
         The factor used.
     """
@@ -121,10 +121,14 @@ def averaged(
     cover = area(mask)
     inside = cover >= 0.5 * area.full
     inside = inside if inside.any() else cover > 0
-    return np.where(inside[..., None], resize_apart(image, mask, inside, area), 0), inside, factor
+    return (
+        np.where(inside[..., None], resize_separately(image, mask, inside, area), 0),
+        inside,
+        factor,
+    )
 
 
-def resize_apart(
+def resize_separately(
     image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, area: AreaFilter
 ) -> np.ndarray:
     """Downscale an image, averaging object and background separately.
@@ -134,7 +138,7 @@ def resize_apart(
     image : (H, W, C) ndarray
     mask : (H, W) bool ndarray
     new_mask : (h, w) bool ndarray
-        Its pixels average the object alone, all others the background.
+        Its pixels average only the object, all others only the background.
     area : AreaFilter
         From the old grid to the new one.
 

@@ -11,7 +11,7 @@ def mask_slices(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice]:
     mask : (H, W) bool ndarray
         At least one pixel is set.
     margin : int, optional
-        Pixels around the box, as far as the mask has them.
+        Pixels around the box, clipped at the frame.
 
     Returns
     -------

@@ -1,18 +1,18 @@
-"""Bright details of a map by size: what openings with larger and larger squares remove.
+"""Bright details of a map by size: the differences of openings with larger and larger squares.
 
-Problem: a highlight, a letter and a stripe are brighter than what is around them. How large such a
-detail is says at which size of an opening it disappears.
+Problem: a highlight, a letter and a stripe are brighter than their surroundings. The size of such a
+detail determines the size of the opening that removes it.
 
 Equation: with the opening o_r by a square of 2 r + 1 pixels, o_0 the map itself,
 
     band_k = o_{r_(k-1)} - o_{r_k} >= 0.
 
-What lies outside the mask is neither bright nor dark: it is left out of minima and maxima.
+Pixels outside the mask are ignored by minima and maxima.
 
 Citation: granulometry: G. Matheron, "Random Sets and Integral Geometry", 1975; openings: J. Serra,
 "Image Analysis and Mathematical Morphology", 1982.
 
-Limits: squares have corners. A ramp toward the mask's outline counts as a detail.
+Limits: square openings are not isotropic. A ramp toward the mask's outline counts as a detail.
 """
 
 from collections.abc import Iterator, Sequence
@@ -31,12 +31,12 @@ def brightness_bands(
     values : (H, W) ndarray
     mask : (H, W) ndarray of bool
     reaches : sequence of int
-        r_1, r_2, ..., pixels, rising.
+        Radii r_1, r_2, ... in pixels, ascending.
 
     Yields
     ------
     (H, W) ndarray
-        One for each reach, the finest details first; not negative, 0 outside the mask.
+        One for each radius, the finest details first; not negative, 0 outside the mask.
     """
     before = values = np.where(mask, values, 0)
     for reach in reaches:

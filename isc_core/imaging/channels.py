@@ -1,7 +1,7 @@
 """Per-pixel statistics of colour channels.
 
-They are computed three to ten times faster than by NumPy's reductions along so short an axis, and
-have the same bytes.
+They are three to ten times faster than NumPy's reductions along so short an axis, with identical
+results.
 """
 
 import functools
@@ -102,7 +102,7 @@ def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
 def saturation(colours: np.ndarray) -> float:
     """Return the saturation of a set of pixels: summed chroma over summed largest channel.
 
-    Strong pixels count most, and a highlight lowers it.
+    Bright pixels have the largest weight, and a highlight lowers it.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def saturation(colours: np.ndarray) -> float:
 
 
 def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
-    """Return the share of a specular layer that counts, by the smallest channel.
+    """Return the share of a specular layer that is kept, by the smallest channel.
 
     A highlight, being white, is bright in the smallest channel.
 
@@ -127,9 +127,9 @@ def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
     low : ndarray
         The smallest channel.
     base : float
-        Level up to which nothing counts.
+        Level up to which the share is 0.
     fade : float
-        All counts from (1 + fade) base on; 0 makes a step.
+        The share is 1 from (1 + fade) base; 0 makes a step.
 
     Returns
     -------

@@ -1,7 +1,7 @@
-"""Averages over near pixels that a guide shows to be alike (the joint bilateral filter).
+"""The joint bilateral filter: averages over near pixels of similar values in a guide.
 
-Problem: a Gaussian average mixes what lies on the two sides of an edge, so that its difference from
-the image oscillates there.
+Problem: a Gaussian average mixes the two sides of an edge, so that its difference from the image
+oscillates there.
 
 Equation: along the rows, then along the columns, with the guide g and the mask M,
 
@@ -14,7 +14,8 @@ and no-flash image pairs", SIGGRAPH 2004, doi:10.1145/1015706.1015777; along row
 T. Q. Pham, L. J. van Vliet, "Separable bilateral filtering for fast video preprocessing", ICME
 2005, doi:10.1109/ICME.2005.1521458.
 
-Limits: rows come first, so a turned image gives slightly other averages at corners of the guide.
+Limits: rows are filtered first, so a rotated image gives slightly different averages at corners of
+the guide.
 """
 
 from dataclasses import dataclass

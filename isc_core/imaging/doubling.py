@@ -1,6 +1,6 @@
-"""Maps at twice the size, by linear interpolation between the centres of pixels.
+"""Upsampling of maps by two, by linear interpolation between the centres of pixels.
 
-Limits: at the border of a map the outermost values go on.
+Limits: at the border of a map the outermost values are replicated.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""Objects at the frame of the photo: cut by it, or cropped to it.
+"""Objects at the frame of the photo: truncated by it, or merely cropped to it.
 
 Where the frame cuts the object, the object's outline is no occluding contour; where a photo was
-merely cropped to the object, it is. A run of mask pixels along the frame is a cut if the mask is
-hardly wider a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame widens
-quickly.
+merely cropped to the object, it is. A run of mask pixels along the frame counts as a cut if the
+mask is hardly wider a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame
+widens quickly.
 
 Limits: a box-shaped object cropped exactly along its sides counts as cut.
 """

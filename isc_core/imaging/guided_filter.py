@@ -1,6 +1,6 @@
 """Local affine models of a quantity in the colours of an image (the guided filter, in colour).
 
-Equation, over a window k inside the mask, for the picture I and the quantity e: e ~ A_k^T I + b_k,
+Equation, over a window k inside the mask, for the image I and the quantity e: e ~ A_k^T I + b_k,
 
     A_k = (cov_k(I) + epsilon)^-1 (cov_k(I, e) + epsilon P_k),   b_k = mean_k e - A_k^T mean_k I.
 
@@ -24,7 +24,7 @@ def affine_fit(
     epsilon: float,
     fallback: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Fit local affine models, averaged over the windows that hold a pixel.
+    """Fit local affine models, averaged over the windows that contain a pixel.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def affine_fit(
 
 
 def window_means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Return means over windows, of the pixels of the mask alone.
+    """Return means over windows, of the pixels inside a mask.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def window_means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, ...) ndarray
-        0 where a window holds no pixel of the mask.
+        0 where a window has no pixel of the mask.
     """
     size = (2 * _RADIUS + 1,) * 2 + (1,) * (values.ndim - 2)
     inside = mask.reshape(mask.shape + (1,) * (values.ndim - 2)).astype(float)

@@ -1,18 +1,18 @@
-"""The labels of pixels by a minimum cut of their grid.
+"""Binary labels of pixels by a minimum cut of their grid.
 
-Problem: each pixel has a cost of being object and one of being background, and neighbours that
-differ cost something; the labels with the least sum are wanted.
+Problem: each pixel has a cost of being object and one of being background, and neighbours with
+different labels have a cost; find the labels with the least sum.
 
-Equation: E(a) = sum_p D_p(a_p) + sum_pq V_pq [a_p != a_q] over the eight neighbours. A cut of the
-graph whose edges to the two terminals weigh D and whose edges between neighbours weigh V costs as
-much as the labels that it separates, and the largest flow finds it.
+Equation: E(a) = sum_p D_p(a_p) + sum_pq V_pq [a_p != a_q] over the eight neighbours. In the graph
+whose edges to the two terminals have the capacities D and whose edges between neighbours have V,
+the cost of a cut is that of its labels, and the maximum flow gives the minimum cut.
 
 Citation: D. Greig, B. Porteous, A. Seheult, "Exact maximum a posteriori estimation for binary
 images", Journal of the Royal Statistical Society B 51 (1989),
 doi:10.1111/j.2517-6161.1989.tb01764.x; E. Dinic's algorithm, of SciPy.
 
-Limits: costs are rounded to whole numbers, so cuts are those of costs within 1 / `SCALE` of the
-given ones. The time grows faster than the number of pixels: some 100,000 take seconds.
+Limits: costs are rounded to multiples of 1 / `SCALE`. The time grows faster than the number of
+pixels: some 100,000 take seconds.
 """
 
 import numpy as np
@@ -24,7 +24,7 @@ STEPS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 
 def shifted(shape: tuple[int, ...], step: tuple[int, int]) -> tuple[tuple[slice, slice], ...]:
-    """Return the places of all pixels that have a neighbour, and of these neighbours.
+    """Return the slices of all pixels that have a neighbour, and of these neighbours.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def minimum_cut(
     difference : (H, W) float ndarray
         Cost of being background less that of being object.
     links : list of four float ndarray
-        Costs of different labels, not negative, at the first places of `shifted` for each of
+        Costs of different labels, not negative, at the first slices of `shifted` for each of
         `STEPS`.
     free : (H, W) bool ndarray
         Pixels to label.
@@ -63,7 +63,7 @@ def minimum_cut(
     Returns
     -------
     (H, W) bool ndarray
-        `fixed`, where nothing is free.
+        The labels; those of `fixed` where no pixel is free.
     """
     shape = free.shape
     number = np.full(shape, -1)
@@ -77,23 +77,23 @@ def minimum_cut(
         both = free[here] & free[there]
         ends.append((number[here][both], number[there][both], link[both]))
     first, second, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
-    on_object = _source_side(_whole(pull[free]), first, second, _whole(weight))
+    on_object = _source_side(_rounded(pull[free]), first, second, _rounded(weight))
     result = fixed.copy()
     result[free] = on_object
     return result
 
 
-def _whole(costs: np.ndarray) -> np.ndarray:
+def _rounded(costs: np.ndarray) -> np.ndarray:
     return np.rint(SCALE * costs).astype(np.int32)
 
 
 def _source_side(
     pull: np.ndarray, first: np.ndarray, second: np.ndarray, weight: np.ndarray
 ) -> np.ndarray:
-    """Which of N nodes stay with the source, (N,) bool: those with no way to the sink when the
-    largest flow runs.
+    """Which of N nodes are on the side of the source, (N,) bool: those that it reaches in the
+    residual graph of the maximum flow.
     """
-    # Imported for a cut alone: every command imports this module.
+    # Imported only for a cut: every command imports this module.
     from scipy import sparse
     from scipy.sparse.csgraph import breadth_first_order, maximum_flow
 

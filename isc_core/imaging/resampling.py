@@ -1,8 +1,8 @@
 """Resampling an object to the scale at which the priors were fitted, and its height map back.
 
 The centre of pixel i lies at (i + 0.5) / factor - 0.5 of the source grid. Images are averaged over
-the area of each new pixel (interpolated linearly when enlarged), with weights inside the object
-only, so that no background bleeds in.
+the area of each new pixel (interpolated linearly when enlarged), with weights only inside the
+object, so that no background bleeds in.
 """
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy import ndimage, sparse
 
 
 def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
-    """Return the shape of the grid that covers an image after scaling.
+    """Return the shape of an image after scaling.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def resample_inside(
 
 
 def resampled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Resample all of an image, each axis by averages where it shrinks and linearly where it grows.
+    """Resample a whole image: averages along an axis that shrinks, linear along one that grows.
 
     Parameters
     ----------
@@ -142,7 +142,7 @@ def resample_height(
 
 
 def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """Sample a map at the centres of another grid; holes (NaN) stay and do not grow.
+    """Sample a map at the centres of another grid; holes (NaN) are kept and do not grow.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Blocks of rows: maps that depend on near pixels alone are made a block at a time.
+"""Blocks of rows, for maps whose values depend only on near pixels.
 
-Intermediate arrays then have the size of a block, whatever the photo's. Results are those of the
-whole map, bit for bit, where each value depends on rows at most `halo` away.
+Intermediate arrays have the size of a block, for photos of any size. Results are bit-identical to
+those of the whole map where each value depends on rows at most `halo` away.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ class RowBlock:
     rows : slice
         The rows.
     wide : slice
-        With those around them that the map has.
+        The rows with their halo, clipped at the map.
     own : slice
         `rows` within `wide`.
     """
@@ -39,7 +39,7 @@ def row_blocks(shape: tuple[int, ...], halo: int = 0, pixels: int = _PIXELS) -> 
     halo : int
         Rows around a block that its values depend on.
     pixels : int
-        Of a block, about; it has at least one row.
+        Approximate number per block, which has at least one row.
 
     Yields
     ------

@@ -43,7 +43,7 @@ def masked_low_pass(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.nda
     layer : (H, W) or (H, W, C) ndarray
     mask : (H, W) bool ndarray
     sigma : float
-        Standard deviation of G in pixels: a period of 3.535 sigma keeps half.
+        Standard deviation of G in pixels: a period of 3.535 sigma is halved.
 
     Returns
     -------
@@ -86,7 +86,7 @@ def weighted_gaussian(
     sigma : float
         Standard deviation in pixels.
     floor : float
-        Weight, greater than 0, of a zero observed at every pixel.
+        Weight, greater than 0, of the value 0 that is added at every pixel.
 
     Returns
     -------

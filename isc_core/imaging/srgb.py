@@ -1,6 +1,6 @@
 """The transfer curve of sRGB.
 
-It uses NumPy alone, so that Blender's own process can use it too.
+It uses only NumPy, so that Blender's own process can use it, too.
 
 Equation: coded = 12.92 L for L <= 0.0031308, else 1.055 L^(1/2.4) - 0.055.
 
@@ -52,8 +52,8 @@ def linear_to_srgb(linear: np.ndarray | float) -> np.ndarray:
 
 
 def srgb_codes(linear: np.ndarray) -> np.ndarray:
-    """Encode linear light as 8-bit sRGB: `linear_to_srgb` times 255, rounded, but from a table, in
-    a fifth of the time.
+    """Encode linear light as 8-bit sRGB: `linear_to_srgb` times 255, rounded, by a table in a fifth
+    of the time.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def srgb_codes(linear: np.ndarray) -> np.ndarray:
 
 @cache
 def _cells(dtype: type[np.floating]) -> tuple[np.ndarray, np.ndarray]:
-    """The code at the beginning of each cell, and where the next code begins."""
+    """The code at the beginning of each cell, and the value at which the next code begins."""
     bounds = _bounds(dtype)
     begins = np.arange(_CELLS + 1, dtype=dtype) / _CELLS
     first = np.searchsorted(bounds, begins, side="right")
@@ -82,7 +82,7 @@ def _cells(dtype: type[np.floating]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _bounds(dtype: type[np.floating]) -> np.ndarray:
-    """The least number of a type for each code from 1 to 255, by bisection."""
+    """The smallest number of a type that rounds to each code from 1 to 255, by bisection."""
     codes = np.arange(1, 256)
     low, high = np.zeros(255, dtype), np.ones(255, dtype)
     while True:

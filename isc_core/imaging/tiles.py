@@ -1,7 +1,8 @@
-"""Tiles of a map whose values depend on near pixels alone.
+"""Tiles of a map whose values depend only on near pixels.
 
-Each tile is computed with what is around it, and only its inner part is kept. Where that covers all
-that a value depends on, there is no seam, and results do not depend on the size of the tiles.
+Each tile is computed with its surroundings, and only its inner part is kept. Where these include
+all pixels that a value depends on, there are no seams, and results do not depend on the size of the
+tiles.
 """
 
 from collections.abc import Iterator
@@ -21,7 +22,7 @@ class Tile:
     Attributes
     ----------
     inner, outer : tuple of slice
-        Rows and columns that are wanted, and those that are looked at.
+        Rows and columns of the result, and of the input.
     own : tuple of slice
         `inner` within `outer`.
     """
@@ -32,18 +33,19 @@ class Tile:
 
 
 def tiles_of(mask: np.ndarray, side: int, overlap: int, multiple: int) -> Iterator[Tile]:
-    """Cover an object with tiles; what is beside it is left out.
+    """Cover an object with tiles.
 
     Parameters
     ----------
     mask : (H, W) bool ndarray
         H and W are multiples of `multiple`.
     side : int
-        Most rows and columns of a tile, without what is around it: a multiple of `multiple`.
+        Largest number of rows and columns of a tile without its surroundings, a multiple of
+        `multiple`.
     overlap : int
-        Pixels around a tile that are looked at, as far as the map has them: another multiple.
+        Pixels around a tile that are read, clipped at the map; a multiple of `multiple`.
     multiple : int
-        All places in the map that tiles begin and end at are multiples of it.
+        Tiles begin and end at multiples of it.
 
     Yields
     ------
@@ -69,7 +71,7 @@ def tiles_of(mask: np.ndarray, side: int, overlap: int, multiple: int) -> Iterat
 
 
 def _divided(used: np.ndarray, side: int, multiple: int) -> Iterator[slice]:
-    """Parts of about equal length of what is `used` (n,), none longer than `side`."""
+    """Intervals of about equal length that cover what is `used` (n,), none longer than `side`."""
     if not used.any():
         return
     places = np.flatnonzero(used)

@@ -28,7 +28,7 @@ def enlarged(
     factor : float
         Width and height of a block in pixels, at least 1.
     start : tuple of int
-        Row and column of the first pixel, where only a part is wanted.
+        Row and column of the first pixel, for a part of the result.
 
     Returns
     -------
@@ -49,7 +49,7 @@ def enlarged(
 
 
 def enlarge_inside(layer: np.ndarray, inside: np.ndarray, factor: float, out: np.ndarray) -> None:
-    """Upsample a map where a mask says so, in blocks of rows.
+    """Upsample a map inside a mask, in blocks of rows.
 
     Parameters
     ----------
@@ -57,9 +57,9 @@ def enlarge_inside(layer: np.ndarray, inside: np.ndarray, factor: float, out: np
         The averages.
     inside : (H, W) bool ndarray
     factor : float
-        As of `enlarged`.
+        As for `enlarged`.
     out : (H, W, C) ndarray
-        Written: the map inside, 0 elsewhere.
+        Receives the map inside the mask, 0 elsewhere.
     """
     same = factor == 1 and layer.shape[:2] == inside.shape
     for block in row_blocks(inside.shape):

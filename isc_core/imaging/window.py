@@ -1,4 +1,4 @@
-"""A rectangle of an image that may reach beyond it: cut out of maps, and put back.
+"""A rectangle that may extend beyond the image: cut out of maps, and pasted back.
 
 Limits: whole pixels.
 """
@@ -12,7 +12,7 @@ from .framing import continued
 
 @dataclass(frozen=True)
 class Window:
-    """A rectangle around the object, which may reach beyond the image.
+    """A rectangle around the object, which may extend beyond the image.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Window:
         return out
 
     def cut_replicated(self, array: np.ndarray) -> np.ndarray:
-        """Cut the window out of an array, which continues with its border values.
+        """Cut the window out of an array, replicating its border values.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class Window:
         return array[np.ix_(rows, columns)]
 
     def cut_silhouette(self, silhouette: np.ndarray) -> np.ndarray:
-        """Cut the window out of a silhouette, which continues where the frame cuts it.
+        """Cut the window out of a silhouette, extended where the frame cuts it.
 
         Parameters
         ----------
@@ -86,7 +86,7 @@ class Window:
         return grown[top : top + self.height, left : left + self.width]
 
     def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-        """Return an image that holds the content of the window, 0 elsewhere.
+        """Return an image with the content of the window, 0 elsewhere.
 
         Parameters
         ----------

@@ -17,7 +17,7 @@ import OpenEXR
 
 from ..errors import InputError
 from .exr_header import check_exr, unpacked_bytes
-from .limits import USUAL, Limits
+from .limits import DEFAULT_LIMITS, Limits
 from .memory import is_exhausted, memory_error
 from .native_io import memory_file, suppress_native_output
 from .regular_files import read_regular
@@ -61,7 +61,7 @@ def _start_threads() -> None:
         OpenEXR.set_global_thread_count(min(os.cpu_count() or 1, _MOST_THREADS))
 
 
-def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+def read_channels(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, np.ndarray]:
     """Read all channels of a file's first part.
 
     Parameters

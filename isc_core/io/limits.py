@@ -97,4 +97,4 @@ class Limits:
             )
 
 
-USUAL = Limits()
+DEFAULT_LIMITS = Limits()

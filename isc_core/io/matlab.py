@@ -20,7 +20,7 @@ from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from ..errors import InputError
-from .limits import USUAL, Limits
+from .limits import DEFAULT_LIMITS, Limits
 from .memory import is_exhausted, memory_error
 from .native_io import suppress_native_output
 from .regular_files import read_regular
@@ -48,7 +48,7 @@ _READ_ERRORS = (
 )
 
 
-def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
+def read_matrix(path: Path, *keys: str, limits: Limits = DEFAULT_LIMITS) -> np.ndarray:
     """Read a real numeric variable, or a field of a struct.
 
     Parameters

@@ -23,7 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from .limits import USUAL, Limits
+from .limits import DEFAULT_LIMITS, Limits
 from .memory import is_exhausted, memory_error
 from .regular_files import read_regular
 
@@ -55,7 +55,7 @@ _UNPACKING_ERRORS = (
 )
 
 
-def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
+def read_array(path: Path, limits: Limits = DEFAULT_LIMITS) -> np.ndarray:
     """Read a `.npy` file.
 
     Parameters
@@ -76,7 +76,7 @@ def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
     return parse_array(_bytes(path, limits), str(path), limits=limits).copy()
 
 
-def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+def read_arrays(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, np.ndarray]:
     """Read a `.npz` file.
 
     Parameters
@@ -97,7 +97,9 @@ def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     return parse_arrays(_bytes(path, None), str(path), limits)
 
 
-def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USUAL) -> np.ndarray:
+def parse_array(
+    data: bytes, name: str, kinds: str = KINDS, limits: Limits = DEFAULT_LIMITS
+) -> np.ndarray:
     """Parse the bytes of a `.npy` file.
 
     Parameters
@@ -148,7 +150,7 @@ def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USU
     return np.frombuffer(data, kind, count, start).reshape(shape, order="F" if by_columns else "C")
 
 
-def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dict[str, np.ndarray]:
     """Parse the bytes of a `.npz` file.
 
     Parameters

@@ -13,12 +13,12 @@ import stat
 from pathlib import Path
 
 from ..errors import InputError
-from .limits import USUAL, Limits
+from .limits import DEFAULT_LIMITS, Limits
 from .memory import enough_memory
 
 
 def read_regular(
-    path: Path | str, limits: Limits | None = USUAL, remedy: str = "use a file"
+    path: Path | str, limits: Limits | None = DEFAULT_LIMITS, remedy: str = "use a file"
 ) -> bytes:
     """Read a regular file.
 
@@ -48,7 +48,7 @@ def read_regular(
 
 
 def require_regular(
-    path: Path | str, limits: Limits | None = USUAL, remedy: str = "use a file"
+    path: Path | str, limits: Limits | None = DEFAULT_LIMITS, remedy: str = "use a file"
 ) -> None:
     """Check that a path names a regular file, without opening it.
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.decoders import Raster, read_raster
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..networks.mask_network import Count
 from ..photo.found_mask import FoundMask
 from ..photo.masks import MIN_MASK_PIXELS, check_mask
@@ -163,7 +163,7 @@ class EachSearch:
 
 
 def read_each(
-    path: Path, mask_path: Path | None, transfer: str = "auto", limits: Limits = USUAL
+    path: Path, mask_path: Path | None, transfer: str = "auto", limits: Limits = DEFAULT_LIMITS
 ) -> list[Photo]:
     """Read a photo of several separate objects.
 

@@ -1,7 +1,7 @@
-"""Arrays as images, for programs that have them in memory.
+"""Arrays in memory as images.
 
-Integer arrays hold codes (sRGB unless said otherwise), arrays of floats hold linear light, as in
-the files that `reading` reads.
+Integer arrays hold codes (sRGB by default), arrays of floats hold linear light, as in the files
+that `reading` reads.
 """
 
 import hashlib
@@ -12,17 +12,17 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.decoders.raster import Raster, check_size, raster_of_codes
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 
 
-def raster_from_array(values: np.ndarray, name: str, limits: Limits = USUAL) -> Raster:
+def raster_from_array(values: np.ndarray, name: str, limits: Limits = DEFAULT_LIMITS) -> Raster:
     """Return an array as if it had been read from a file.
 
     Parameters
     ----------
     values : (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) ndarray
         Grey, RGB or RGBA. uint8 and uint16 are codes, floats are linear; alpha from 0 to the
-        largest code, or to 1. bool is a mask.
+        largest code, or 1. bool is a mask.
     name : str
         Opens the error messages.
     limits : Limits
@@ -34,7 +34,7 @@ def raster_from_array(values: np.ndarray, name: str, limits: Limits = USUAL) -> 
     Raises
     ------
     InputError
-        If the array is no image.
+        If the array is not an image.
     """
     if values.ndim not in (2, 3) or (values.ndim == 3 and values.shape[2] not in (1, 3, 4)):
         raise InputError(

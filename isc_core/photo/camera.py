@@ -1,14 +1,14 @@
-"""The camera of a photo: a pinhole whose focal length is known.
+"""The camera of a photo: a pinhole of known focal length.
 
-Equation: the pixel (row, column) sees along (u, -v, -f), with u = column + 1/2 - x and v = row +
-1/2 - y counted from the principal point (x, y), f the focal length, all in pixels; camera frame: x
-right, y up, z toward the viewer, the pinhole at the origin.
+Equation: the viewing ray of the pixel (row, column) is (u, -v, -f), with u = column + 1/2 - x and v
+= row + 1/2 - y counted from the principal point (x, y), f the focal length, all in pixels; camera
+frame: x right, y up, z toward the viewer, the pinhole at the origin.
 
 Citation: R. Hartley, A. Zisserman, "Multiple view geometry in computer vision" (2004),
 doi:10.1017/CBO9780511811685.
 
-Limits: square pixels, no lens distortion; the principal point is the middle of the photo, which
-holds for files that nobody cropped.
+Limits: square pixels, no lens distortion; the principal point is the centre of the photo, so the
+photo must not be cropped.
 """
 
 from dataclasses import dataclass, replace
@@ -16,7 +16,7 @@ from enum import StrEnum
 
 
 class CameraSource(StrEnum):
-    """Where the focal length is from.
+    """The source of the focal length.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Camera:
     principal_point : tuple of float
         (x, y) in pixels from the left and upper edge of the frame.
     source : CameraSource
-        Where the focal length is from.
+        The source of the focal length.
     """
 
     focal_length: float

@@ -1,14 +1,14 @@
 """Gaussian mixtures of colours.
 
-Equation: the density of a colour z is sum_k w_k N(z; m_k, C_k). Colours are sorted into components
-by splitting: the component whose colours spread most along one axis is cut in two at its mean,
-across that axis, until there are enough. Later each colour goes to the component under which it is
-most likely.
+Equation: the density of a colour z is sum_k w_k N(z; m_k, C_k). Colours are first assigned to
+components by splitting: the component of the largest variance along one axis is split at its mean,
+across that axis, until there are enough. Later each colour is assigned to the component under which
+it is most likely.
 
 Citation: M. Orchard, C. Bouman, "Color quantization of images", IEEE Transactions on Signal
 Processing 39 (1991), doi:10.1109/78.107417.
 
-Limits: colours are sorted hard, not by shares, as in GrabCut.
+Limits: assignments are hard, as in GrabCut.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 COMPONENTS = 5
-_NOISE = 0.1  # added to the variances of codes, so that plain colours have some
+_NOISE = 0.1  # added to the variances of codes, so that uniform colours have some
 _TINY = 1e-12
 
 
@@ -38,27 +38,27 @@ class ColourMixture:
     roots: np.ndarray
 
     @staticmethod
-    def fitted(colours: np.ndarray, owners: np.ndarray) -> "ColourMixture":
+    def fitted(colours: np.ndarray, assignments: np.ndarray) -> "ColourMixture":
         """Fit components to colours.
 
         Parameters
         ----------
         colours : (N, 3) ndarray
             N > 0.
-        owners : (N,) int ndarray
+        assignments : (N,) int ndarray
             Component of each, below `COMPONENTS`.
 
         Returns
         -------
         ColourMixture
         """
-        moments = [_moments(colours, owners, k) for k in range(COMPONENTS)]
+        moments = [_moments(colours, assignments, k) for k in range(COMPONENTS)]
         counts, means, covariances = (np.stack(parts) for parts in zip(*moments, strict=True))
         inverse = np.linalg.inv(covariances + _NOISE * np.eye(3))
         return ColourMixture(counts / counts.sum(), means, np.linalg.cholesky(inverse))
 
     def costs(self, colours: np.ndarray) -> np.ndarray:
-        """Return the negative logarithms of w_k N(z; m_k, C_k), but for a constant.
+        """Return the negative logarithms of w_k N(z; m_k, C_k), up to a constant.
 
         Parameters
         ----------
@@ -77,7 +77,7 @@ class ColourMixture:
         return result
 
     def cost(self, colours: np.ndarray) -> np.ndarray:
-        """Return the negative logarithms of the densities, but for a constant.
+        """Return the negative logarithms of the densities, up to a constant.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class ColourMixture:
 
 
 def split_colours(colours: np.ndarray) -> np.ndarray:
-    """Sort colours into components.
+    """Assign colours to components by splitting.
 
     Parameters
     ----------
@@ -106,32 +106,32 @@ def split_colours(colours: np.ndarray) -> np.ndarray:
     (N,) int ndarray
         Component of each.
     """
-    owners = np.zeros(len(colours), int)
-    axes = [_axis(colours, owners, 0)]
+    assignments = np.zeros(len(colours), int)
+    axes = [_axis(colours, assignments, 0)]
     for new in range(1, COMPONENTS):
         widest = int(np.argmax([spread for spread, _, _ in axes]))
         _, axis, mean = axes[widest]
         beyond = sum((colours[:, c] - mean[c]) * axis[c] for c in range(3)) > 0
-        owners[(owners == widest) & beyond] = new
-        axes[widest] = _axis(colours, owners, widest)
-        axes.append(_axis(colours, owners, new))
-    return owners
+        assignments[(assignments == widest) & beyond] = new
+        axes[widest] = _axis(colours, assignments, widest)
+        axes.append(_axis(colours, assignments, new))
+    return assignments
 
 
 def _axis(
-    colours: np.ndarray, owners: np.ndarray, component: int
+    colours: np.ndarray, assignments: np.ndarray, component: int
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Sum of squares along the longest axis of a component, this axis, and its mean."""
-    count, mean, covariance = _moments(colours, owners, component)
+    """Sum of squares along the principal axis of a component, this axis, and its mean."""
+    count, mean, covariance = _moments(colours, assignments, component)
     values, vectors = np.linalg.eigh(covariance)
     return count * float(values[-1]), vectors[:, -1], mean
 
 
 def _moments(
-    colours: np.ndarray, owners: np.ndarray, component: int
+    colours: np.ndarray, assignments: np.ndarray, component: int
 ) -> tuple[int, np.ndarray, np.ndarray]:
-    """Count, mean and covariance of a component's colours, summed in one order."""
-    chosen = colours[owners == component]
+    """Count, mean and covariance of a component's colours, summed in a fixed order."""
+    chosen = colours[assignments == component]
     if not len(chosen):
         return 0, np.zeros(3), np.eye(3)
     mean = chosen.mean(axis=0)

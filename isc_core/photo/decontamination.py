@@ -1,16 +1,16 @@
-"""Taking the background out of the soft rim of an object.
+"""Foreground colours at the soft rim of an object, without the background.
 
-Problem: a pixel of the outline shows object and background, I = a F + (1 - a) B for its cover a.
-Taken for the object, the background bends shape and colours there.
+Problem: a pixel of the outline shows object and background, I = a F + (1 - a) B for its coverage a.
+If it is taken for the object, the background distorts shape and colours there.
 
 Equation: with means over a window, f = mean(a^8 I) / mean(a^8) and b the same for 1 - a, so that
-pixels of one kind count most, F = f + a (I - a f - (1 - a) b).
+pure pixels have the largest weights, F = f + a (I - a f - (1 - a) b).
 
 Citation: M. Forte, "Approximate fast foreground colour estimation", ICIP 2021,
 doi:10.1109/ICIP42928.2021.9506164.
 
-Limits: one step, on a reduced photo, with powers of a instead of a: colours that change within the
-window are averaged.
+Limits: a single step, on a downscaled photo, with powers of a instead of a: colours that vary
+within the window are averaged.
 """
 
 import numpy as np
@@ -25,8 +25,8 @@ _POWER = 8
 _LEAST = 1e-6
 
 
-def without_background(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """Take the background out of the rim of an object.
+def estimate_foreground(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
+    """Replace the colours at the rim of an object by foreground colours.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def without_background(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, 3) float32 ndarray
-        The image; other where the cover is at least half, but not whole.
+        The image, changed where the coverage is at least half, but below 1.
     """
     rim = (cover >= 0.5) & (cover < 1)
     if not rim.any():

@@ -1,11 +1,11 @@
-"""A mask that was found in a photo, and what finds it."""
+"""A mask that was found in a photo, and the interface of its finder."""
 
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-FOUND = ("automatic", "hints", "each")  # what `PhotoSource.mask_from` calls them
+FOUND = ("automatic", "hints", "each")  # their values of `PhotoSource.mask_from`
 
 
 @dataclass(frozen=True)
@@ -17,11 +17,11 @@ class FoundMask:
     cover : (H, W) float32 ndarray
         Fraction of each pixel that the object covers.
     confidence : float
-        Confidence: the probability that the overlap (IoU) with the intended object is at least .5.
+        The probability that the overlap (IoU) with the intended object is at least .5.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several objects.
     evidence : (N,) ndarray
-        What the confidence was computed from, see `masking.evidence`.
+        Features from which the confidence was computed, see `masking.evidence`.
     """
 
     cover: np.ndarray
@@ -31,16 +31,16 @@ class FoundMask:
 
     @property
     def mask(self) -> np.ndarray:
-        """The pixels (H, W) that the object covers by half or more."""
+        """The pixels (H, W) at least half covered by the object."""
         return self.cover >= 0.5
 
 
 class MaskFinder(Protocol):
-    """What finds the mask of a photo by its appearance."""
+    """Finds the mask of a photo by appearance."""
 
     @property
     def always(self) -> bool:
-        """Whether to look even where the photo has an alpha channel or a black border."""
+        """Whether to search even where the photo has an alpha channel or a black border."""
 
     def __call__(self, name: str, light: np.ndarray) -> FoundMask | None:
         """Find the mask of a photo.
@@ -55,10 +55,10 @@ class MaskFinder(Protocol):
         Returns
         -------
         FoundMask or None
-            None: it is not sure; the whole frame may be used.
+            None: the confidence is too low; the whole frame may be used.
 
         Raises
         ------
         InputError
-            If it is not sure.
+            If the confidence is too low.
         """

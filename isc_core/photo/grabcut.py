@@ -12,9 +12,9 @@ Citation: C. Rother, V. Kolmogorov, A. Blake, "GrabCut", ACM Transactions on Gra
 doi:10.1145/1015706.1015720; the cut in a band: H. Lombaert et al., "A multilevel banded graph cuts
 method for fast image segmentation", ICCV 2005, doi:10.1109/ICCV.2005.13.
 
-Limits: only colours count, so an object of the background's colour is segmented badly: check the
-mask. Large boxes are solved at 65,000 pixels, their outline at half a megapixel, and the border is
-interpolated; what is thinner than two coarse pixels may be lost.
+Limits: only colours are compared, so an object of the background's colour is segmented badly: check
+the mask. Large boxes are solved at 65,000 pixels, their outline at half a megapixel, and the border
+is interpolated; parts thinner than two coarse pixels may be lost.
 """
 
 import os
@@ -30,7 +30,7 @@ from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_codes
 from ..io.atomic import new_file, require_writable_file
 from ..io.decoders import MIN_SIDE
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..io.png import encode_png
 from .colour_mixture import ColourMixture, split_colours
 from .masks import check_mask, tidy_mask
@@ -59,13 +59,13 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
     Returns
     -------
     (H, W) bool ndarray
-        False outside the box; holes filled, specks dropped.
+        False outside the box; holes are filled, small parts removed.
 
     Raises
     ------
     InputError
-        If the box lies outside the image, is thinner than 8 pixels, leaves no background, or holds
-        no object.
+        If the box lies outside the image, is thinner than 8 pixels, leaves no background, or
+        contains no object.
     """
     height, width = image.shape[:2]
     check_box(box, width, height)
@@ -87,7 +87,7 @@ def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
 
 
 def check_box(box: Box, width: int, height: int) -> None:
-    """Raise `InputError` for a box that is thin, leaves the image, or covers all of it.
+    """Raise `InputError` for a box that is thin, extends beyond the image, or covers all of it.
 
     Parameters
     ----------
@@ -115,8 +115,8 @@ def check_box(box: Box, width: int, height: int) -> None:
 
 
 def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
-    """Object coverage (H, W) float32 of an (H, W, 3) uint8 RGB image: solved coarsely, then at the
-    outline.
+    """Object coverage (H, W) float32 of an (H, W, 3) uint8 RGB image, solved coarsely and then
+    refined at the outline.
     """
     height, width = coded.shape[:2]
     small, part = _reduced(coded, box, COARSE_PIXELS)
@@ -136,7 +136,7 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
 
 
 def _reduced(coded: np.ndarray, box: Box, most: int) -> tuple[np.ndarray, tuple[slice, slice]]:
-    """Codes (h, w, 3) uint8 of no more than so many pixels, and where the box is in them."""
+    """The codes (h, w, 3) uint8 downscaled to at most so many pixels, and the box in them."""
     height, width = coded.shape[:2]
     factor = min(1.0, float(np.sqrt(most / (height * width))))
     size = (max(round(width * factor), 1), max(round(height * factor), 1))
@@ -146,7 +146,7 @@ def _reduced(coded: np.ndarray, box: Box, most: int) -> tuple[np.ndarray, tuple[
 
 
 def _band(found: np.ndarray, part: tuple[slice, slice]) -> np.ndarray:
-    """Labels that are open near the outline of a mask, inside of the box."""
+    """Labels that are uncertain near the outline of a mask, inside the box."""
     near = ndimage.binary_dilation(found, iterations=_BAND)
     deep = ndimage.binary_erosion(found, iterations=_BAND, border_value=1)
     labels = np.where(found, Label.PROBABLY_OBJECT, Label.PROBABLY_BACKGROUND).astype(np.uint8)
@@ -158,7 +158,7 @@ def _band(found: np.ndarray, part: tuple[slice, slice]) -> np.ndarray:
 
 
 class Label(IntEnum):
-    """What is known of a pixel."""
+    """The prior knowledge of a pixel."""
 
     BACKGROUND = 0
     OBJECT = 1
@@ -167,14 +167,14 @@ class Label(IntEnum):
 
 
 def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndarray:
-    """Segment an image of which some pixels are known.
+    """Segment an image with some known pixels.
 
     Parameters
     ----------
     coded : (H, W, 3) uint8 ndarray
         RGB.
     labels : (H, W) uint8 ndarray
-        Of `Label`; some of the object and some of the background.
+        Values of `Label`, of both the object and the background.
     iterations : int
 
     Returns
@@ -184,22 +184,24 @@ def segmented(coded: np.ndarray, labels: np.ndarray, iterations: int) -> np.ndar
     codes = coded.astype(float)
     inside = (labels == Label.OBJECT) | (labels == Label.PROBABLY_OBJECT)
     free = (labels == Label.PROBABLY_OBJECT) | (labels == Label.PROBABLY_BACKGROUND)
-    owners = np.zeros(inside.shape, int)
+    assignments = np.zeros(inside.shape, int)
     for part in (inside, ~inside):
-        owners[part] = split_colours(codes[part])
+        assignments[part] = split_colours(codes[part])
     links = _links(codes)
     for _ in range(iterations):
-        mixtures = [ColourMixture.fitted(codes[part], owners[part]) for part in (~inside, inside)]
+        mixtures = [
+            ColourMixture.fitted(codes[part], assignments[part]) for part in (~inside, inside)
+        ]
         inside = _cut(codes, mixtures, links, free, inside)
         if inside.all() or not inside.any():
             break
         for mixture, part in zip(mixtures, (~inside, inside), strict=True):
-            owners[part] = np.argmin(mixture.costs(codes[part]), axis=0)
+            assignments[part] = np.argmin(mixture.costs(codes[part]), axis=0)
     return inside
 
 
 def _links(codes: np.ndarray) -> list[np.ndarray]:
-    """Costs of different labels of neighbours: high but for where colours differ."""
+    """Costs of different labels of neighbours: low where colours differ."""
     squares = []
     for step in STEPS:
         here, there = shifted(codes.shape, step)
@@ -231,10 +233,7 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
 
     Parameters
     ----------
-    path : str or Path
-    mask : (H, W) bool ndarray, or float cover in [0, 1]
-
-    Raises
+    path : str or Path mask : (H, W) bool ndarray, or float cover in [0, 1] Raises
     ------
     InputError
         If the file cannot be written.
@@ -291,7 +290,7 @@ def cut_out(
     box: Box,
     out_path: str | Path,
     transfer: str = "auto",
-    limits: Limits = USUAL,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> np.ndarray:
     """Segment the object within a box of a photo and write its mask.
 

@@ -1,4 +1,4 @@
-"""Places of a photo at which a person says what is a highlight and what is paint."""
+"""Positions in a photo that a user has marked as highlights or paint."""
 
 from dataclasses import dataclass
 
@@ -14,12 +14,12 @@ _LEAST_REACH = 2.0  # pixels
 
 @dataclass(frozen=True)
 class HighlightMarks:
-    """What a person has marked, in pixels of the upright photo from its upper left edges.
+    """Marks of a user, in pixels of the upright photo from its upper left corner.
 
     Attributes
     ----------
     highlights : tuple of (x, y)
-        On highlights; the middle of pixel (3, 5) is (3.5, 5.5).
+        On highlights; the centre of pixel (3, 5) is (3.5, 5.5).
     paint : tuple of (x, y)
         On print or paint that looks like a highlight.
     """
@@ -70,8 +70,8 @@ class HighlightMarks:
                 )
 
 
-def mark_reach(mask: np.ndarray) -> float:
-    """Return how far from a mark the highlight may lie that it means, in pixels.
+def mark_radius(mask: np.ndarray) -> float:
+    """Return the largest distance in pixels between a mark and its highlight.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A small picture of a photo with its mask over it, to judge the mask by.
+"""A small picture of a photo with its mask as an overlay, to check the mask.
 
 The background is darkened and tinted red, the mask's outline is orange.
 
@@ -61,7 +61,7 @@ def write_mask_overlay(path: Path, image: np.ndarray, mask: np.ndarray) -> None:
 
 
 def _outline(inside: np.ndarray) -> np.ndarray:
-    """Pixels of the object beside the background."""
+    """Pixels of the object next to the background."""
     padded = np.pad(inside, 1, mode="edge")
     neighbours = (padded[:-2, 1:-1], padded[2:, 1:-1], padded[1:-1, :-2], padded[1:-1, 2:])
     outline: np.ndarray = inside & ~np.logical_and.reduce(neighbours)

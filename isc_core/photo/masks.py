@@ -14,7 +14,7 @@ from .found_mask import FoundMask, MaskFinder
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
 _LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
-_HARD = 0.02  # of the largest value: closer to it, or to 0, masks of lossy files are, too
+_HARD = 0.02  # of the largest value: lossy files differ from 0 and 1 by as much
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
@@ -69,7 +69,7 @@ def find_mask(
     whole_frame: bool,
     finder: MaskFinder | None = None,
 ) -> tuple[np.ndarray | FoundMask, str]:
-    """Find the object's mask in the photo itself, and where it comes from.
+    """Find the object's mask in the photo itself, and name its source.
 
     Parameters
     ----------
@@ -80,10 +80,10 @@ def find_mask(
     linear : (H, W, 1 or 3) ndarray
         Its linear light.
     whole_frame : bool
-        Take all pixels where there is no alpha channel and no black border, and the finder is not
-        sure.
+        Use all pixels where there is no alpha channel and no black border, and the finder's
+        confidence is too low.
     finder : MaskFinder, optional
-        Looks for the object where there is no alpha channel and no black border.
+        Finds the object where there is no alpha channel and no black border.
 
     Returns
     -------
@@ -109,12 +109,12 @@ def find_mask(
     # A float file has no peak value: use its 99th percentile as white.
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
     if finder is not None and finder.always:
-        found = finder(name, linear_of_white(linear, white))
+        found = finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "hints"
     bright = light > white * float(srgb_to_linear(BLACK))
     if bright[0].any() or bright[-1].any() or bright[:, 0].any() or bright[:, -1].any():
-        found = None if finder is None else finder(name, linear_of_white(linear, white))
+        found = None if finder is None else finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "automatic"
         if whole_frame:
@@ -131,20 +131,20 @@ def find_mask(
 
 
 def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
-    """Return how much of each pixel the object covers, where an image tells more than yes or no.
+    """Return the fractional coverage of pixels by the object, where an image has it.
 
     Parameters
     ----------
     raster : Raster
         A mask, or a photo with an alpha channel.
     mask : (H, W) bool ndarray
-        What it shows as the object.
+        The object in it.
 
     Returns
     -------
     (H, W) float32 ndarray or None
-        0 to 1: the alpha channel; of an image without, shares of the value that most of the object
-        has. None where all are as good as 0 or 1, or where the background is not 0.
+        0 to 1: the alpha channel, else the values over that of most of the object. None where all
+        are practically 0 or 1, or where the background is not 0.
     """
     if raster.transparency is not None:
         values = np.asarray(raster.transparency, np.float32)
@@ -158,8 +158,8 @@ def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
     return cover if plain and partly.any() else None
 
 
-def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:
-    """Return light as a `MaskFinder` takes it.
+def normalised_to_white(linear: np.ndarray, white: float) -> np.ndarray:
+    """Return light in the form that a `MaskFinder` expects.
 
     Parameters
     ----------
@@ -177,7 +177,7 @@ def linear_of_white(linear: np.ndarray, white: float) -> np.ndarray:
 
 
 def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
-    """Return the mask that an image shows.
+    """Return the mask in an image.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.area_resize import AreaFilter, resize_apart
+from ..imaging.area_resize import AreaFilter, resize_separately
 from ..imaging.bounding_box import mask_box
 from ..io.decoders import MIN_SIDE
 from ..io.reading_notes import ReadingNote
@@ -16,7 +16,7 @@ from .highlight_marks import HighlightMarks
 
 @dataclass(frozen=True)
 class PhotoSource:
-    """The file a photo comes from.
+    """The file of a photo.
 
     Attributes
     ----------
@@ -25,17 +25,18 @@ class PhotoSource:
     size : tuple of int
         (width, height), after rotation.
     bit_depth : int
-        Bits a channel.
+        Bits per channel.
     transfer : str
-        The transfer curve used: "srgb", "linear", or "profile" for another one of the file.
+        The transfer curve used: "srgb", "linear", or "profile" for that of the file's colour
+        profile.
     mask_from : str
         "file", "alpha", "black border", "automatic", "hints", "each" or "whole frame".
     colour_profile : str
         Name of the colour space that the file states, "" without one.
     notes : tuple of ReadingNote
-        What was assumed or left out.
+        Assumptions, and omissions.
     cropped : bool
-        The metadata give a focal length, but of a frame of another shape: it does not hold.
+        The metadata give a focal length, but for a frame of another aspect ratio: it is not valid.
     confidence : float or None
         Of a mask that was found automatically or by hints, see `FoundMask`.
     """
@@ -69,22 +70,22 @@ class Photo:
         only.
     clipped : (H, W) bool ndarray
         Some channel is at the coding's maximum, or the sensor was saturated, so the light may have
-        been brighter; never in float files. After resizing: some part of the object's pixel is.
+        been brighter; never in float files. After resizing: part of the pixel is clipped.
     original : PhotoSource
         The file.
     scale : float
         Working size over original size; a working pixel coordinate is `scale` times the original
         one.
     exposed : bool
-        Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
+        Whether values are relative to white, which is 1: true for codes, unknown for floats.
     camera : Camera or None
-        The pinhole camera of `image`; None where it is unknown, for an orthographic view.
+        The pinhole camera of `image`; None where it is unknown, and the view is orthographic.
     found : FoundMask or None
         The mask at the file's size, if it was found automatically or from hints.
     cover : (H', W') float32 ndarray or None
-        Share of each of the file's pixels that the object covers; None where `mask` says all.
+        Coverage of the file's pixels by the object; None where all are 0 or 1, as in `mask`.
     marks : HighlightMarks
-        What a person says of its highlights.
+        Highlights and paint marked by the user.
     """
 
     image: np.ndarray
@@ -101,19 +102,19 @@ class Photo:
 
     @property
     def box(self) -> tuple[int, int, int, int]:
-        """(x, y, width, height) of the mask's box, in pixels of `image`."""
+        """(x, y, width, height) of the mask's bounding box, in pixels of `image`."""
         return mask_box(self.mask)
 
     def resized_to_object(self, max_size: int = 512) -> "Photo":
         """Downscale the photo to an object of at most `max_size` pixels.
 
-        Linear light is averaged over the area of each new pixel, object and background apart; the
-        mask is where the object covers half.
+        Linear light is averaged over the area of each new pixel, separately for object and
+        background; the mask consists of the pixels at least half covered by the object.
 
         Parameters
         ----------
         max_size : int
-            Long side of the mask's box; 0 keeps the size. Photos are never enlarged.
+            Long side of the mask's bounding box; 0 keeps the size. Photos are never enlarged.
 
         Returns
         -------
@@ -149,7 +150,7 @@ class Photo:
         clipped = mask & (area(self.clipped & self.mask) > 1e-6)
         return replace(
             self,
-            image=resize_apart(self.image, self.mask, mask, area),
+            image=resize_separately(self.image, self.mask, mask, area),
             mask=mask,
             clipped=clipped,
             scale=self.scale * factor,

@@ -1,4 +1,4 @@
-"""Primaries of a colour space to those of Rec.709.
+"""Conversion from the primaries of a colour space to those of Rec.709.
 
 Equation: with the colorants P of the space (CIE XYZ in the columns, their sum is its white w) and
 those of Rec.709, S, of the white D65,
@@ -48,12 +48,12 @@ def to_rec709(space: ColourSpace | None) -> np.ndarray | None:
 
 
 def in_rec709(linear: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Convert linear light to Rec.709, with what is outside of it clipped at 0.
+    """Convert linear light to Rec.709; colours outside its gamut are clipped at 0.
 
     Parameters
     ----------
     linear : (H, W, 3) float32 ndarray
-        Pixels with values that are negative or not finite are defective, and stay as they are.
+        Pixels with negative or non-finite values are defective and are not changed.
     matrix : (3, 3) ndarray
         From `to_rec709`.
 

@@ -1,7 +1,7 @@
 """Reading a photo and its mask as linear light.
 
-Problem: files store codes (8 or 16 bits, mostly sRGB) or floats, in colour spaces of their own;
-everything behind this folder works on linear Rec.709 light with a mask.
+Problem: files store codes (8 or 16 bits, mostly sRGB) or floats, in various colour spaces; all
+other packages use linear Rec.709 light with a mask.
 
 Limits: see `transfer` for colour spaces and `io.decoders` for file formats.
 """
@@ -17,11 +17,11 @@ from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..io.memory import READING, enough_memory
 from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
-from .decontamination import without_background
+from .decontamination import estimate_foreground
 from .found_mask import FoundMask, MaskFinder
 from .masks import check_mask, find_mask, mask_of, soft_cover
 from .photo import Photo, PhotoSource
@@ -30,8 +30,8 @@ from .soft_rim import soft_rim
 from .transfer import PROFILE, resolve_transfer, to_linear
 
 FLOAT_STEP = 2.0**-14
-_MOST_OUTSIDE = 0.01  # of the object's pixels: fewer need no note
-_TOGETHER = 1 << 16  # pixels that are compared at once
+_MOST_OUTSIDE = 0.01  # of the object's pixels: below it there is no note
+_CHUNK = 1 << 16  # pixels compared at a time
 _DEFECTIVE = 1e9  # times the median light of the object: brighter pixels are defective
 
 
@@ -41,7 +41,7 @@ def read_photo(
     transfer: str = "auto",
     *,
     whole_frame: bool = False,
-    limits: Limits = USUAL,
+    limits: Limits = DEFAULT_LIMITS,
     finder: MaskFinder | None = None,
 ) -> Photo:
     """Read a photo at full size.
@@ -60,11 +60,11 @@ def read_photo(
     path : str or Path
     mask_path : str or Path, optional
     transfer : {"auto", "srgb", "linear"}
-        "auto": the curve that the file states; without one floats are linear, all others sRGB.
+        "auto": the curve that the file states; without one, floats are linear, all others sRGB.
     whole_frame : bool
-        Take all pixels where there is no mask, alpha channel or black border.
+        Use all pixels where there is no mask, alpha channel or black border.
     limits : Limits
-        Checked by the header, before the file is unpacked.
+        Checked with the header, before the file is decoded.
     finder : MaskFinder, optional
         Finds the object where there is no mask, alpha channel or black border
         (`isc_core.masking`).
@@ -157,14 +157,14 @@ def _photo(
     cover = None if found is None else found.cover
     if mask_from in ("alpha", "file"):
         cover = soft_cover(raster if mask_raster is None else mask_raster, mask)
-    # An alpha channel comes with the object's own colours.
+    # Colours of an image with an alpha channel are already those of the object.
     mixed = found is not None or (mask_from == "file" and _is_soft(cover, mask))
     height, width = mask.shape
     lens = raster.focal_length
     cropped = lens is not None and lens.cropped
     light = as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name))
     return Photo(
-        image=without_background(light, cover) if mixed and cover is not None else light,
+        image=estimate_foreground(light, cover) if mixed and cover is not None else light,
         mask=mask,
         code_value=_code_value(raster, used, linear, mask),
         clipped=_clipped(raster),
@@ -201,13 +201,13 @@ def _clipped(raster: Raster) -> np.ndarray:
 def _notes(
     raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndarray
 ) -> Iterator[ReadingNote]:
-    """What was assumed or left out when the raster was read, and when it became linear light."""
+    """Assumptions and omissions in reading the raster and its conversion to linear light."""
     unused = raster.space is not None and raster.space.is_table and transfer != PROFILE
     for note in raster.notes:
         table = note.kind is ReadingNoteKind.TABLE_PROFILE
         yield ReadingNote(ReadingNoteKind.UNUSED_PROFILE) if unused and table else note
     if raster.values.shape[2] == 3 and to_rec709(raster.space) is not None:
-        # No channel is black in the file, one is in Rec.709: it was clipped.
+        # A channel that is black only in Rec.709 was clipped.
         outside = mask & (smallest(raster.values) > 0) & (smallest(linear) == 0)
         share = float(outside.sum() / mask.sum())
         if share > _MOST_OUTSIDE:
@@ -215,7 +215,11 @@ def _notes(
 
 
 def read_linear(
-    path: str | Path, transfer: str = "auto", limits: Limits = USUAL, *, finite: bool = False
+    path: str | Path,
+    transfer: str = "auto",
+    limits: Limits = DEFAULT_LIMITS,
+    *,
+    finite: bool = False,
 ) -> np.ndarray:
     """Read a whole image as linear light, without a mask.
 
@@ -225,7 +229,7 @@ def read_linear(
     transfer : {"auto", "srgb", "linear"}
     limits : Limits
     finite : bool
-        Refuse values that are not finite.
+        Raise `InputError` for values that are not finite.
 
     Returns
     -------
@@ -246,12 +250,12 @@ def read_linear(
 
 def _check_not_constant(values: np.ndarray, what: str, mask: np.ndarray | None = None) -> None:
     first = None
-    for block in row_blocks(values.shape, pixels=_TOGETHER):
+    for block in row_blocks(values.shape, pixels=_CHUNK):
         part = values[block.rows] if mask is None else values[block.rows][mask[block.rows]]
         part = part.reshape(-1, values.shape[-1])
         if first is None and len(part):
             first = part[0]
-        if len(part) and (part != first).any():  # in most photos, already in the first part
+        if len(part) and (part != first).any():  # in most photos, already in the first block
             return
     black = first is None or not first.any()
     raise InputError(
@@ -294,6 +298,6 @@ def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndar
     if raster.peak is None:
         light = largest(linear)[mask]
         return FLOAT_STEP * float(np.percentile(light, 99.9) or light.max())
-    # Codes of fewer bits may be spread over more.
+    # Codes of fewer bits may be scaled to the range of more.
     step = max(1.0 / raster.peak, 1.0 / (2**raster.bit_depth - 1))
     return step if transfer == "linear" else float(srgb_to_linear(step))

@@ -1,22 +1,22 @@
-"""Whether the rim of an object is soft: hair, fur, mist; or an outline.
+"""Detection of soft rims (hair, fur, mist), as opposed to antialiased outlines.
 
-Problem: any mask may have values between 0 and 1. Those of an outline say where it runs between the
-pixels, and the object stays opaque. Only what has no outline needs transparency.
+Problem: any mask may have values between 0 and 1. Those of an outline give its position within a
+pixel, and the object remains opaque. Only a rim without an outline needs transparency.
 
 Rule: across a smooth outline at most w pixels are partly covered (.1 to .9): 3 by an alpha channel;
 6, or 2.5 % of the object's length, by a mask, which `masking.refinement` may have feathered along
 the colours of the photo. A rim is soft where at least .6 of the pixels of a window of 2 w + 1 are
-partly covered, so that strands count as well as mist. Such pixels are at least as many as the
-object is long, else nothing is soft. In each place, at least a sixth of the partly covered pixels
-are covered by more than half: hair grows from the object, and what lies beyond a step, such as a
-shadow in the alpha channel, is none of it.
+partly covered, so that both strands and mist are detected. There must be at least as many such
+pixels as the object is long, else nothing is soft. In each connected zone, at least a sixth of the
+partly covered pixels must be covered by more than half: hair is attached to the object, whereas a
+region beyond a step, such as a shadow in the alpha channel, is not part of it.
 
 Citation: none; the rule is our own. On soft masks in general: J. Wang and M. F. Cohen, "Image and
 video matting: a survey", Foundations and Trends in Computer Graphics and Vision 3 (2007),
 doi:10.1561/0600000019.
 
-Limits: a mask that is blurred on purpose is soft. A mask that was found automatically is an
-outline, feathered over a few pixels, and never that soft.
+Limits: a deliberately blurred mask is soft. A mask that was found automatically is an outline
+feathered over a few pixels, and is never soft.
 """
 
 import numpy as np
@@ -32,21 +32,21 @@ _FEATHER, _FEATHER_SHARE = 6, 0.025  # w of masks: pixels, and of the object's l
 
 
 def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | None:
-    """Return where the rim of an object is soft.
+    """Return the regions in which the rim of an object is soft.
 
     Parameters
     ----------
     share : (H, W) ndarray
-        Cover of each pixel.
+        Coverage of each pixel.
     mask : (H, W) bool ndarray
         The object.
     own : bool
-        Whether this is the alpha channel of the photo.
+        Whether `share` is the alpha channel of the photo.
 
     Returns
     -------
     (H, W) bool ndarray or None
-        With the pixels around, half a window; None where it is soft nowhere.
+        Dilated by half a window; None without soft regions.
     """
     longest = max(mask[mask_slices(mask)].shape)
     edge = _EDGE if own else max(_FEATHER, round(_FEATHER_SHARE * longest))

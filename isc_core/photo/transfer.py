@@ -1,15 +1,15 @@
 """From stored codes to linear Rec.709 light, and back.
 
-Equation, for a code x in [0, 1] (the real sRGB curve, never a power alone):
+Equation, for a code x in [0, 1] (the exact sRGB curve, not a power law):
     linear = x / 12.92                      if x <= 0.04045
              ((x + 0.055) / 1.055)^2.4      otherwise
-A file that names a colour space has the curves and primaries of that, see `primaries`.
+For a file that states a colour space, its curves and primaries are used, see `primaries`.
 
 Citation: IEC 61966-2-1:1999; M. Stokes, M. Anderson, S. Chandrasekar, R. Motta, "A Standard Default
 Color Space for the Internet - sRGB" (1996).
 
-Limits: a curve that the user names replaces that of the file; the file's primaries remain. Float
-files are linear, whatever curve they name. Colours outside of Rec.709 are clipped at 0.
+Limits: a curve that the user chooses replaces that of the file; the file's primaries remain. Float
+files are linear, even if they state another curve. Colours outside of Rec.709 are clipped at 0.
 """
 
 from collections.abc import Callable
@@ -29,7 +29,7 @@ from .primaries import in_rec709, to_rec709
 PROFILE = "profile"
 _CODES = np.arange(256) / 255
 _HALF_A_CODE = 0.5 / 255
-_TOGETHER = 1 << 15  # pixels that are looked up at once: NumPy makes an index of 8 bytes of each
+_CHUNK = 1 << 15  # pixels looked up at a time: NumPy makes an index of 8 bytes for each
 
 
 def resolve_transfer(transfer: str, raster: Raster) -> str:
@@ -43,7 +43,7 @@ def resolve_transfer(transfer: str, raster: Raster) -> str:
     Returns
     -------
     str
-        "srgb", "linear", or "profile" for another one that the file names.
+        "srgb", "linear", or "profile" for another one that the file states.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def resolve_transfer(transfer: str, raster: Raster) -> str:
 
 
 def _curve_of(space: ColourSpace | None) -> str:
-    """The curve of a colour space, by its usual name if it is within half a code of 8 bits."""
+    """The name of a colour space's curve; that of sRGB or linear if within half an 8-bit code."""
     if space is not None and space.is_table:
         return PROFILE
     if space is None or not space.curves:
@@ -73,7 +73,7 @@ def _curve_of(space: ColourSpace | None) -> str:
 def to_linear(raster: Raster, transfer: str) -> np.ndarray:
     """Convert a raster to linear Rec.709.
 
-    Integer codes go through a table, so that each code has one exact value.
+    Integer codes are looked up in a table, so that each code has one exact value.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def _decoded(raster: Raster, transfer: str) -> np.ndarray:
     codes = np.arange(np.iinfo(raster.values.dtype).max + 1) / raster.peak
     tables = [curve(codes).astype(np.float32) for curve in curves]
     linear = np.empty(raster.values.shape, np.float32)
-    for block in row_blocks(linear.shape, pixels=_TOGETHER):
+    for block in row_blocks(linear.shape, pixels=_CHUNK):
         stored, light = raster.values[block.rows], linear[block.rows]
         if len(tables) == 1:
             np.take(tables[0], stored, out=light, mode="clip")
@@ -118,12 +118,12 @@ def curves_of(raster: Raster, transfer: str) -> tuple[Callable[[np.ndarray], np.
     ----------
     raster : Raster
     transfer : {"srgb", "linear", "profile"}
-        The table of a profile counts as sRGB.
+        Profiles with tables are treated as sRGB.
 
     Returns
     -------
     tuple of callable
-        One for all channels, or one a channel.
+        One for all channels, or one per channel.
     """
     if transfer == PROFILE and raster.space is not None and raster.space.curves:
         return raster.space.curves
@@ -131,9 +131,9 @@ def curves_of(raster: Raster, transfer: str) -> tuple[Callable[[np.ndarray], np.
 
 
 def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.ndarray) -> Raster:
-    """Encode an image as a raster is encoded, where it changed; other values keep every bit.
+    """Encode the changed pixels of an image like a raster; other values keep every bit.
 
-    A raster of a colour space that no PNG can carry becomes one of 16-bit sRGB.
+    A raster of a colour space that a PNG cannot represent becomes one of 16-bit sRGB.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.nd
 
 
 def _fits_png(raster: Raster, transfer: str, coloured: bool) -> bool:
-    """Whether a PNG can say what the codes mean: by their own profile, or as plain sRGB."""
+    """Whether a PNG can represent the codes: with their own profile, or as plain sRGB."""
     space = raster.space
     if space is None or (to_rec709(space) is None and transfer == _curve_of(space) == "srgb"):
         return True

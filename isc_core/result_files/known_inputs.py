@@ -9,7 +9,7 @@ from ..errors import InputError
 from ..imaging.resampling import nearest_samples
 from ..io.exr import read_channels
 from ..io.json_files import numbers, read_json
-from ..io.limits import USUAL, Limits
+from ..io.limits import DEFAULT_LIMITS, Limits
 from ..io.npy import read_array
 from ..io.regular_files import require_regular
 from ..photo import read_raster
@@ -22,7 +22,10 @@ _CHANNELS = ("height.Z", "Z", "Y", "height.Y")
 
 
 def read_height(
-    path: str | Path, shape: tuple[int, ...], scale: float | None = None, limits: Limits = USUAL
+    path: str | Path,
+    shape: tuple[int, ...],
+    scale: float | None = None,
+    limits: Limits = DEFAULT_LIMITS,
 ) -> np.ndarray:
     """Read a height map.
 

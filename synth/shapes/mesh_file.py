@@ -32,7 +32,7 @@ from scipy.sparse.csgraph import connected_components
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.decoders.jpeg import check_scans
-from isc_core.io.limits import USUAL
+from isc_core.io.limits import DEFAULT_LIMITS
 from isc_core.io.memory import is_exhausted, memory_error
 from isc_core.io.native_io import suppress_native_output
 from isc_core.io.regular_files import read_regular
@@ -270,7 +270,7 @@ def _check_claims(path: Path, data: bytes) -> None:
 def _is_image(data: bytes) -> bool:
     try:
         with suppress_native_output(), Image.open(io.BytesIO(data), formats=_PICTURES) as image:
-            USUAL.check_pixels("a texture", *image.size)
+            DEFAULT_LIMITS.check_pixels("a texture", *image.size)
             if image.format == "JPEG":
                 check_scans(data, "a texture")
             image.load()
@@ -329,7 +329,7 @@ def _texture(material: Any) -> np.ndarray | None:
     if image is not None:
         if image.format not in (None, *_PICTURES):  # images made by trimesh have no format
             raise ValueError("a texture of a kind that is not read")
-        USUAL.check_pixels("a texture", *image.size)
+        DEFAULT_LIMITS.check_pixels("a texture", *image.size)
     numbers = np.ones(3) if factor is None else np.asarray(factor)[:3]
     scale = numbers / (255 if numbers.dtype.kind in "iu" else 1)
     if image is None:

@@ -45,7 +45,7 @@ def imported(code: str) -> set[str]:
         "isc_core.cli.interface.options import add_triangles",
         "isc_core.decomposition import Settings",
         "isc_core.decomposition.settings import MODELS, Settings",
-        "isc_core.io.limits import USUAL, Limits",
+        "isc_core.io.limits import DEFAULT_LIMITS, Limits",
     ],
 )
 def test_the_names_that_options_show_need_no_numerical_library(names: str) -> None:

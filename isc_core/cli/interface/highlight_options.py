@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
+from ...photo.highlight_marks import HighlightMarks, Place, mark_radius
 from ...photo.photo import Photo
 from ...scene.decomposition import Decomposition
 from .options import add_pixels
@@ -76,7 +76,7 @@ def mark_notes(photo: Photo, result: Decomposition) -> list[str]:
     list of str
     """
     scale = result.mask.shape[1] / photo.mask.shape[1]
-    reach = mark_reach(result.mask)
+    reach = mark_radius(result.mask)
     return [
         f"no highlight was removed at {int(x)},{int(y)}: neither colour nor shape distinguishes it "
         "from paint"

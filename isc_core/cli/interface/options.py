@@ -10,7 +10,7 @@ from ...decomposition.settings import (
     SHAPE_PRIORS,
     Settings,
 )
-from ...io.limits import USUAL, Limits
+from ...io.limits import DEFAULT_LIMITS, Limits
 from ...photo import TRANSFERS
 from ...result_files.mesh.options import MeshOptions
 from ...separation import SUMMARIES
@@ -137,7 +137,7 @@ def add_limits(parser: argparse.ArgumentParser | Group) -> None:
     parser.add_argument(
         "--max-pixels",
         type=whole,
-        default=USUAL.max_pixels,
+        default=DEFAULT_LIMITS.max_pixels,
         metavar="N",
         help="refuse images with more pixels (width x height) before decoding them "
         "(default %(default)s)",

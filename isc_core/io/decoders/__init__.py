@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 
 from ...errors import InputError
-from ..limits import USUAL, Limits
+from ..limits import DEFAULT_LIMITS, Limits
 from ..memory import READING, is_available, is_exhausted, memory_error
 from ..native_io import suppress_native_output
 from ..regular_files import read_regular
@@ -77,7 +77,7 @@ class _RecordingLimits(Limits):
         self.sizes.append((width, height))
 
 
-def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
+def read_raster(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Raster:
     """Read the values that an image file stores, upright.
 
     Parameters

@@ -37,7 +37,7 @@ from scipy import ndimage
 
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
-from ...photo.highlight_marks import HighlightMarks, Place, mark_reach
+from ...photo.highlight_marks import HighlightMarks, Place, mark_radius
 
 _FAINT = 0.01  # of the bright pixels: less removed light joins no regions
 _DARK = 0.02  # of the bright pixels: added to what a chroma is divided by
@@ -243,7 +243,7 @@ def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np
     if not places or not labels.any():
         return found
     distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
-    reach = mark_reach(mask)
+    reach = mark_radius(mask)
     for x, y in places:
         at = (min(int(y), labels.shape[0] - 1), min(int(x), labels.shape[1] - 1))
         if distance[at] <= reach:

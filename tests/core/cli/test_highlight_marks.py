@@ -11,7 +11,7 @@ import isc_core
 from isc_core.cli.interface.highlight_options import mark_notes
 from isc_core.cli.main import main
 from isc_core.decomposition.settings import Settings
-from isc_core.photo.highlight_marks import HighlightMarks, mark_reach
+from isc_core.photo.highlight_marks import HighlightMarks, mark_radius
 from isc_core.photo.reading import read_photo
 from tests.core.command_line import ball_codes, ball_photo, write_image
 
@@ -45,7 +45,7 @@ def test_the_note_looks_as_far_as_the_mark_reaches(
     result = isc_core.decompose(photo.image, photo.mask, settings=Settings(model="naive"))
     specular = np.zeros_like(result.specular)
     specular[30, 30] = 1
-    x = 30.5 + mark_reach(result.mask) + further
+    x = 30.5 + mark_radius(result.mask) + further
     marked = replace(photo, marks=HighlightMarks(((x, 30.5),)))
     assert bool(mark_notes(marked, replace(result, specular=specular))) is noted
 

@@ -10,9 +10,9 @@ def test_a_component_has_colours_of_one_cluster() -> None:
     rng = np.random.default_rng(0)
     kind = rng.integers(2, size=2000)
     centres = np.array([[30, 60, 90], [200, 140, 40]])
-    owners = split_colours(centres[kind] + rng.normal(0, 3, (2000, 3)))
-    assert len(set(owners)) == COMPONENTS
-    assert len(set(zip(owners, kind, strict=True))) == COMPONENTS
+    assignments = split_colours(centres[kind] + rng.normal(0, 3, (2000, 3)))
+    assert len(set(assignments)) == COMPONENTS
+    assert len(set(zip(assignments, kind, strict=True))) == COMPONENTS
 
 
 def test_the_density_is_that_of_the_colours() -> None:

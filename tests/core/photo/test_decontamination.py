@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isc_core.photo.decontamination import without_background
+from isc_core.photo.decontamination import estimate_foreground
 
 
 def composite(side: int = 60) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -19,14 +19,14 @@ def test_the_rim_gets_the_objects_colours() -> None:
     image, cover, front = composite()
     rim = (cover >= 0.5) & (cover < 1)
     before = np.abs(image - front)[rim].mean()
-    after = np.abs(without_background(image, cover) - front)[rim].mean()
+    after = np.abs(estimate_foreground(image, cover) - front)[rim].mean()
     assert after < 0.25 * before
 
 
 def test_everything_else_stays_as_it_is() -> None:
     image, cover, _ = composite()
-    found = without_background(image, cover)
+    found = estimate_foreground(image, cover)
     others = (cover < 0.5) | (cover == 1)
     assert np.array_equal(found[others], image[others]) and (found >= 0).all()
     hard = (cover >= 0.5).astype(np.float32)
-    assert without_background(image, hard) is image
+    assert estimate_foreground(image, hard) is image

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.imaging.area_resize import AreaFilter, resize_apart
+from isc_core.imaging.area_resize import AreaFilter, resize_separately
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.imaging.upsampling import enlarged
 from isc_core.photo import Photo
@@ -42,7 +42,7 @@ def scene(center: tuple[float, float] = (150.0, 221.0), long_side: int = 75) -> 
     small = photo.resized_to_object(long_side)
     area = AreaFilter.of(truth.mask.shape, small.scale)
     layers = {
-        name: resize_apart(getattr(truth, name), truth.mask, small.mask, area)
+        name: resize_separately(getattr(truth, name), truth.mask, small.mask, area)
         * small.mask[..., None]
         for name in COLOR_MAPS
     }
@@ -67,7 +67,7 @@ def test_its_averages_are_the_base_colour_of_the_maps(center: tuple[float, float
     height, width = photo.mask.shape
     texture = texture_of(photo, d)
     area = AreaFilter.of(photo.mask.shape, d.provenance.input["scale"])
-    averages = resize_apart(texture[:height, :width], photo.mask, d.mask, area)[d.mask]
+    averages = resize_separately(texture[:height, :width], photo.mask, d.mask, area)[d.mask]
     wanted = np.clip(maps_color(d)[0], 0, 1)[d.mask]
     error = np.abs(averages - wanted) / wanted.mean()
     assert error.mean() < 0.01 and np.percentile(error, 95) < 0.03
