@@ -124,7 +124,7 @@ def require_object(system: Any, path: str, remedy: str) -> None:
     system : fsspec.AbstractFileSystem
     path : str
     remedy : str
-        Ends the error message.
+        End of the error message.
 
     Raises
     ------

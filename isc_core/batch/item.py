@@ -212,7 +212,7 @@ def parse_options(given: Mapping[str, object], where: str) -> Options:
     given : mapping
         Text is converted to the option's type.
     where : str
-        Opens the error message.
+        Prefix of the error message.
 
     Returns
     -------

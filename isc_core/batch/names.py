@@ -72,7 +72,7 @@ def check_given(name: str, where: str) -> str:
     ----------
     name : str
     where : str
-        Opens the error message.
+        Prefix of the error message.
 
     Returns
     -------

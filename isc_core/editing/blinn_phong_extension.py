@@ -1,16 +1,16 @@
-"""The Blinn-Phong extension: sharper, rougher or metallic gloss.
+"""The Blinn-Phong extension: sharper, broader or metallic highlights.
 
 Equations. Remapping needs no shape: under one light the specular layer is s = w c^p, so that an
-exponent q turns it, pixel by pixel, into
+exponent q changes it, pixel by pixel, into
 
     s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),
 
 with m the pixel's largest channel, w the layer's white, the usual energy-preserving factor and a
-gain g. For a wider lobe, q < p, m / w counts as at least a quarter, or the edge at which the
-separated layer ends would be lifted with it. Rendering draws the lobe anew on the recovered shape
-under the light that best explains the layer. Metal has no diffuse colour of its own: of the share M
-of metal the diffuse light vanishes, the highlight takes the colour of the reflectance, and the
-environment is mirrored in that colour:
+gain g. For a wider lobe, q < p, m / w is clamped to at least a quarter, because otherwise the edge
+of the separated layer would be amplified, too. Rendering renders a new lobe on the recovered shape
+under the light that best explains the layer. Metals have no diffuse reflection: for the share M of
+metal the diffuse light vanishes, the highlight takes the colour of the reflectance, and the
+environment is reflected in that colour:
 
     diffuse' = (1 - M) diffuse,
     specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w) max(0, n . w).
@@ -18,8 +18,8 @@ environment is mirrored in that colour:
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (Blinn-Phong extension); for
 metals, R. L. Cook, K. E. Torrance 1982, doi:10.1145/357290.357293.
 
-Limits: remapping cannot spread a highlight beyond the pixels that show some of it, so a much
-rougher look needs rendering. The mirrored environment is the one recovered from the smooth shading.
+Limits: remapping cannot spread a highlight beyond its present pixels, so a much rougher surface
+needs rendering. The reflected environment is the one recovered from the smooth shading.
 """
 
 from dataclasses import dataclass, replace
@@ -41,7 +41,7 @@ METHODS = ("remap", "render")
 _ENVIRONMENT_ROWS = 16
 # of the brightest: below, a separation recovers a shrinking share of a highlight, ending in an edge
 _RECOVERED = 0.25
-_CENTRE = 99.9  # percentile: the lobe's centre, robust to a few wrong pixels
+_CENTRE = 99.9  # percentile: the lobe's centre, robust to a few outliers
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     d : Decomposition
     gloss : Gloss
     light : DirectionalLight, optional
-        To render under; by default the one that best explains the specular layer.
+        The light to render with; by default the one that best explains the specular layer.
 
     Returns
     -------

@@ -3,9 +3,9 @@
 Equation: k-means over (a / L, b / L, L / 5) in Oklab of the reflectance in the light's mean colour,
 with brightness scaled so that its 99.5th percentile is white. The ratios are invariant where
 shading was taken for reflectance, which scales L, a and b alike. Initial centres: each next centre
-is the one of a few random pixels that lowers the total distance most (greedy k-means++), with a
-seed of its own; then alternating means; then centres that are nearly indistinguishable to the eye
-are merged. Clusters are numbered by size, the largest first.
+is the one of a few random pixels that lowers the total distance most (greedy k-means++, seeded);
+then Lloyd's iterations; then centres of nearly indistinguishable colours are merged. Clusters are
+numbered by size, the largest first.
 
 Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++",
 SODA 2007, doi:10.5555/1283383.1283494.
@@ -52,9 +52,10 @@ class Clusters:
     reflectance: np.ndarray
 
     def weight(self, number: int) -> np.ndarray:
-        """Return how much each pixel belongs to a cluster.
+        """Return the soft membership of each pixel in a cluster.
 
-        Along its outline pixels are mixtures of two reflectances; their colour gives the share.
+        Pixels along its outline are mixtures of two reflectances; their colour gives the
+        membership.
 
         Parameters
         ----------

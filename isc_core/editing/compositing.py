@@ -1,22 +1,22 @@
 """Transferring an edit to the photo at its full size.
 
-Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels
-outside the object must not change.
+Problem: the maps may be smaller than the photo, but the edited picture should keep the photo's
+detail; pixels outside the object must not change.
 
 Equation: the transferred quantity is the CHANGE, e = image' - image. Around each pixel k of the
 maps it is modelled as an affine function of the photo's colour I, e ~ A_k^T I + b_k (see
-`imaging.guided_filter`). Where the window's colours are uninformative A falls back to the change as
-a factor of each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the
-contrast of its new light. A and b, which are smooth, are upsampled and applied to the full photo;
-the remainder of e is upsampled as it is. So a removed highlight or a changed reflectance ends at
-the photo's own edges. At the photo's own size e is added as it is.
+`imaging.guided_filter`). Where the window's colours are uninformative, A falls back to the change
+as a factor of each channel, mean_k e / mean_k I, at most 1, so that texture finer than the maps
+gets the contrast of its new light. A and b, which are smooth, are upsampled and applied to the full
+photo; the remainder of e is upsampled directly. So a removed highlight or a changed reflectance
+ends at the photo's own edges. At the photo's own size e is added directly.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013,
 doi:10.1109/TPAMI.2012.213; upsampling the coefficients: K. He, J. Sun, "Fast guided filter" (2015),
 arXiv:1505.00996.
 
-Limits: detail that the maps do not hold changes only with its colour. Where the photo is clipped,
-so is the edit.
+Limits: detail that the maps do not resolve changes only with its colour. Where the photo is
+clipped, so is the edit.
 """
 
 import numpy as np
@@ -55,7 +55,7 @@ def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray,
     Raises
     ------
     InputError
-        If photo, mask and result do not fit.
+        If photo, mask and result do not match.
     """
     scale = scale_of(d, photo)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)

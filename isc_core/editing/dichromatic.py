@@ -1,4 +1,4 @@
-"""Dichromatic editing: the diffuse and the specular layer, edited separately (thesis, figure 4.50).
+"""Dichromatic editing: separate edits of the diffuse and specular layers (thesis, figure 4.50).
 
 Equation, for a layer l with white w (its 99.5th percentile), m its largest channel, G a Gaussian
 average inside the mask: sharpened u = max(0, l + amount (l - G l)); then l' = gain u (m(u) /

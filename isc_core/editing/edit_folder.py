@@ -1,13 +1,13 @@
 """The files of an edit: the picture, in the photo's own encoding, and a contact sheet.
 
 `edit.json` records the parameters and measurements; `edited.png` has the photo's bit depth,
-encoding, colour profile and alpha (none for a photo of floats; sRGB of 16 bits where a PNG cannot
-carry the encoding, such as camera raw); `edited.exr` is the same picture in linear light,
+encoding, colour profile and alpha (none for a photo of floats; 16-bit sRGB where a PNG cannot
+represent the encoding, such as camera raw); `edited.exr` is the same picture in linear light,
 premultiplied by alpha; `before_after.png` is the contact sheet; `clusters.png`, of recolouring,
 shows the clusters to choose from. A folder appears completely or not at all.
 
-Limits: of a float photo with partly transparent pixels those outside the mask are kept bit by bit
-only where its file is an EXR with plain R, G, B; else to the rounding of the product with alpha.
+Limits: pixels outside the mask of a float photo with partly transparent pixels are bit-identical
+only if its file is an EXR with plain R, G, B; else they are rounded by the product with alpha.
 """
 
 import json
@@ -46,7 +46,7 @@ class Original:
     photo : Photo
         Its light and mask at full size.
     raster : Raster
-        The values of its file.
+        The values in its file.
     path : Path or None
         The file.
     """
@@ -169,8 +169,8 @@ def save_edit(
 def _linear_planes(
     image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None
 ) -> dict[str, np.ndarray]:
-    """R, G, B times alpha, and A; outside the mask the values of the photo's EXR file, which that
-    product could round.
+    """R, G, B times alpha, and A; outside the mask, the values of the photo's EXR file, which the
+    product might round.
     """
     alpha = raster.alpha
     cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
@@ -189,7 +189,7 @@ def _linear_planes(
 
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
-    """Draw the clusters: for each, the reflectance with all others faded, under its number.
+    """Draw the clusters: for each, the reflectance with all others faded, labelled with its number.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ def _picture(
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
     if transfer == PROFILE or given.get("colour_profile") == CAMERA_RAW:
-        transfer = "srgb"  # a PNG cannot carry the photo's encoding
+        transfer = "srgb"  # a PNG cannot represent the photo's encoding
     peak = None if bits == 32 else 65535 if bits > 8 else 255
     kind = np.float32 if peak is None else np.uint16 if bits > 8 else np.uint8
     empty = Raster(

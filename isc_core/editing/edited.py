@@ -2,14 +2,14 @@
 
 Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' +
 residual' where the residual is not negative; it belongs to a highlight and follows it, residual' =
-residual min(1, specular' / specular). A negative residual is what the sensor clipped of L: there
-the picture stays clipped at the photo's value while the light is sufficient, and a stronger light
-raises it equally (Y: luminance),
+residual min(1, specular' / specular). A negative residual is the part of L that the sensor clipped:
+there the picture stays clipped at the photo's value while the light is sufficient, and a stronger
+light raises it in proportion (Y: luminance),
 
     image' = min(L', image max(1, Y(L') / Y(L))).
 
-A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the rounded sum
-would not.
+A pixel whose layers are unchanged keeps the photo's own value exactly, without the rounding of the
+sum.
 """
 
 from dataclasses import dataclass
@@ -78,8 +78,8 @@ def edited(
 def light_color(d: Decomposition) -> np.ndarray:
     """Return the mean colour of the light on the object, of luminance 1.
 
-    One photo leaves open how much of a tint is light and how much is reflectance. `reflectance *
-    light_color` is the colour that the photo shows, and the one that users choose.
+    One photo cannot determine how much of a tint is light and how much is reflectance. `reflectance
+    * light_color` is the colour in the photo, which users expect to edit.
 
     Parameters
     ----------

@@ -1,12 +1,12 @@
-"""New highlights: a lobe on the recovered shape, under a chosen light.
+"""New highlights: a specular lobe rendered on the recovered shape under a chosen light.
 
 Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), with the lobe f of
 `shading.lobe_rendering.Lobe` and k by `lobes.strength_of`.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (rendering highlights).
 
-Limits: the recovered shape is smooth where the texture is busy; so is the highlight. It is clipped
-where the picture is.
+Limits: where texture is strong, the recovered shape is smooth, and so is the highlight. It is
+clipped where the picture is.
 """
 
 from dataclasses import replace
@@ -30,13 +30,13 @@ def add_highlight(
     level: float | None = None,
     replacing: bool = False,
 ) -> Edited:
-    """Return the scene with a highlight, added to the specular layer or in its place.
+    """Return the scene with a highlight that is added to the specular layer or replaces it.
 
     Parameters
     ----------
     d : Decomposition
     light : DirectionalLight
-        Its direction and colour count.
+        Only its direction and colour are used.
     lobe : Lobe, optional
         By default the fitted one, or a standard one.
     level : float, optional

@@ -1,8 +1,8 @@
-"""The lobe of an edit, and its strength relative to the photo.
+"""The specular lobe of an edit, and its strength relative to the photo.
 
-Strength: the photo's unit is unknown, so the strength is given relative to the photo (`level`: the
-brightness of the lobe's centre at exponent 60, in units of the photo's white; other exponents keep
-the energy), or such that the energy of the present specular layer is kept.
+Strength: the radiometric scale of the photo is unknown, so the strength is relative to the photo
+(`level`: the brightness of the lobe's centre at exponent 60, in units of the photo's white; other
+exponents preserve the energy), or preserves the energy of the present specular layer.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
 doi:10.2312/EGWR/EGSR07/195-206 (see `shading.brdf`).
@@ -23,7 +23,7 @@ _MAX_CENTRE = 2.0  # of the photo's white: limit of a lobe's centre when its ene
 
 
 def known_lobe(d: Decomposition) -> Lobe | None:
-    """Return the lobe fitted to the photo, or the widest possible one where only a bound is known.
+    """Return the lobe fitted to the photo, or the widest one where only an upper bound is known.
 
     Parameters
     ----------
@@ -55,9 +55,9 @@ def strength_of(d: Decomposition, lobe: Lobe, unscaled: np.ndarray, level: float
     unscaled : (H, W, 3) ndarray
         The lobe of strength 1, rendered under a light of irradiance 1 across its beam.
     level : float or None
-        Brightness relative to the photo's white, in [0, 1e6]; None keeps the energy of the present
-        specular layer, as long as the lobe's centre is not brighter than twice the white, and is 1
-        where there is none.
+        Brightness relative to the photo's white, in [0, 1e6]. None preserves the energy of the
+        present specular layer, with the lobe's centre limited to twice the white; without specular
+        light it is 1.
 
     Returns
     -------
@@ -79,5 +79,5 @@ def strength_of(d: Decomposition, lobe: Lobe, unscaled: np.ndarray, level: float
 
 
 def _centre(lobe: Lobe) -> float:
-    """The radiance of the lobe's centre, light and view along the normal, irradiance 1."""
+    """The radiance at the lobe's centre: light and view along the normal, irradiance 1."""
     return float(radiance(lobe.model, VIEW, VIEW, directional(VIEW, 1.0))[0])

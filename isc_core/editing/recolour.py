@@ -1,16 +1,16 @@
-"""Recolouring: another reflectance under the same light and the same gloss (thesis, figure 4.51).
+"""Recolouring: new reflectance under the same light and gloss (thesis, figure 4.51).
 
 Equation, for a colour r, the reflectance times the light's mean colour, with luminance Y(r), in
 Oklab (L, a, b) with hue h and chroma C: h' = h + shift, C' = saturation C; or, for a target colour,
-the target's hue and the chroma C_target L / L_target, which is the target in more or less light.
-Back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading stay. A colour
-that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 -
-w) r + w r') shading, with w the region's weight; the specular layer does not change.
+the target's hue and the chroma C_target L / L_target, which is the target in more or less light. In
+linear light the result is scaled to Y(r') = value Y(r), so that texture and shading are preserved.
+A colour outside the gamut at that luminance is desaturated just until it is inside. diffuse' = ((1
+- w) r + w r') shading, with w the region's weight; the specular layer does not change.
 
 Citation: B. Ottosson 2020 (Oklab, see `chroma`); H. Akbar 2016 (recolouring).
 
-Limits: highlights that the separation left in the diffuse layer are recoloured too. Black and pure
-white take hardly any colour.
+Limits: highlights that remain in the diffuse layer are recoloured, too. Black and pure white can
+hardly be coloured.
 """
 
 from dataclasses import dataclass
@@ -36,9 +36,9 @@ class ColourEdit:
     saturation, value : float
         Factors of chroma and luminance, not negative.
     target : (3,) ndarray or None
-        Linear colour in [0, 1] that the reflectance takes first.
+        Linear colour in [0, 1]; hue, saturation and value are applied to it.
     target_luminance : bool
-        Match the mean luminance of the target, too.
+        Whether to match the mean luminance of the target, too.
     """
 
     hue: float = 0.0
@@ -70,7 +70,7 @@ class ColourEdit:
 
 
 def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = None) -> Edited:
-    """Return the scene with another reflectance.
+    """Return the scene with a changed reflectance.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = N
     Raises
     ------
     InputError
-        If the region has another size or covers nothing of the object.
+        If the region has another size or does not overlap the object.
     """
     if region is not None and region.shape != d.mask.shape:
         raise InputError(
@@ -121,9 +121,9 @@ def change_colours(
         Linear, not negative.
     change : ColourEdit
     white : float
-        Brightest value a colour may take.
+        Largest value of a colour.
     weight : (N, 1) ndarray
-        Of each colour in the mean.
+        Weight of each colour in the mean.
 
     Returns
     -------
@@ -154,8 +154,8 @@ def change_colours(
 
 
 def _max_level(d: Decomposition, tint: np.ndarray) -> float:
-    """Largest value of a new colour: the object's brightest, or the one that reaches the photo's
-    white in the object's brightest light.
+    """Largest value of a new colour: the object's brightest, or that which is the photo's white in
+    the object's brightest light.
     """
     float_photo = d.provenance.input.get("bit_depth", 8) == 32
     white = white_of(d.image, d.mask) if float_photo else 1.0

@@ -1,8 +1,8 @@
-"""Relighting: the object under the recovered light rotated, or under another light.
+"""Relighting: the object under the rotated recovered light, or under another light.
 
 Equation: diffuse' = reflectance S'(n), with S' by the new light: exp(sum_k L'_k Y_k(n)), one
 distant light with an ambient term, or the irradiance of an environment map (see
-`shading.environment_map`). Highlights follow one of these modes:
+`shading.environment_map`). Highlights have one of these modes:
 
     keep     they stay as they are;
     scale    they follow their pixel's shading, specular' = specular S' / S, at most fourfold;
@@ -10,17 +10,17 @@ distant light with an ambient term, or the irradiance of an environment map (see
     render   a lobe is rendered under the new light, with the strength under which it has the
              present layer's energy in the present light.
 
-The present light that a lobe is rendered in is the distant light that best explains the specular
-layer, or else that of the fit, since the recovered one is too smooth for highlights; without
-either, the recovered one. A rotated light takes it along. By default ("auto") a rotation fades from
-the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle by which this
-light moves: the smallest rotation changes least, and a highlight far from its place is all
-rendered.
+A lobe under the present light is rendered with the distant light that best explains the specular
+layer, or else with that of the fit, since the recovered light is too smooth for highlights; without
+either, with the recovered light. This light rotates with a rotated light. By default ("auto") a
+rotation fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the
+angle by which this light moves: small rotations cause small changes, and a highlight far from its
+original position is entirely rendered.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; H. Akbar 2016 (relighting).
 
-Limits: no cast shadows, old or new: those of the photo stay in the reflectance. No normal saw light
-from behind the object.
+Limits: no cast shadows, old or new: those of the photo remain in the reflectance. Light from behind
+the object is unobserved.
 """
 
 from dataclasses import dataclass, replace
@@ -42,8 +42,8 @@ from .lobes import known_lobe, strength_of
 HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
 _MAX_SCALE = 4.0  # largest factor by which scaling brightens a highlight
 _ROWS = 32  # of environment maps for diffuse shading
-_LOBE_ROWS = 16  # of environment maps for lobes, where every sample is costly
-_FADE = 10.0  # degrees of a light's motion over which highlights change from kept to rendered
+_LOBE_ROWS = 16  # of environment maps for lobes, where each sample is expensive
+_FADE = 10.0  # degrees of a light's rotation over which highlights change from kept to rendered
 
 
 @dataclass(frozen=True)
@@ -146,12 +146,12 @@ class Relighting:
     highlights : str
         One of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise.
     lobe : Lobe or None
-        To render; None for the fitted one.
+        The lobe to render; None for the fitted one.
     exposure : float
         Factor of the new light, greater than 0.
     balanced : bool
-        Give the new light's white the present light's mean colour, and its mean brightness over the
-        object: for lights whose unit is not the photo's.
+        Whether to scale the new light to the mean colour of the present light, and to its mean
+        brightness over the object: for lights whose unit is not the photo's.
     """
 
     highlights: str = "auto"
@@ -278,8 +278,8 @@ def _highlights(
 
 
 def _dominant_light(d: Decomposition) -> DirectionalLight | None:
-    """The light that causes the highlights, with luminance 1 perpendicular to its beam; None if it
-    is unknown.
+    """The light that causes the highlights, with luminance 1 perpendicular to its direction; None
+    if unknown.
     """
     fit = explain_specular(d)
     lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
@@ -301,7 +301,7 @@ def _as_map(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def _kept_share(before: np.ndarray, after: np.ndarray) -> float:
-    """The share of the present highlights to keep when their light moves from one unit vector to
+    """The share of the present highlights to keep when their light moves from one direction to
     another.
     """
     # From the chord, which is accurate for small angles.

@@ -1,4 +1,4 @@
-"""Spheres under a light: a picture of the light (thesis, figure 4.49).
+"""Rendered spheres that visualise a light (thesis, figure 4.49).
 
 Equation: a white diffuse sphere of radius 1 has the normal (x, y, sqrt(1 - x^2 - y^2)); its
 radiance is the light's shading of that normal, plus that of a lobe if one is given.
@@ -11,7 +11,7 @@ from ..shading.lights import DirectionalLight
 
 
 def sphere_normals(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normals of a sphere that fills 90 % of a square picture, and its coverage.
+    """Return the normals and coverage of a sphere that fills 90 % of a square picture.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def sphere_normals(size: int) -> tuple[np.ndarray, np.ndarray]:
     distance = np.hypot(x, y)
     shrink = np.minimum(
         1, 1 / np.maximum(distance, 1e-9)
-    )  # outside the outline: its normal, for the pixels that it crosses
+    )  # outside the outline: the normal at the outline, for partly covered pixels
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
     return normal, np.clip((1 - distance) * radius + 0.5, 0, 1)
 

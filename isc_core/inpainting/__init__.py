@@ -1,1 +1,1 @@
-"""Filling holes of an image: smoothly (pull-push), or with matched patches."""
+"""Inpainting: smooth (pull-push), or with matched patches."""

@@ -1,8 +1,8 @@
 # mypy: disable-error-code="no-untyped-def"
 """Nearest patches by hashing and coherence (Korman & Avidan 2011).
 
-Problem: for each target patch the source patch with the smallest Euclidean distance. Comparing all
-pairs is exact and takes minutes to hours; hashing alone misses many neighbours; images are
+Problem: find for each target patch the source patch with the smallest Euclidean distance. Comparing
+all pairs is exact and takes minutes to hours; hashing alone misses many neighbours; images are
 coherent, so that the neighbour of a good match is often a good match.
 
 Equation: each table hashes a patch v by the bins floor((a_j . v + b_j) / r) of its strongest
@@ -10,15 +10,15 @@ Walsh-Hadamard coefficients a_j . v, with random offsets b_j. Candidates of a ta
 source patches in its bin, (2) the matches of target patches in its bin, (3) the matches of its two
 neighbours visited before, moved by one pixel, and (4) source patches in the bin of those. A
 candidate is dropped as soon as the distance of its projections, a lower bound, exceeds the best
-distance; the others are compared in full. Tables follow each other, each with a new offset, another
-width r and the opposite scan direction.
+distance; the others are compared in full. Each table has a new offset, another width r and the
+opposite scan direction to the one before.
 
 Citation: S. Korman and S. Avidan, "Coherency sensitive hashing", ICCV 2011, 1607-1614,
 doi:10.1109/ICCV.2011.6126421; IEEE TPAMI 38(6), 1099-1112 (2016), doi:10.1109/TPAMI.2015.2477814.
-Ours: widths from the data, and distances that are exact in the end.
+Changes: widths from the data, and exact final distances.
 
 Limits: approximate; patches are 8 x 8 pixels, neither rotated nor scaled. A patch without a similar
-one gets some source patch, with a large distance.
+one is matched to an arbitrary one, with a large distance.
 """
 
 from dataclasses import dataclass
@@ -43,13 +43,13 @@ class CshOptions:
     tables : int
         Number of hash tables, at least 1; more find better matches.
     projections : int
-        Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C channels).
+        Walsh-Hadamard coefficients kept per patch, 1 to 64 C (8 pixels squared, C channels).
     hashed : int
-        How many of them, the strongest, enter a hash, 1 to `projections`.
+        Number of the strongest of them that are hashed, 1 to `projections`.
     candidates : int
-        Patches of one bin that are tried, at least 1.
+        Patches tried per bin, at least 1.
     occupancy : float
-        Median number of source patches in a patch's bin where bins are narrowest, greater than 0.
+        Median number of source patches in a patch's bin for the narrowest bins, greater than 0.
     seed : int
         Of the random offsets, not negative; the same seed gives the same matches.
     threads : int
@@ -186,7 +186,7 @@ class CshSearch:
         Parameters
         ----------
         target : Patches
-            Of an image with as many channels as the sources'.
+            Patches of an image with as many channels as the sources'.
         start : (n,) int ndarray, optional
             Initial matches; no match gets worse. Random by default.
         monitor : Monitor, optional
@@ -274,11 +274,11 @@ class _Hashed(NamedTuple):
 
 # Types, see `numerics.kernel_types`.
 _HASHED = "_Hashed(f4[3] i8[1:] i8[1:] i4[2] f4[2] i4[1] i4[1] i4[1])"
-# Number of parts in which target patches are swept, independent of the threads, so that the result
-# is too.
+# Number of parts in which target patches are swept; independent of the number of threads, so that
+# the result is, too.
 _PARTS = 16
-# Factors of the bin width: wide bins give rare patches candidates, narrow ones common patches their
-# best.
+# Factors of the bin width: wide bins give candidates to rare patches, narrow ones the best to
+# common patches.
 _WIDTHS = (8.0, 4.0, 2.0, 16.0, 1.0)
 
 
@@ -304,7 +304,7 @@ def _check(options: CshOptions, source: Patches) -> None:
 
 def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
     """The width at which the median patch, with projections `values` (n, k), shares its bin with
-    `occupancy` patches, to about a tenth.
+    `occupancy` patches, within about a tenth.
     """
     spread = max(float(np.ptp(values, axis=0).max()), 1e-30)
     low, high = float(np.log(1e-4 * spread)), float(np.log(2 * spread))
@@ -371,8 +371,8 @@ def _sort_into(bins, starts, members):
 def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
     """One pass over the target patches [low, high).
 
-    Matches of other patches are read from `before`, the state at the start: other threads change
-    them.
+    Matches outside that range are read from `before`, a copy of the state at the start, because
+    other threads change them.
     """
     step = 1 if forward else -1
     tried = np.empty(4 * candidates + 4, np.int32)
@@ -427,8 +427,8 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
 
 @jit
 def _propagated(source, target, match, before, low, high, i, down, right):
-    """The source patch that continues the match of target patch i's neighbour, (down, right) before
-    it; -1 where there is none.
+    """The source patch propagated from the match of target patch i's neighbour at -(down, right);
+    -1 without one.
     """
     row, column = target.rows[i] - down, target.columns[i] - right
     if row < 0 or column < 0 or row >= target.places.shape[0] or column >= target.places.shape[1]:

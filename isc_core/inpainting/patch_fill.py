@@ -1,19 +1,20 @@
-"""Filling holes with texture from the rest of the image (Wexler, Shechtman & Irani 2007).
+"""Inpainting with texture from the rest of the image (Wexler, Shechtman & Irani 2007).
 
-Problem: pixels whose values are missing, in an image with texture: every patch that touches the
-hole should look like some patch outside it.
+Problem: fill missing pixels of a textured image such that every patch that touches the hole
+resembles some patch outside it.
 
 Equation: alternate until convergence: each patch p that touches the hole finds its nearest source
 patch (`coherency_sensitive_hashing`), at squared distance d_p; each missing pixel becomes the mean
 of its votes, with weights g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the distances, e_p
-the depth of the patch's centre in the hole, g = 1.3 (`voting`). A pyramid starts this where the
-hole is small; its top is filled smoothly (`pull_push`), and each level starts from the one above.
+the depth of the patch's centre in the hole, g = 1.3 (`voting`). A pyramid begins at a level where
+the hole is small; its top is filled smoothly (`pull_push`), and each level is initialised from the
+one above.
 
 Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3),
 463-476 (2007), doi:10.1109/TPAMI.2007.60.
 
-Limits: the fill is plausible, not true. Patches of 8 x 8 pixels are copied without change of
-brightness, so that a shading that occurs nowhere else is not continued. Where no source patch
+Limits: the fill is plausible, not the truth. Patches of 8 x 8 pixels are copied without change of
+brightness, so that a shading that occurs nowhere else is not extrapolated. Where no source patch
 exists, the fill is smooth.
 """
 
@@ -36,7 +37,7 @@ from .pull_push import fill, pull, push
 from .voting import vote
 from .walsh_hadamard import PATCH
 
-# Factor by which a vote's weight falls per pixel of its patch's depth in the hole.
+# Factor by which a vote's weight decreases per pixel of its patch's depth in the hole.
 _DEPTH_LOSS = 1.3
 
 
@@ -49,9 +50,9 @@ class PatchFillOptions:
     iterations : int
         Matching and voting on the finest level, at least 1; each coarser level has one more.
     most_iterations : int
-        The limit of that, at least `iterations`.
+        Upper limit on any level, at least `iterations`.
     matching : CshOptions
-        Its seed decides everything that is random.
+        Its seed determines all random choices.
     """
 
     iterations: int = 2
@@ -79,7 +80,7 @@ def fill_patches(
     Returns
     -------
     (H, W, C) float32 ndarray
-        Known pixels stay; the others hold a guess.
+        Known pixels are unchanged; all others are estimates.
 
     Raises
     ------
@@ -108,7 +109,7 @@ def _filled(
     level: int,
     monitor: Monitor,
 ) -> np.ndarray:
-    """One level of the pyramid, 0 the finest, after those above it."""
+    """One level of the pyramid, 0 the finest, after the coarser ones."""
     if not wanted.any() or min(known.shape) < 2 * PATCH:
         return fill(values, known)
     smaller, share = pull(values, known.astype(np.float32))
@@ -119,7 +120,7 @@ def _filled(
     if not len(source):
         return current
     search = CshSearch(source, options.matching)
-    near = mask_slices(wanted, PATCH - 1)  # all patches with a wanted pixel lie there
+    near = mask_slices(wanted, PATCH - 1)  # contains all patches with a wanted pixel
     depth = ndimage.distance_transform_edt(~known)[near]
     filled, unknown = current[near], ~known[near]
     count = min(options.iterations + level, options.most_iterations)
@@ -135,15 +136,15 @@ def _filled(
 
 
 def _any_of_four(flags: np.ndarray) -> np.ndarray:
-    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column forms
-    blocks of its own.
+    """Which 2 x 2 blocks of `flags` (H, W) bool have a set pixel; an odd last row or column forms
+    separate blocks.
     """
     padded = np.pad(flags, [(0, n % 2) for n in flags.shape])
     return padded[::2, ::2] | padded[1::2, ::2] | padded[::2, 1::2] | padded[1::2, 1::2]
 
 
 def _depth_penalty(target: Patches, depth: np.ndarray) -> np.ndarray:
-    """Loss of the votes of `target` patches (see `voting`): the `depth` (H, W) of their centres in
-    the hole, in pixels, times log g.
+    """Penalty of the votes of `target` patches (see `voting`): the `depth` (H, W) of their centres
+    in the hole, in pixels, times log g.
     """
     return np.log(_DEPTH_LOSS) * depth[target.rows + PATCH // 2, target.columns + PATCH // 2]

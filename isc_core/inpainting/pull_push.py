@@ -1,15 +1,14 @@
 """Smooth interpolation of unknown pixels by pull-push (Gortler et al. 1996).
 
-Problem: values known at some pixels are wanted at all of them.
+Problem: interpolate values known at some pixels to all of them.
 
-Equation: known pixels are averaged over 2 x 2 blocks down a pyramid (pull); from the top, holes
-take the bilinear interpolation of the finest level that is known (push). It is linear in the
-pixels.
+Equation: known pixels are averaged over 2 x 2 blocks down a pyramid (pull); from the top, holes are
+filled by bilinear interpolation of the finest known level (push). The time is linear in the pixels.
 
 Citation: S. J. Gortler, R. Grzeszczuk, R. Szeliski and M. F. Cohen, "The Lumigraph", SIGGRAPH 1996,
 43-54, doi:10.1145/237170.237200.
 
-Limits: texture does not continue into a hole; the fill is smooth.
+Limits: the fill is smooth, without texture.
 """
 
 import numpy as np
@@ -49,7 +48,7 @@ def fill_at(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.nda
     Returns
     -------
     (n, C) float32 ndarray
-        What `fill` gives there.
+        The values of `fill` at these pixels.
     """
     parts = []
     for block in row_blocks((-(-len(known) // 2), known.shape[1])):

@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Votes of matched patches for the pixels under them: a weighted mean.
+"""Votes of matched patches for their pixels: a weighted mean.
 
 Equation: a pixel under the target patches p becomes sum_p w_p v_p / sum_p w_p, with v_p the value
-at its place in p's match and w_p = exp(-d_p / (2 s) - l_p): d_p is the squared distance of p to its
-match, s the upper quartile of all d, l_p a loss that the caller may add.
+at the corresponding pixel of p's match and w_p = exp(-d_p / (2 s) - l_p): d_p is the squared
+distance of p to its match, s the upper quartile of all d, l_p an optional penalty.
 
 Citation: see `patch_fill`.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from ..numerics.jit import jit
 from .coherency_sensitive_hashing import Matches, Patches
 
-# Weights below exp(-60) are negligible but must not vanish: they decide where all patches match
+# Weights below exp(-60) are negligible but must not vanish: they are used where all patches match
 # badly.
 _LEAST = -60.0
 
@@ -25,12 +25,12 @@ def vote(
     matches: Matches,
     loss: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Average what the matches hold at each pixel.
+    """Average the votes of the matches at each pixel.
 
     Parameters
     ----------
     values : (h, w, C) ndarray
-        On the sources' grid.
+        The source image.
     target, source : Patches
     matches : Matches
     loss : (n,) ndarray or float

@@ -1,15 +1,15 @@
 # mypy: disable-error-code="no-untyped-def"
 """Projection of image patches on the Walsh-Hadamard basis.
 
-Problem: comparing two patches of 8 x 8 pixels costs 64 products a channel. Natural images put most
-of a patch's energy into a few coefficients of an orthonormal basis, and any subset of them gives a
-lower bound of the distance: with r_a the length of what the subset leaves of a, sum over the subset
-of (a_k - b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
+Problem: comparing two patches of 8 x 8 pixels costs 64 products per channel. In natural images a
+few coefficients of an orthonormal basis have most of a patch's energy, and any subset of them gives
+a lower bound of the distance: with r_a the norm of the rest of a, sum over the subset of (a_k -
+b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
 
-Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1):
-additions alone, 48 of them along each axis by the fast transform. Colour channels are mixed
-beforehand by an orthonormal matrix with rows grey, red-green, yellow-blue, so that brightness,
-which carries most of the energy, is one channel.
+Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1): only
+additions, 24 for each row and column by the fast transform. Colour channels are mixed beforehand by
+an orthonormal matrix with rows grey, red-green, yellow-blue, so that brightness, which carries most
+of the energy, is one channel.
 
 Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI
 27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. The kept coefficients are those with the most
@@ -33,7 +33,7 @@ _SAMPLE = 4096
 
 
 def opponent(image: np.ndarray) -> np.ndarray:
-    """Convert three channels to grey, red-green and yellow-blue; distances stay the same.
+    """Convert three channels to grey, red-green and yellow-blue; distances are preserved.
 
     Parameters
     ----------
@@ -74,7 +74,8 @@ def project(
 ) -> np.ndarray:
     """Project patches.
 
-    The squared distance of two rows never exceeds that of their patches. Fast in raster order.
+    The squared distance of two rows never exceeds that of their patches. Fastest for patches in
+    raster order.
 
     Parameters
     ----------
@@ -88,7 +89,7 @@ def project(
     Returns
     -------
     (n, k + 1) float32 ndarray
-        In the last column the length of the rest.
+        The last column is the norm of the rest.
     """
     out = np.empty((len(rows), len(chosen) + 1), np.float32)
     ends = np.linspace(0, len(rows), 4 * threads + 1).astype(int)

@@ -88,7 +88,7 @@ def check_exr(
     data : bytes
         The beginning of the file: all of it, or a MiB.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
     stored : int, optional
         Size of the file; that of `data` by default.

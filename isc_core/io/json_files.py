@@ -19,7 +19,7 @@ def read_json(path: Path, remedy: str = "write it again") -> Any:
     ----------
     path : Path
     remedy : str
-        Ends the error message.
+        End of the error message.
 
     Returns
     -------

@@ -42,7 +42,7 @@ class Limits:
         Parameters
         ----------
         path : Path or str
-            Opens the error message.
+            Prefix of the error message.
         width, height : int
             In pixels.
 
@@ -64,7 +64,7 @@ class Limits:
         Parameters
         ----------
         path : Path or str
-            Opens the error message.
+            Prefix of the error message.
         stored : int
             Size of the file in bytes.
 
@@ -85,7 +85,7 @@ class Limits:
         Parameters
         ----------
         path : Path or str
-            Opens the error message.
+            Prefix of the error message.
         unpacked, stored : int
             Bytes of its values, and of the file.
         """

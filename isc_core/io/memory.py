@@ -106,13 +106,13 @@ def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> 
     Parameters
     ----------
     work : str
-        What needs the memory, in the plural: opens the message.
+        What needs the memory, in the plural: the prefix of the message.
     needed : int
         In bytes.
     allowed : int or None
         In bytes; None for what is free.
     remedy : str
-        Ends the message.
+        End of the message.
 
     Raises
     ------
@@ -140,11 +140,11 @@ def memory_error(work: str, needed: int, remedy: str) -> InputError:
     Parameters
     ----------
     work : str
-        What needs the memory, in the plural: opens the message.
+        What needs the memory, in the plural: the prefix of the message.
     needed : int
         In bytes.
     remedy : str
-        Ends the message.
+        End of the message.
 
     Returns
     -------
@@ -163,7 +163,7 @@ def memory_message(error: MemoryError, remedy: str) -> str:
     error : MemoryError
         NumPy's says how much: "Unable to allocate 7.45 GiB for an array with shape ...".
     remedy : str
-        Ends the message.
+        End of the message.
 
     Returns
     -------
@@ -180,11 +180,11 @@ def enough_memory(work: str, needed: int, remedy: str) -> Iterator[None]:
     Parameters
     ----------
     work : str
-        What needs the memory, in the plural: opens the message.
+        What needs the memory, in the plural: the prefix of the message.
     needed : int
         In bytes.
     remedy : str
-        Ends the message.
+        End of the message.
 
     Yields
     ------

@@ -106,7 +106,7 @@ def parse_array(
     ----------
     data : bytes
     name : str
-        Opens the error message.
+        Prefix of the error message.
     kinds : str
         Permitted dtype kinds, as NumPy's letters.
     limits : Limits
@@ -157,7 +157,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dic
     ----------
     data : bytes
     name : str
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
 
     Returns

@@ -28,7 +28,7 @@ def read_regular(
     limits : Limits or None
         Bound the size of the file; None for any size.
     remedy : str
-        Ends the error message for a folder, pipe or device.
+        End of the error message for a folder, pipe or device.
 
     Returns
     -------
@@ -58,7 +58,7 @@ def require_regular(
     limits : Limits or None
         Bound the size of the file; None for any size.
     remedy : str
-        Ends the error message for a folder, pipe or device.
+        End of the error message for a folder, pipe or device.
 
     Raises
     ------

@@ -24,7 +24,7 @@ def raster_from_array(values: np.ndarray, name: str, limits: Limits = DEFAULT_LI
         Grey, RGB or RGBA. uint8 and uint16 are codes, floats are linear; alpha from 0 to the
         largest code, or 1. bool is a mask.
     name : str
-        Opens the error messages.
+        Prefix of the error messages.
     limits : Limits
 
     Returns

@@ -48,7 +48,7 @@ class MaskFinder(Protocol):
         Parameters
         ----------
         name : str
-            Opens the error message.
+            Prefix of the error message.
         light : (H, W, 3) float32 ndarray
             Linear, 1 is white.
 

@@ -24,7 +24,7 @@ def check_mask(mask: np.ndarray, what: str) -> None:
     ----------
     mask : (H, W) bool ndarray
     what : str
-        Opens the error message.
+        Prefix of the error message.
     """
     count = int(mask.sum())
     if count == 0:
@@ -74,7 +74,7 @@ def find_mask(
     Parameters
     ----------
     name : str
-        The photo; opens the error message.
+        The photo; prefix of the error message.
     raster : Raster
         Of the photo.
     linear : (H, W, 1 or 3) ndarray
@@ -184,7 +184,7 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
     raster : Raster
         Of the image.
     name : str
-        Opens the error message.
+        Prefix of the error message.
     photo : Raster
         The photo.
 

@@ -108,11 +108,11 @@ def photo_from_raster(
     raster : Raster
         The photo.
     name : str
-        Opens the error messages.
+        Prefix of the error messages.
     mask_raster : Raster, optional
         The mask.
     mask_name : str
-        Opens the error messages about it.
+        Prefix of the error messages about it.
     transfer : {"auto", "srgb", "linear"}
     whole_frame : bool
     finder : MaskFinder, optional

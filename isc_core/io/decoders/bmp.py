@@ -18,7 +18,7 @@ def read_bmp(data: bytes, path: Path, limits: Limits) -> Raster:
     data : bytes
         The whole file.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
 
     Returns

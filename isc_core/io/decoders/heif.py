@@ -35,7 +35,7 @@ def read_heif(data: bytes, path: Path, limits: Limits) -> Raster:
     data : bytes
         The whole file.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
 
     Returns

@@ -29,7 +29,7 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
     data : bytes
         The whole file.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
 
     Returns
@@ -59,7 +59,7 @@ def check_scans(data: bytes, path: Path | str) -> None:
     data : bytes
         The whole file.
     path : Path or str
-        Opens the error message.
+        Prefix of the error message.
 
     Raises
     ------

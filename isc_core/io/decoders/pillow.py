@@ -49,7 +49,7 @@ def decode_pillow(
     ----------
     image : PIL.Image.Image
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
     oriented : bool
         Whether the decoder applies the orientation itself.

@@ -63,7 +63,7 @@ def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
     Parameters
     ----------
     path : Path
-        Opens the error message.
+        Prefix of the error message.
     limits : Limits
     width, height : int
         From the header alone.

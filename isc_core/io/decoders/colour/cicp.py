@@ -34,7 +34,7 @@ def space_of_code_points(primaries: int, transfer: int, path: Path) -> ColourSpa
     primaries, transfer : int
         Code points of H.273.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
 
     Returns
     -------

@@ -38,7 +38,7 @@ def space_of_chunks(
     channels : int
         Of the pixels without alpha, 1 or 3.
     path : Path
-        Opens the error message.
+        Prefix of the error message.
 
     Returns
     -------
