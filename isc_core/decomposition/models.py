@@ -20,7 +20,7 @@ from dataclasses import replace
 from functools import partial
 from types import TracebackType
 
-from ..io.memory import LARGE, give_back_memory
+from ..io.memory import LARGE_PHOTO, release_memory
 from ..networks.scene_network import SceneNetwork
 from ..progress import Monitor
 from ..scene.decomposition import Separation
@@ -92,8 +92,8 @@ def _solved(
         task = with_predictions(task)
         estimate = solve_under_estimated_light(task, lambda lit: solver(ahead.added(lit)))
     estimate = replace(estimate, prediction=task.prediction)
-    if task.maps.mask.size > LARGE:
-        give_back_memory()
+    if task.maps.mask.size > LARGE_PHOTO:
+        release_memory()
     estimate = with_fine_relief(task, estimate)
     if task.prediction is None or not task.options.check_assumptions:
         return estimate

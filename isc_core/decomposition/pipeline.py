@@ -16,7 +16,7 @@ from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
 from ..imaging.row_blocks import row_blocks
-from ..io.memory import LARGE, enough_memory, give_back_memory, require_memory
+from ..io.memory import LARGE_PHOTO, enough_memory, release_memory, require_memory
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -131,8 +131,8 @@ def decompose(
         result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
         if estimate.prediction is not None and inputs.height is None:
             result = with_expected_error(result, estimate.prediction, working)
-    if maps.mask.size > LARGE:
-        give_back_memory()
+    if maps.mask.size > LARGE_PHOTO:
+        release_memory()
     return result
 
 

@@ -1,20 +1,20 @@
-"""Writing a folder or a file completely or not at all.
+"""Atomic writes: a folder or a file appears completely or not at all.
 
-The content is written beside its final place under a temporary name, flushed to disk, and renamed
-once it is complete, so that the final name never holds half of a result. What stood there before is
-replaced only then, in one step where the system supports it (Linux), and a folder only if
-everything in it is of the kind that this program writes: foreign files are never deleted.
+The content is written next to its final path under a temporary name, flushed to disk, and renamed
+once it is complete, so that the final path never has an incomplete result. Previous content is
+replaced only then, atomically where the system supports it (Linux), and a folder only if it
+contains only files that this program writes: foreign files are never deleted.
 
-A process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
+A writing process holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
 that writes the same name removes siblings without a lock, which belong to killed processes. The
-lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that
-is why `flock` is used here and not the library `filelock`.
+lock is on the sibling itself, not on a separate lock file, so that it moves with the rename;
+therefore `flock` is used and not the library `filelock`.
 
 Limits: without such locks (Windows, some network disks) and for other machines, siblings of killed
-processes stay; delete them by hand, or by `remove_unfinished` where nobody else is at work. What is
-removed is renamed to `.NAME.xxxxxxxx.gone` first. Without the exchange in one step, a process
+processes remain; delete them by hand, or by `remove_unfinished` where no other process is writing.
+Entries to be removed are first renamed to `.NAME.xxxxxxxx.gone`. Without atomic exchange, a process
 killed between two renames leaves the old content as `.NAME.xxxxxxxx.old`, which the next process
-puts back.
+restores.
 """
 
 import contextlib
@@ -48,7 +48,7 @@ _MAX_SIBLINGS = 0x10000
 _MAX_NAME_BYTES = (
     230  # bytes of a name, of the usual 255, with room for the suffix of a temporary sibling
 )
-_TOGETHER = 8  # files that are flushed at a time
+_FLUSH_THREADS = 8
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fs.h
 
 _REASONS = {
@@ -69,15 +69,15 @@ _REASONS = {
 def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
     """Provide an empty temporary folder and rename it to `folder` when the block succeeds.
 
-    An existing `folder` is replaced if it is empty, or holds the marker file and nothing but
+    An existing `folder` is replaced if it is empty, or contains the marker file and only files of
     `ours`.
 
     Parameters
     ----------
     folder : Path or str
     ours : sequence of str
-        Files that a folder of this kind holds, as relative paths with `/`. The first one is the
-        marker, without which a folder counts as foreign.
+        Files that a folder of this kind may contain, as relative paths with `/`. The first one is
+        the marker, without which a folder is foreign.
 
     Returns
     -------
@@ -139,7 +139,7 @@ def new_file(path: Path | str) -> Iterator[Path]:
 def require_writable(
     folder: Path | str, ours: Sequence[str], inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Check that `new_folder` can begin, before hours of work are spent; leaves no trace.
+    """Check that `new_folder` can begin, before long work begins; leaves no files.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def require_writable(
 
 
 def require_writable_file(path: Path | str) -> None:
-    """Check that `new_file` can begin, before hours of work are spent; leaves no trace.
+    """Check that `new_file` can begin, before long work begins; leaves no files.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def require_writable_file(path: Path | str) -> None:
 
 
 def unfinished(path: Path | str) -> frozenset[Path]:
-    """Return the temporary siblings of `path`, of processes at work or killed.
+    """Return the temporary siblings of `path`, of running or killed processes.
 
     Parameters
     ----------
@@ -207,13 +207,13 @@ def unfinished(path: Path | str) -> frozenset[Path]:
 def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None:
     """Clean up after processes that were killed while they wrote `path`.
 
-    Removes their temporary siblings and restores what they had moved aside.
+    Removes their temporary siblings and restores content that they had moved aside.
 
     Parameters
     ----------
     path : Path or str
     spared : set of Path
-        Siblings to keep; so are all that a process holds a lock on.
+        Siblings to keep, in addition to all locked ones.
     """
     target = _resolved(path)
     for leftover in sorted(unfinished(target) - spared):
@@ -229,7 +229,7 @@ def remove_unfinished_in(folder: Path, spared: Set[Path] = frozenset()) -> None:
     folder : Path
         Need not exist.
     spared : set of Path
-        As of `remove_unfinished`.
+        As for `remove_unfinished`.
     """
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for name in {
@@ -245,12 +245,12 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
     ----------
     folder : Path
     ours : sequence of str
-        Files that a folder of this kind holds, as relative paths with `/`; the marker first.
+        Files that a folder of this kind may contain, as relative paths with `/`; the marker first.
 
     Raises
     ------
     InputError
-        If `folder` is a file, the working folder or a mount point, or holds anything foreign.
+        If `folder` is a file, the working folder or a mount point, or contains foreign files.
     """
     with _explained(folder):
         if not folder.exists():
@@ -290,7 +290,7 @@ def _require_replaceable_file(target: Path) -> None:
 
 
 def _try_writing(target: Path) -> None:
-    """Create and remove a temporary sibling, in the innermost existing parent: creating and
+    """Create and remove a temporary sibling in the innermost existing parent, since creating and
     removing parents could interfere with another process.
     """
     with _explained(target):
@@ -314,7 +314,7 @@ def _resolved(path: Path | str, use: str = "written") -> Path:
 
 
 def _label(target: Path) -> str:
-    """The target's part of a sibling's name; a digest of names that are too long."""
+    """The target's part of a sibling's name; a digest for names that are too long."""
     coded = os.fsencode(target.name)
     return target.name if len(coded) <= _MAX_NAME_BYTES else hashlib.sha256(coded).hexdigest()
 
@@ -326,8 +326,8 @@ def _origin(entry: Path) -> str | None:
 
 
 def _sibling(target: Path, number: int, suffix: str) -> Path:
-    """This machine's temporary sibling of that number: locks of other machines may not be visible
-    here.
+    """The temporary sibling with a number. The name depends on the machine, because locks of other
+    machines may not be visible.
     """
     machine = hashlib.sha256(platform.node().encode()).hexdigest()[:4]
     return target.with_name(f".{_label(target)}.{machine}{number:04x}.{suffix}")
@@ -401,8 +401,8 @@ class _Gone(OSError):
 
 @contextmanager
 def _lock(entry: Path, *, wait: bool) -> Iterator[bool]:
-    """Lock a file or folder during the block; the lock ends with the process at the latest. Yields
-    False without support for locks.
+    """Lock a file or folder during the block, or until the process ends. Yields False without
+    support for locks.
 
     Raises `OSError` if another process has the lock and `wait` is false, or if the entry no longer
     exists when locked.
@@ -424,7 +424,7 @@ def _lock(entry: Path, *, wait: bool) -> Iterator[bool]:
 
 
 def _is_named(descriptor: int, entry: Path) -> bool:
-    """Whether an open file or folder still has that name; a single lookup, because it may be
+    """Whether an open file or folder still has that name, by a single lookup, since it may be
     renamed between two.
     """
     with contextlib.suppress(FileNotFoundError):
@@ -446,8 +446,8 @@ def _acquired(descriptor: int, wait: bool) -> bool:
 
 
 def _flush(content: Path) -> None:
-    """Flush a file, or a folder with its content, to the disk, which may report only now that it is
-    full.
+    """Flush a file, or a folder with its content, to the disk; a full disk may be reported only
+    then.
     """
     folders = (
         [content, *(entry for entry in content.rglob("*") if entry.is_dir())]
@@ -455,7 +455,7 @@ def _flush(content: Path) -> None:
         else []
     )
     files = [entry for entry in content.rglob("*") if entry.is_file()] if folders else [content]
-    with ThreadPoolExecutor(_TOGETHER) as pool:  # file systems write what waits at once
+    with ThreadPoolExecutor(_FLUSH_THREADS) as pool:  # file systems combine pending writes
         list(pool.map(_flush_file, files))
     for folder in folders:
         _flush_names(folder)
@@ -502,7 +502,7 @@ def _put_in_place(partial: Path, target: Path) -> None:
 
 
 def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange the names of two folders in one step; False if this is not supported."""
+    """Exchange the names of two folders atomically; False if this is not supported."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):
@@ -539,7 +539,7 @@ def _made_parents(target: Path) -> Iterator[None]:
         yield
         missing = []
     finally:
-        for parent in missing:  # the innermost first; folders that another process has filled stay
+        for parent in missing:  # innermost first; folders that another process has filled are kept
             with contextlib.suppress(OSError):
                 parent.rmdir()
 

@@ -1,8 +1,8 @@
-"""Float32 OpenEXR files from and to plain arrays, channel by channel.
+"""Reading and writing of float32 OpenEXR files as arrays, one per channel.
 
 Channels keep their full names (`diffuse.R`, `height.Z`). Compression is lossless (ZIP), and equal
-arrays give equal bytes. The library compresses large files on several threads, with the same bytes
-as on one.
+arrays give equal bytes. The library compresses large files on several threads, with identical
+bytes.
 """
 
 import errno
@@ -33,8 +33,8 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     ----------
     path : Path
     channels : mapping of str to (H, W) or (H, W, 3) ndarray
-        All of one height and width. A colour image is written as it is: NAME stands for NAME.R,
-        NAME.G and NAME.B, and RGB for R, G and B.
+        All of the same height and width. A colour image NAME is written as NAME.R, NAME.G and
+        NAME.B, and the image RGB as R, G and B.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
 
 
 def _start_threads() -> None:
-    """Give the library threads, if it has none yet; they sleep between files."""
+    """Start the library's threads, if there are none yet; they sleep between files."""
     if hasattr(OpenEXR, "global_thread_count") and not OpenEXR.global_thread_count():
         OpenEXR.set_global_thread_count(min(os.cpu_count() or 1, _MOST_THREADS))
 

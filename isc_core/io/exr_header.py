@@ -1,18 +1,19 @@
 """Checks of the header of an OpenEXR file, before the library reads it.
 
-Problem: the library allocates what a header claims, for every channel, before it checks whether the
-file holds it. `OpenEXR.File(header_only=True)` allocates nothing and survived 9,000 damaged
-headers, but it tells neither the channels' types, so the unpacked size would be a guess, nor the
-number of chunks. Here windows, channels and chunks are checked against `Limits` and against the
-size of the file first.
+Problem: the library allocates the claimed size of every channel before it checks that the file has
+as much data. `OpenEXR.File(header_only=True)` allocates nothing and survived 9,000 damaged headers,
+but it returns neither the channels' types, without which the unpacked size is unknown, nor the
+number of chunks. Here windows, channels and chunks are checked first, against `Limits` and the size
+of the file.
 
-Layout: a magic number, the version with its flags, one header a part (name, type, size, value;
-ended by an empty name), then for each part a table of 8 bytes a chunk: a block of lines or a tile.
+Layout: a magic number, the version with its flags, one header per part (name, type, size, value;
+ended by an empty name), then for each part a table of 8 bytes per chunk: a block of lines or a
+tile.
 
 Citation: OpenEXR, "OpenEXR File Layout" (Academy Software Foundation, 2023),
 https://openexr.com/en/latest/OpenEXRFileLayout.html.
 
-Limits: flat images of full resolution; deep images and subsampled channels are refused.
+Limits: flat images of full resolution; deep images and subsampled channels are not supported.
 """
 
 import math
@@ -64,7 +65,7 @@ def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
 
 
 def unpacked_bytes(parts: tuple[ExrPart, ...]) -> int:
-    """Return the memory that the channels of a file take as float32.
+    """Return the memory of a file's channels as float32.
 
     Parameters
     ----------
@@ -86,7 +87,7 @@ def check_exr(
     Parameters
     ----------
     data : bytes
-        The beginning of the file: all of it, or a MiB.
+        The beginning of the file: all of it, or at least 1 MiB.
     path : Path
         Prefix of the error message.
     limits : Limits

@@ -1,4 +1,4 @@
-"""Focal lengths: millimetres on 35-mm film, and pixels. Without imports that start slowly."""
+"""Focal lengths: millimetres on 35-mm film, and pixels. Without slow imports."""
 
 import math
 from dataclasses import dataclass
@@ -10,15 +10,15 @@ _DIAGONAL_35MM = math.hypot(36, 24)
 
 @dataclass(frozen=True)
 class FocalLength:
-    """What the metadata of a photo say of its lens.
+    """The focal length in the metadata of a photo.
 
     Attributes
     ----------
     pixels : float
         Focal length in pixels of the photo.
     cropped : bool
-        The metadata tell of a frame of another shape: the photo was cropped, and the focal length
-        does not hold.
+        Whether the metadata state another aspect ratio: the photo was cropped, and the focal length
+        is invalid.
     """
 
     pixels: float

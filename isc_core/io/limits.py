@@ -1,12 +1,11 @@
-"""Limits on the size of files, checked before any content is unpacked.
+"""Limits on the size of files, checked before any content is decompressed.
 
-Problem: a hundred bytes can claim a picture of a million pixels a side, and a small archive can
-unpack to more than a machine holds. What a file claims stands in its header: width and height, the
-shape and dtype of an array, the unpacked size of an archive's member. Readers check these against
-`Limits` first and decode afterwards.
+Problem: a file of a hundred bytes can claim a million pixels on each side, and a small archive can
+unpack to more than the memory of a machine. The header of a file states the claimed size: width and
+height, the shape and dtype of an array, the unpacked size of an archive's member. Readers first
+check these against `Limits` and then decode.
 
-Limits: they bound what a file unpacks to. What a command then needs for its own work is a multiple
-of it.
+Limits: only the unpacked size is bounded. The memory of a command is a multiple of it.
 """
 
 from dataclasses import dataclass
@@ -17,10 +16,10 @@ from ..errors import InputError
 
 @dataclass(frozen=True)
 class Limits:
-    """What is read of one file at most.
+    """Limits of one file.
 
-    Large files hold what they hold; small ones that unpack to much are bombs. So the larger of
-    `max_bytes` and `max_ratio` times the size of the file counts.
+    The unpacked size is limited to the larger of `max_bytes` and `max_ratio` times the size of the
+    file, so that large files are read but decompression bombs are not.
 
     Attributes
     ----------
@@ -80,7 +79,7 @@ class Limits:
             )
 
     def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
-        """Raise `InputError` for a file that unpacks to too much.
+        """Raise `InputError` for a file whose unpacked size exceeds the limit.
 
         Parameters
         ----------

@@ -1,8 +1,8 @@
 """Numeric variables of MATLAB files of version 5 to 7.
 
-Problem: research data comes as MAT files, from anybody. SciPy reads them, but unpacks whatever size
-a file claims, and crashes on elements of unknown type. All elements are checked before SciPy sees
-the file, the sizes of compressed ones against `Limits`.
+Problem: research data are distributed as MAT files from untrusted sources. SciPy reads them, but
+unpacks any size that a file claims, and crashes on elements of unknown type. All elements are
+checked before SciPy reads the file, the sizes of compressed ones against `Limits`.
 
 Citation: The MathWorks, "MAT-File Format", R2023a (2023), chapter 1, "Level 5 MAT-File Format".
 
@@ -28,7 +28,7 @@ from .regular_files import read_regular
 _HEADER = 128  # bytes
 _MATRIX, _DEFLATED = 14, 15
 _NUMERIC = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18}  # types of numbers and characters
-_CONTAINERS = {1, 2, 3, 16, 17}  # array classes that hold matrices: cells, structs, objects
+_CONTAINERS = {1, 2, 3, 16, 17}  # array classes that contain matrices: cells, structs, objects
 _MAX_DEPTH = 32
 _READ_ERRORS = (
     MatReadError,
@@ -58,7 +58,7 @@ def read_matrix(path: Path, *keys: str, limits: Limits = DEFAULT_LIMITS) -> np.n
     *keys : str
         The variable's name, then the field's, and so on.
     limits : Limits
-        What the file may unpack to.
+        Limits of the unpacked size.
 
     Returns
     -------
@@ -68,7 +68,7 @@ def read_matrix(path: Path, *keys: str, limits: Limits = DEFAULT_LIMITS) -> np.n
     Raises
     ------
     InputError
-        If the file is absent, damaged, too large, of another version, or holds no such numbers.
+        If the file is absent, damaged, too large, of another version, or has no such numbers.
     """
     try:
         data = read_regular(path, limits, "use a MATLAB file")
@@ -114,7 +114,7 @@ def _field(value: object, keys: tuple[str, ...]) -> np.ndarray | None:
 def _check_elements(path: Path, data: bytes, limits: Limits) -> int:
     """Reject elements that are unsafe for SciPy: of unknown type, truncated or too large.
 
-    Returns the unpacked size of all, in bytes.
+    Returns their total unpacked size in bytes.
     """
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None:

@@ -1,12 +1,12 @@
-"""Exhausted memory as an error that says how much is needed.
+"""Out-of-memory errors that state how much memory is needed.
 
-Problem: libraries report exhausted memory in many ways: as `MemoryError`, as the words of a C++
-exception, or as nothing but damaged data (libjpeg). Taken for damage, the error sends the user to
-the wrong remedy.
+Problem: libraries report exhausted memory in many ways: as `MemoryError`, as the text of a C++
+exception, or only as damaged data (libjpeg). An error that is mistaken for damage suggests the
+wrong remedy.
 
-Limits: the amounts are estimates for the usual path, within about a third. Linux grants more memory
-than there is, and ends a process that uses it, which no process can report: work that is known to
-need more than is free is refused before it begins (`require_memory`).
+Limits: the amounts are estimates for the usual code path, within about a third. Linux overcommits
+memory and kills a process that uses too much, which the process cannot report: work that is known
+to need more than the free memory is rejected before it begins (`require_memory`).
 """
 
 import contextlib
@@ -19,13 +19,13 @@ from pathlib import Path
 from ..errors import InputError
 
 _SYSTEM, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
-LARGE = 1 << 18  # pixels: memory of larger photos is worth the time that giving it back takes
-READING = 32  # bytes a pixel, at most, from the file to linear light
+LARGE_PHOTO = 1 << 18  # pixels: only above is it worth the time to return memory to the system
+READING_BYTES_PER_PIXEL = 32  # bytes per pixel, at most, from the file to linear light
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
 
 
 def is_exhausted(error: BaseException) -> bool:
-    """Tell whether an error, or one of its causes, says that memory is exhausted.
+    """Return whether an error, or one of its causes, reports exhausted memory.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ def is_exhausted(error: BaseException) -> bool:
 
 
 def is_available(needed: int) -> bool:
-    """Tell whether the process may allocate this much memory now.
+    """Return whether the process can allocate this much memory now.
 
     Parameters
     ----------
@@ -63,19 +63,19 @@ def is_available(needed: int) -> bool:
 
 
 def free_memory(system: Path = _SYSTEM, group: Path = _GROUP) -> int | None:
-    """Return how much memory processes may still take, in bytes.
+    """Return the memory available to processes, in bytes.
 
     Parameters
     ----------
     system : Path, optional
         Linux's report of the machine's memory.
     group : Path, optional
-        Folder of the control group's limits: those of a container.
+        Folder of the control group's limits, as of a container.
 
     Returns
     -------
     int or None
-        None where the system does not say.
+        None where the system does not report it.
     """
     known = []
     try:
@@ -91,17 +91,17 @@ def free_memory(system: Path = _SYSTEM, group: Path = _GROUP) -> int | None:
     return max(0, min(known))
 
 
-def give_back_memory() -> None:
-    """Give memory that was freed back to the system, where the C library can.
+def release_memory() -> None:
+    """Return freed memory to the system, where the C library can.
 
-    It keeps what it may need again, in pieces: after work on large arrays, as much as is in use.
+    The allocator keeps freed memory for reuse: after work on large arrays, as much as is in use.
     """
     with contextlib.suppress(OSError, AttributeError):  # another library than glibc
         ctypes.CDLL(None).malloc_trim(0)
 
 
 def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> None:
-    """Refuse work that needs more memory than it may take.
+    """Raise `InputError` for work that needs more memory than is allowed.
 
     Parameters
     ----------
@@ -110,14 +110,14 @@ def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> 
     needed : int
         In bytes.
     allowed : int or None
-        In bytes; None for what is free.
+        In bytes; None for the free memory.
     remedy : str
         End of the message.
 
     Raises
     ------
     InputError
-        If it needs more.
+        If the work needs more.
     """
     free = free_memory() if allowed is None else allowed
     if free is None or needed <= free:
@@ -135,7 +135,7 @@ def _amount(size: int) -> str:
 
 
 def memory_error(work: str, needed: int, remedy: str) -> InputError:
-    """Return the error for work that memory does not suffice for.
+    """Return the error for work without enough memory.
 
     Parameters
     ----------
@@ -156,12 +156,12 @@ def memory_error(work: str, needed: int, remedy: str) -> InputError:
 
 
 def memory_message(error: MemoryError, remedy: str) -> str:
-    """Return the message for work whose need is not known beforehand.
+    """Return the message for work whose memory is not known beforehand.
 
     Parameters
     ----------
     error : MemoryError
-        NumPy's says how much: "Unable to allocate 7.45 GiB for an array with shape ...".
+        NumPy's states the amount: "Unable to allocate 7.45 GiB for an array with shape ...".
     remedy : str
         End of the message.
 
@@ -175,7 +175,7 @@ def memory_message(error: MemoryError, remedy: str) -> str:
 
 @contextmanager
 def enough_memory(work: str, needed: int, remedy: str) -> Iterator[None]:
-    """Turn a `MemoryError` of the block into an error that says how much is needed.
+    """Convert a `MemoryError` of the block into an error that states the memory needed.
 
     Parameters
     ----------

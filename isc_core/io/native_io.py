@@ -1,12 +1,11 @@
 """Workarounds for native libraries, which open files by name only and print to the terminal.
 
-Problem: a library that opens a file by itself may read other bytes than those that were checked,
-since files change, and some accept no names but UTF-8: `memory_file` gives checked bytes an ASCII
-name of their own. Decoders of damaged files print warnings, through Python or straight to the
-process's error stream; the `InputError` that follows is the message that matters:
-`suppress_native_output` mutes the rest.
+Problem: a library that opens a file itself may read other bytes than those that were checked, since
+files change, and some accept only UTF-8 names: `memory_file` provides checked bytes under an ASCII
+name. Decoders of damaged files print warnings, through Python or directly to standard error; only
+the `InputError` that follows is meant for the user: `suppress_native_output` mutes the rest.
 
-Limits: memory files live in memory on Linux, in the temporary folder elsewhere. File descriptor 2
+Limits: memory files are in memory on Linux, in the temporary folder elsewhere. File descriptor 2
 belongs to the whole process: output of other threads is muted as well.
 """
 

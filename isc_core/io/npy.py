@@ -1,8 +1,8 @@
-"""Reading NumPy's files, single arrays and archives of them, from untrusted sources.
+"""Reading NumPy files (.npy, .npz) from untrusted sources.
 
-Problem: `numpy.load` trusts the header: it allocates what the shape claims before it checks whether
-the file holds it, and unpacks an archive's member whatever its size. Here shape, dtype and size are
-checked against the data, and against `Limits`, first.
+Problem: `numpy.load` trusts the header: it allocates the claimed shape before it checks that the
+file has as much data, and unpacks an archive's member of any size. Here shape, dtype and size are
+first checked against the data and against `Limits`.
 
 Citation: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays" (2007),
 https://numpy.org/neps/nep-0001-npy-format.html; PKWARE, "APPNOTE.TXT - .ZIP File Format
@@ -71,7 +71,7 @@ def read_array(path: Path, limits: Limits = DEFAULT_LIMITS) -> np.ndarray:
     Raises
     ------
     InputError
-        If the file is absent, damaged, or holds no plain numbers.
+        If the file is absent, damaged, or not of plain numbers.
     """
     return parse_array(_bytes(path, limits), str(path), limits=limits).copy()
 
@@ -119,7 +119,7 @@ def parse_array(
     Raises
     ------
     InputError
-        If the bytes are damaged, cut short, or hold something else.
+        If the bytes are damaged, truncated, or of another type.
     """
     try:
         shape, by_columns, kind, start = array_header(data)
@@ -168,7 +168,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dic
     Raises
     ------
     InputError
-        If the bytes are damaged, hold something else, or unpack to more than `limits`.
+        If the bytes are damaged, of another type, or unpack to more than `limits`.
     """
     needed = len(data)
     try:

@@ -1,6 +1,7 @@
-"""PNG files of 8 or 16 bits, without an image library: Blender's own process loads none.
+"""PNG files of 8 or 16 bits without an image library, for Blender's own process.
 
-Every row has the filter Sub: differences from the pixel before. The pixels are one deflate stream.
+Every row has the filter Sub (differences from the previous pixel). The pixels are one deflate
+stream.
 
 Citation: W3C Recommendation "Portable Network Graphics" (2003), ISO/IEC 15948.
 """
@@ -24,7 +25,7 @@ def encode_png(codes: np.ndarray, compression: int = 6) -> bytes:
     codes : (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) ndarray of uint8 or uint16
         Row 0 at the top.
     compression : int, optional
-        From 1, run lengths alone, which photos need no more than, to 9, small.
+        From 1, run lengths only, which is enough for photos, to 9, the smallest file.
 
     Returns
     -------
@@ -65,7 +66,7 @@ def decode_png(data: bytes) -> np.ndarray:
     Raises
     ------
     ValueError
-        If another program has written it, or its codes have 16 bits.
+        If another program wrote it, or its codes have 16 bits.
     """
     start = len(SIGNATURE) + _LENGTH_AND_KIND
     columns, rows, depth, color_type = struct.unpack_from(">IIBB", data, start)

@@ -1,8 +1,8 @@
 """File names in printable characters.
 
-Problem: on Linux a file name is any bytes but `/` and zero. Python carries bytes that are not UTF-8
-as lone surrogates, which no text file, terminal or font accepts; and a name may hold line breaks,
-or characters that move the cursor or change the writing direction.
+Problem: on Linux a file name may contain any bytes except `/` and zero. Python represents bytes
+that are not UTF-8 by lone surrogates, which no text file, terminal or font accepts; and a name may
+contain line breaks, or characters that move the cursor or change the writing direction.
 """
 
 import unicodedata

@@ -1,7 +1,6 @@
-"""What was assumed or left out when a file was read.
+"""Notes on assumptions and omissions in reading a file.
 
-Values only: the sentences for people are made where they are shown
-(`result_files.reading_notes_text`).
+Only values; the sentences for users are in `result_files.reading_notes_text`.
 """
 
 from dataclasses import dataclass
@@ -9,22 +8,22 @@ from enum import StrEnum
 
 
 class ReadingNoteKind(StrEnum):
-    """What happened.
+    """The kind of a note.
 
     Attributes
     ----------
     BROKEN_PROFILE
         The colour profile is damaged or does not fit the pixels: sRGB was assumed.
     TABLE_PROFILE
-        The profile is a table of colours, which is applied with 8 bits.
+        The profile is a table of colours, which was applied with 8 bits.
     UNUSED_PROFILE
-        The profile is a table of colours, and the user named another curve: it was not applied.
+        The profile is a table of colours, and the user chose another curve: it was not applied.
     GAIN_MAP
         The file has a gain map (HDR), which was ignored.
     UNKNOWN_CAMERA_COLOURS
         The colours of the camera are unknown: its raw colours were used.
     OUT_OF_GAMUT
-        Colours of the object are outside of Rec.709; the value is their share of its pixels.
+        Colours of the object are outside Rec.709; the value is their share of its pixels.
     """
 
     BROKEN_PROFILE = "broken profile"
@@ -42,9 +41,9 @@ class ReadingNote:
     Attributes
     ----------
     kind : ReadingNoteKind
-        What happened.
+        The kind of the note.
     value : float or None
-        See `ReadingNoteKind`, in [0, 1]; None where there is none.
+        See `ReadingNoteKind`, in [0, 1]; None for kinds without a value.
     """
 
     kind: ReadingNoteKind

@@ -1,8 +1,8 @@
-"""Reading the files that a user names: regular files only.
+"""Reading of files given by the user, which must be regular files.
 
-Problem: to open a named pipe waits for a writer that may never come; a device such as /dev/zero has
-no end; a file of many gigabytes fills the memory. All three are seen in the file's status, before
-it is opened.
+Problem: opening a named pipe waits for a writer that may never come; a device such as /dev/zero has
+no end; a file of many gigabytes fills the memory. All three are detected from the file's status,
+before it is opened.
 
 Limits: another program may replace the file between the check and the opening.
 """
@@ -37,9 +37,9 @@ def read_regular(
     Raises
     ------
     InputError
-        If it is something else, or too large for the limits or the memory.
+        If it is not a regular file, or too large for the limits or the memory.
     OSError
-        If it does not exist or cannot be read; the caller knows what to advise.
+        If it does not exist or cannot be read; the caller adds the remedy.
     """
     require_regular(path, limits, remedy)
     path = Path(path)
@@ -63,13 +63,13 @@ def require_regular(
     Raises
     ------
     InputError
-        If it is something else, or too large.
+        If it is not a regular file, or too large.
     OSError
         If it does not exist or its status cannot be read.
     """
     try:
         status = os.stat(path)
-    except ValueError as error:  # a null byte, which no name has
+    except ValueError as error:  # a null byte, which no name may contain
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path)) from error
     if stat.S_ISDIR(status.st_mode):
         raise InputError(f"{path} is a folder: {remedy}")

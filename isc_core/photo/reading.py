@@ -18,7 +18,7 @@ from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import Raster, read_raster
 from ..io.decoders.raster import as_rgb
 from ..io.limits import DEFAULT_LIMITS, Limits
-from ..io.memory import READING, enough_memory
+from ..io.memory import READING_BYTES_PER_PIXEL, enough_memory
 from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import estimate_foreground
@@ -129,7 +129,9 @@ def photo_from_raster(
     """
     height, width = raster.values.shape[:2]
     with enough_memory(
-        f"{name}: {width} x {height} pixels", READING * width * height, "reduce the image"
+        f"{name}: {width} x {height} pixels",
+        READING_BYTES_PER_PIXEL * width * height,
+        "reduce the image",
     ):
         return _photo(raster, name, mask_raster, mask_name, transfer, whole_frame, finder)
 

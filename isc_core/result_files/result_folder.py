@@ -26,7 +26,7 @@ from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
-from ..io.memory import LARGE, give_back_memory
+from ..io.memory import LARGE_PHOTO, release_memory
 from ..io.png import encode_png
 from ..io.printable_names import readable
 from ..photo.camera import Camera
@@ -139,9 +139,9 @@ def save(
         (partial / "maps").mkdir()
         maps = pool.submit(_write_maps, d, channels, partial)
         preview = pool.submit(_write_preview, d, partial / "preview.png")
-        if d.mask.size > LARGE:
+        if d.mask.size > LARGE_PHOTO:
             maps.result()
-            give_back_memory()
+            release_memory()
         monitor.report("building the mesh", 0.4)
         edge = object_cover(d, cover)
         built = mesh_of(d, mesh, edge)

@@ -1,4 +1,4 @@
-"""Image files to arrays: one format per file, recognised by the first bytes, not by the name."""
+"""Decoders of image files: one format per module, detected from the content, not the name."""
 
 import hashlib
 import math
@@ -13,7 +13,7 @@ from PIL import Image
 
 from ...errors import InputError
 from ..limits import DEFAULT_LIMITS, Limits
-from ..memory import READING, is_available, is_exhausted, memory_error
+from ..memory import READING_BYTES_PER_PIXEL, is_available, is_exhausted, memory_error
 from ..native_io import suppress_native_output
 from ..regular_files import read_regular
 from .avif import read_avif
@@ -61,14 +61,14 @@ _READERS: tuple[tuple[bytes, str, _Reader], ...] = (
 )
 
 
-# HEIF files begin with a box `ftyp` that lists what they can be read as.
+# HEIF files begin with a box `ftyp` that lists compatible formats.
 _AVIF_BRANDS = {b"avif", b"avis"}
 _HEIF_BRANDS = {b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"mif2", b"msf1"}
 
 
 @dataclass(frozen=True)
 class _RecordingLimits(Limits):
-    """Limits that remember the sizes they were asked about."""
+    """Limits that record the sizes that were checked."""
 
     sizes: list[tuple[int, int]] = field(default_factory=list)
 
@@ -78,7 +78,7 @@ class _RecordingLimits(Limits):
 
 
 def read_raster(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Raster:
-    """Read the values that an image file stores, upright.
+    """Read the stored values of an image file, in upright orientation.
 
     Parameters
     ----------
@@ -113,12 +113,12 @@ def read_raster(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Raster:
         raise
     except (MemoryError, ImportError, *_DECODING_ERRORS) as error:
         width, height = max(checked.sizes, key=math.prod, default=(0, 0))
-        needed = len(data) + READING * width * height
+        needed = len(data) + READING_BYTES_PER_PIXEL * width * height
         if is_exhausted(error) or not is_available(needed):
             raise memory_error(
                 f"{path}: {width} x {height} pixels", needed, "reduce the image"
             ) from error
-        if isinstance(error, ImportError):  # of a decoder that is not installed properly
+        if isinstance(error, ImportError):  # a decoder is not installed properly
             raise
         raise InputError(
             f"{path}: the {kind} file is damaged, incomplete or of an unsupported kind: save it "

@@ -1,6 +1,6 @@
-"""AVIF files, by libavif in Pillow.
+"""AVIF files, decoded by libavif in Pillow.
 
-Limits: 8 bits a channel, which is what Pillow decodes files of more bits to.
+Limits: 8 bits per channel; Pillow reduces files of more bits.
 """
 
 import io

@@ -1,19 +1,19 @@
 """The focal length of a photo from its EXIF metadata.
 
-Problem: a perspective needs the focal length in pixels; a lens' millimetres alone say nothing
-without the size of the sensor.
+Problem: a perspective camera needs the focal length in pixels, which cannot be computed from
+millimetres without the size of the sensor.
 
 Equation: from FocalLengthIn35mmFilm F, which refers to the diagonal of a frame of 36 x 24 mm, f = F
 / 43.27 d, d the photo's diagonal in pixels; else from FocalLength and FocalPlaneXResolution r, f =
 FocalLength r, times the photo's long side over that of PixelXDimension and PixelYDimension. Nothing
-else is used: tables of sensors go out of date.
+else is used: databases of sensors become outdated.
 
 Citation: CIPA DC-008-2023, Exchangeable image file format for digital still cameras: Exif version
 3.0, section 4.6.
 
-Limits: a photo whose sides are in another proportion than the metadata say was cropped, so neither
-number holds. A crop in the same proportion, and one after which a program corrected the metadata,
-go unnoticed.
+Limits: a photo of another aspect ratio than in the metadata was cropped, so the focal length is
+invalid. A crop of the same aspect ratio, or after which a program updated the metadata, is not
+detected.
 """
 
 import math
@@ -44,14 +44,14 @@ _UNREADABLE = (
 
 
 def with_focal_length(raster: Raster, metadata: Image.Image | Image.Exif | bytes) -> Raster:
-    """Add the focal length that the metadata of a file give; unreadable metadata give none.
+    """Add the focal length from the metadata of a file, if it can be read.
 
     Parameters
     ----------
     raster : Raster
         The whole photo.
     metadata : Image, Exif or bytes
-        The opened image, its EXIF, or a block of EXIF or a whole TIFF.
+        The opened image, its EXIF, or the bytes of an EXIF block or a whole TIFF.
 
     Returns
     -------
@@ -83,12 +83,12 @@ def _focal_length(tags: dict[int, Any], shape: tuple[int, ...]) -> FocalLength |
 
 
 def _number(tags: dict[int, Any], tag: int) -> float:
-    """A positive number; 0 where there is none."""
+    """A positive number; 0 without one."""
     value = float(tags.get(tag, 0))
     return value if math.isfinite(value) and value > 0 else 0.0
 
 
 def _same_proportion(size: tuple[int, int], given: tuple[float, float]) -> bool:
-    """Whether two frames have one shape, upright or turned."""
+    """Whether two frames have the same aspect ratio, up to rotation by 90 degrees."""
     ratio = max(size) / min(size) * min(given) / max(given)
     return abs(math.log(ratio)) < _SAME_PROPORTION

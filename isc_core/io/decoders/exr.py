@@ -15,13 +15,13 @@ from ..native_io import memory_file
 from .colour.space import ColourSpace, colorants_of
 from .raster import Raster, check_size, raster_of_codes
 
-# The frame around the data may be blank, and costs as much as data: up to so many pixels, or so
-# many times the data's.
+# The display window around the data may be blank, but needs as much memory as data: largest number
+# of its pixels, or of its multiple of the data's.
 _FRAME_PIXELS, _FRAME_RATIO = 1 << 24, 16
 
 
 def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode the RGB or Y channels, and A, which EXR colours are premultiplied by.
+    """Decode the RGB or Y channels, and A, by which EXR colours are premultiplied.
 
     The frame is the display window, black where it has no data.
 
@@ -71,7 +71,7 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
 
 
 def _space(header: dict[str, Any]) -> ColourSpace | None:
-    """The primaries that the attribute `chromaticities` names; None without usable ones."""
+    """The primaries of the attribute `chromaticities`; None without valid ones."""
     try:
         given = np.array(header["chromaticities"], float).reshape(4, 2)
         return ColourSpace("chromaticities of the EXR", colorants=colorants_of(given))
@@ -80,7 +80,7 @@ def _space(header: dict[str, Any]) -> ColourSpace | None:
 
 
 def _check_frame(path: Path, claimed: ExrPart) -> None:
-    """Raise `InputError` for a little data in a huge display window."""
+    """Raise `InputError` for a huge display window with little data."""
     data, frame = (math.prod(size_of(window)) for window in (claimed.data, claimed.display))
     if frame > max(_FRAME_PIXELS, _FRAME_RATIO * data):
         raise InputError(
@@ -90,9 +90,7 @@ def _check_frame(path: Path, claimed: ExrPart) -> None:
 
 
 def _exr_channels(names: list[str], path: Path) -> list[str]:
-    """R, G, B or Y, then A if there is one, of the unnamed layer or of the only layer that has
-    them.
-    """
+    """R, G, B or Y, then A if present, of the unnamed layer or of the only layer that has them."""
     layers: dict[str, dict[str, str]] = {}
     for name in names:
         layer, _, channel = name.rpartition(".")

@@ -1,9 +1,9 @@
-"""Gain maps: what turns an ordinary photo into an HDR one on some screens.
+"""Detection of gain maps, with which some displays show an ordinary photo in HDR.
 
-Phones store a second, small picture of how much brighter than white each place is (Ultra HDR and
-ISO 21496-1 in JPEG and HEIF, Apple's own in HEIC). The photo itself is complete without it.
+Phones store a second, small picture of the brightness relative to white (Ultra HDR and ISO 21496-1
+in JPEG and HEIF, Apple's own in HEIC). The photo itself is complete without it.
 
-Limits: the map is recognised and left out.
+Limits: the map is detected and ignored.
 """
 
 from ..reading_notes import ReadingNote, ReadingNoteKind
@@ -16,7 +16,7 @@ _NAMES = (
 
 
 def gain_map_notes(data: bytes) -> tuple[ReadingNote, ...]:
-    """Return the note on a gain map, where a file has one.
+    """Return a note if a file has a gain map.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ def gain_map_notes(data: bytes) -> tuple[ReadingNote, ...]:
     Returns
     -------
     tuple of ReadingNote
-        None or one.
+        Empty or one note.
     """
     found = any(name in data for name in _NAMES) or b"tmap" in data[8:64]  # a brand of HEIF
     return (ReadingNote(ReadingNoteKind.GAIN_MAP),) if found else ()

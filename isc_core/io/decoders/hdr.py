@@ -1,14 +1,15 @@
 """Radiance HDR files: a mantissa for each channel and one exponent.
 
-Equation: channel = code 2^(exponent - 136), and 0 where the exponent is 0. A row is flat, four
-bytes a pixel, or begins with 2, 2 and its width, and then has its four channels one by one: a count
-above 128 repeats the next byte count - 128 times, another is followed by so many bytes.
+Equation: channel = code 2^(exponent - 136), and 0 where the exponent is 0. A row is either
+uncompressed, four bytes per pixel, or begins with 2, 2 and its width, followed by its four channels
+with run-length encoding: a count above 128 repeats the next byte count - 128 times, any other is
+followed by as many literal bytes.
 
 Citation: G. Ward, "Real Pixels", Graphics Gems II (1991), 80-83,
 doi:10.1016/B978-0-08-050754-5.50025-6.
 
-Limits: upright pictures in RGB; `EXPOSURE` is ignored, since only ratios of light count. The older
-run lengths, of whole pixels, are not read.
+Limits: upright pictures in RGB; `EXPOSURE` is ignored, since only ratios of light matter. The older
+run-length encoding of whole pixels is not supported.
 """
 
 import re
@@ -20,7 +21,7 @@ from ..limits import Limits
 from .raster import Raster, check_size, raster_of_codes
 
 _HEADER_BYTES = 1 << 14
-_SHORTEST, _LONGEST = 8, 0x7FFF  # rows of other lengths are flat
+_SHORTEST, _LONGEST = 8, 0x7FFF  # rows of other lengths are uncompressed
 _BIAS = 128 + 8
 
 
@@ -44,8 +45,8 @@ def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
     InputError
         If the size is not supported.
     ValueError
-        If 16 KiB hold no upright resolution line, the colours are not RGB, or the pixels are
-        damaged or incomplete.
+        If the first 16 KiB have no upright resolution line, the colours are not RGB, or the pixels
+        are damaged or incomplete.
     """
     size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data[:_HEADER_BYTES])
     if size is None:
@@ -64,7 +65,7 @@ def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
 
 
 def _unpacked(data: bytes, at: int, height: int, width: int) -> np.ndarray:
-    """Pixels (height, width, 4) uint8 of rows with run lengths that begin at a byte."""
+    """Pixels (height, width, 4) uint8 of run-length encoded rows from an offset."""
     pixels = np.empty((height, width, 4), np.uint8)
     start = b"\2\2" + width.to_bytes(2, "big")
     for row in pixels:
@@ -76,7 +77,7 @@ def _unpacked(data: bytes, at: int, height: int, width: int) -> np.ndarray:
 
 
 def _row(data: bytes, at: int, width: int) -> tuple[bytes, int]:
-    """The four channels of a row one behind the other, and where the next row begins."""
+    """The four channels of a row, concatenated, and the offset of the next row."""
     parts = []
     for _ in range(4):
         missing = width

@@ -1,8 +1,8 @@
-"""HEIC and HEIF files, by libheif through the optional package pillow-heif.
+"""HEIC and HEIF files, decoded by libheif through the optional package pillow-heif.
 
-libheif turns the picture as the file says. An EXIF orientation only repeats that, and is ignored.
+libheif applies the rotation in the file. An EXIF orientation is redundant and ignored.
 
-Limits: the primary picture alone; no depth maps, bursts and gain maps.
+Limits: only the primary picture; no depth maps, bursts or gain maps.
 """
 
 import io
@@ -28,7 +28,7 @@ from .raster import Raster, check_size, raster_of_codes
 def read_heif(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a HEIC.
 
-    More than 8 bits are spread over 16.
+    Codes of more than 8 bits are scaled to 16.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def read_heif(data: bytes, path: Path, limits: Limits) -> Raster:
     check_size(path, limits, *image.size)
     bits = int(image.info.get("bit_depth", 8))
     codes = np.asarray(image)
-    if codes.dtype == np.uint16:  # the bits are the upper ones
+    if codes.dtype == np.uint16:  # the code is in the upper bits
         spread = np.rint(np.arange(2**bits) * (65535 / (2**bits - 1))).astype(np.uint16)
         codes = spread[codes >> (16 - bits)]
     space, notes = _colours(image.info, 1 if codes.ndim == 2 else 3, path)

@@ -13,11 +13,11 @@ from .gain_map import gain_map_notes
 from .pillow import decode_pillow
 from .raster import Raster
 
-# A decoder visits every pixel in each scan, and cannot be interrupted. Writers make at most 14.
+# A decoder visits every pixel in each scan and cannot be interrupted. Encoders write at most 14.
 _MAX_SCANS = 100
 _MAX_SEGMENTS = 10_000
 _START_OF_SCAN, _END_OF_IMAGE = 0xDA, 0xD9
-# Compressed data hold 0xFF only before 0 and within restart markers.
+# Compressed data contain 0xFF only before 0 and within restart markers.
 _MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")
 
 
@@ -41,7 +41,7 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
     InputError
         If the size, the colour mode or the number of scans is not supported.
     ValueError
-        If the file has far more segments than a picture takes.
+        If the file has far more segments than a picture needs.
     """
     check_scans(data, path)
     image = JpegImagePlugin.JpegImageFile(io.BytesIO(data))
@@ -50,9 +50,9 @@ def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
 
 
 def check_scans(data: bytes, path: Path | str) -> None:
-    """Raise `InputError` for a JPEG of more scans than writers make.
+    """Raise `InputError` for a JPEG of more scans than encoders write.
 
-    Segments are skipped by their length, since metadata may hold another JPEG.
+    Segments are skipped by their length, since metadata may contain another JPEG.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def check_scans(data: bytes, path: Path | str) -> None:
     InputError
         If there are more than 100 scans.
     ValueError
-        If the file has far more segments than a picture takes.
+        If the file has far more segments than a picture needs.
     """
     scans, at = 0, 2
     for _ in range(_MAX_SEGMENTS):

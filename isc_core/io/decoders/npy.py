@@ -14,7 +14,7 @@ from .raster import Raster, check_size, raster_of_codes
 def read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a NumPy array (H, W), (H, W, 1), (H, W, 3) or (H, W, 4).
 
-    Alpha comes last and is not premultiplied. The size is checked by the header alone.
+    Alpha comes last and is not premultiplied. The size is checked from the header alone.
 
     Parameters
     ----------

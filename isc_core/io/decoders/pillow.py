@@ -43,7 +43,7 @@ def decode_pillow(
     space: ColourSpace | None = None,
     notes: tuple[ReadingNote, ...] = (),
 ) -> Raster:
-    """Decode an image of 8 bits a channel. Stricter than OpenCV: a truncated file raises OSError.
+    """Decode an image of 8 bits per channel. A truncated file raises OSError.
 
     Parameters
     ----------
@@ -52,9 +52,9 @@ def decode_pillow(
         Prefix of the error message.
     limits : Limits
     oriented : bool
-        Whether the decoder applies the orientation itself.
+        Whether the decoder has already applied the orientation.
     space : ColourSpace, optional
-        An ICC profile that Pillow finds in the file replaces it.
+        Replaced by an ICC profile that Pillow finds in the file.
     notes : tuple of ReadingNote
 
     Returns

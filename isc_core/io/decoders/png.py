@@ -18,7 +18,7 @@ from .raster import Raster, as_rgb, check_size, raster_of_codes
 
 # Writers split the pixels into chunks of 4 KiB or more.
 _CHUNKS, _CHUNK_BYTES = 1000, 512
-_HEADER = 33  # bytes of the signature and of IHDR, behind which a profile stands
+_HEADER = 33  # bytes of the signature and of IHDR, after which a profile is inserted
 _GREY = (0, 4)  # colour types
 _ABOUT = (b"IHDR", b"eXIf", b"IEND")
 _KEPT = (*_ABOUT, b"PLTE", b"tRNS", b"IDAT")
@@ -27,7 +27,7 @@ _KEPT = (*_ABOUT, b"PLTE", b"tRNS", b"IDAT")
 def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a PNG.
 
-    The checksum of each chunk is verified first, which decoders skip.
+    The checksum of each chunk is verified first, since decoders skip it.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """
     width, height, bits, kind = struct.unpack(">IIBB", data[16:26])
     check_size(path, limits, width, height)
-    deep = bits == 16  # Pillow opens it for its EXIF alone, and does not unpack the pixels
+    deep = bits == 16  # Pillow opens it only for its EXIF and does not decode the pixels
     plain, chunks = _plain_png(data, _ABOUT if deep else _KEPT)
     image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
     space, notes = space_of_chunks(chunks, 1 if kind in _GREY else 3, path)
@@ -60,9 +60,10 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
 
 
 def _plain_png(data: bytes, kinds: tuple[bytes, ...]) -> tuple[bytes, dict[bytes, bytes]]:
-    """The PNG reduced to some kinds of chunks, and what its chunks hold, those of pixels as one.
+    """The PNG reduced to some kinds of chunks, and the content of its chunks, with those of pixels
+    joined.
 
-    Raises ValueError for a wrong checksum, a missing end, or far more chunks than pixels take.
+    Raises ValueError for a wrong checksum, a missing end, or far more chunks than pixels need.
     """
     whole, at = memoryview(data), 8
     kept, pixels, held = [whole[:at]], list[memoryview](), dict[bytes, bytes]()
@@ -88,9 +89,9 @@ def _plain_png(data: bytes, kinds: tuple[bytes, ...]) -> tuple[bytes, dict[bytes
 
 
 def _with_alpha(codes: np.ndarray, transparent: bytes) -> np.ndarray:
-    """Codes of 16 bits, where grey with alpha is RGBA, and one transparent colour is alpha.
+    """Codes of 16 bits, with grey and alpha expanded to RGBA and a transparent colour to alpha.
 
-    One transparent grey stays grey.
+    A transparent grey level is ignored.
     """
     if codes.ndim == 3 and codes.shape[2] == 2:
         return codes[..., [0, 0, 0, 1]]

@@ -1,8 +1,8 @@
-"""The pixels of a PNG of 16 bits, which Pillow reduces to 8.
+"""Decoding of 16-bit PNGs, which Pillow reduces to 8 bits.
 
-Method: the filters of PNG work on bytes, and each on those of one place in the pixel. So the high
-bytes of all codes, with the filters of their rows, are the pixels of a PNG of 8 bits, and the low
-bytes those of another; Pillow decodes both.
+Method: PNG filters operate on bytes, separately for each byte position in a pixel. So the high
+bytes of all codes, with the filters of their rows, form an 8-bit PNG, and the low bytes another;
+Pillow decodes both.
 
 Citation: W3C Recommendation "Portable Network Graphics" (2003), sections 8.2 and 9.
 """
@@ -15,7 +15,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from PIL import Image
 
-_MODES = {0: "L", 2: "RGB", 4: "LA", 6: "RGBA"}  # of Pillow, a letter a channel, by colour type
+_MODES = {0: "L", 2: "RGB", 4: "LA", 6: "RGBA"}  # of Pillow, one letter per channel, by colour type
 # First column and row, and steps, of the seven passes of an interlaced picture.
 _PASSES = (
     *((0, 0, 8, 8), (4, 0, 8, 8), (0, 4, 4, 8), (2, 0, 4, 4)),
@@ -24,14 +24,14 @@ _PASSES = (
 
 
 def deep_codes(header: bytes, packed: bytes) -> np.ndarray:
-    """Decode the pixels of a PNG of 16 bits.
+    """Decode the pixels of a 16-bit PNG.
 
     Parameters
     ----------
     header : bytes
-        What the chunk IHDR holds.
+        Content of the chunk IHDR.
     packed : bytes
-        What the chunks IDAT hold.
+        Joined content of the chunks IDAT.
 
     Returns
     -------

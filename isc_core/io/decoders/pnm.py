@@ -11,8 +11,8 @@ from ..limits import Limits
 from .pillow import decode_pillow
 from .raster import Raster, check_size, raster_of_codes
 
-# Magic number, width, height and, but for bitmaps, the largest code. Possessive: what is blank is
-# never tried again.
+# Magic number, width, height and, except for bitmaps, the largest code. Possessive quantifiers
+# prevent backtracking over whitespace.
 _GAP = rb"(?:\s|#[^\n]*+\n)++"
 _BITMAP = re.compile(rb"P[14]" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)\s")
 _MAP = re.compile(rb"P([2356])" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)\s")

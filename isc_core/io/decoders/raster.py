@@ -1,4 +1,4 @@
-"""The raster that every decoder returns, and the checks that all of them share."""
+"""The raster that every decoder returns, and shared checks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +17,8 @@ MIN_SIDE = 8
 
 @dataclass(frozen=True)
 class Raster:
-    """What an image file stores, upright (its orientation applied), before any transfer curve.
+    """The stored values of an image file, upright (its orientation applied), before any transfer
+    curve.
 
     Attributes
     ----------
@@ -26,19 +27,19 @@ class Raster:
     alpha : (H, W) float32 ndarray or None
         In [0, 1].
     peak : int or None
-        Largest code the file can hold; None for floats.
+        Largest code of the format; None for floats.
     bit_depth : int
-        Bits a channel.
+        Bits per channel.
     sha256 : str
         Of the whole file.
     space : ColourSpace or None
-        What the file says about its colours; None where it says nothing.
+        The colour space of the file; None where it states none.
     saturated : (H, W) bool ndarray or None
-        Where a sensor was saturated; None where the largest code says it.
+        Where the sensor was saturated; None where only the largest code shows it.
     notes : tuple of ReadingNote
-        What was assumed or left out.
+        Assumptions and omissions.
     focal_length : FocalLength or None
-        Where the metadata give it.
+        From the metadata; None without one.
     """
 
     values: np.ndarray
@@ -58,7 +59,7 @@ class Raster:
 
 
 def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
-    """Raise `InputError` for a size that does not fit or cannot be a photo of an object.
+    """Raise `InputError` for a size that is too large or implausible for a photo of an object.
 
     Parameters
     ----------
@@ -66,7 +67,7 @@ def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
         Prefix of the error message.
     limits : Limits
     width, height : int
-        From the header alone.
+        From the header.
     """
     limits.check_pixels(path, width, height)
     if min(width, height) < MIN_SIDE:
@@ -131,8 +132,8 @@ def raster_of_codes(
 
 
 def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
-    """Apply an EXIF orientation, 1 to 8 (others count as 1), to (H, W, C) pixels: 5 to 8 swap the
-    axes, the rest are flips.
+    """Apply an EXIF orientation, 1 to 8 (others are treated as 1), to (H, W, C) pixels: 5 to 8 swap
+    the axes, the rest are flips.
     """
     if orientation in (5, 6, 7, 8):
         pixels = pixels.transpose(1, 0, 2)

@@ -1,16 +1,16 @@
-"""Camera raw files (DNG, CR2, CR3, NEF, ARW and others), by LibRaw through the package rawpy.
+"""Camera raw files (DNG, CR2, CR3, NEF, ARW and others), developed by LibRaw through rawpy.
 
-The picture is linear Rec.709 of 16 bits: black level off, white balance as the camera set it, no
-automatic brightness, 1 is where the sensor saturates. A raw file is recognised by its content: many
-are TIFF files, in which the directory of the raw pixels has the photometric interpretation of a
-colour filter array or of linear raw, or the tag `DNGVersion`.
+The picture is 16-bit linear Rec.709: black level subtracted, white balance of the camera, no
+automatic brightness, 1 at the saturation of the sensor. A raw file is detected from its content:
+many are TIFF files, in which the directory of the raw pixels has the photometric interpretation of
+a colour filter array or of linear raw, or the tag `DNGVersion`.
 
 Citation: Adobe, "Digital Negative (DNG) Specification" 1.7.1 (2023); K. Hirakawa and T. W. Parks
-(2005), "Adaptive homogeneity-directed demosaicing algorithm", doi:10.1109/TIP.2004.838691, which is
-LibRaw's usual one.
+(2005), "Adaptive homogeneity-directed demosaicing algorithm", doi:10.1109/TIP.2004.838691, LibRaw's
+default.
 
 Limits: lens corrections, local tone curves and opcodes of a DNG are not applied. Where a pixel is
-saturated, so are its neighbours, from which demosaicing took its colours.
+saturated, its neighbours are marked, too, since demosaicing uses it for their colours.
 """
 
 import io
@@ -50,7 +50,7 @@ _MOST_DIRECTORIES, _MOST_ENTRIES = 16, 500
 
 
 def is_raw(data: bytes) -> bool:
-    """Tell whether a file is a camera raw file.
+    """Return whether a file is a camera raw file.
 
     Parameters
     ----------
@@ -139,8 +139,8 @@ def _library(path: Path) -> ModuleType:
 
 
 def _saturated(raw: Any) -> np.ndarray | None:
-    """Where the developed picture (H, W) depends on a saturated pixel of the sensor; None where
-    the sensor's pixels are not there.
+    """Where the developed picture (H, W) depends on a saturated pixel of the sensor; None without
+    the sensor's pixels.
     """
     sensor = raw.raw_image_visible
     if sensor is None:
@@ -154,14 +154,14 @@ def _saturated(raw: Any) -> np.ndarray | None:
     else:
         bayer = raw.raw_pattern is None or len(raw.raw_pattern) == 2
         full = maximum_filter(full, 3 if bayer else 5)
-    # LibRaw's turn: the bits are columns reversed, rows reversed, transposed.
+    # LibRaw's orientation: the bits are columns reversed, rows reversed, transposed.
     flip = raw.sizes.flip
     full = full[:: -1 if flip & 2 else 1, :: -1 if flip & 1 else 1]
     return full.T if flip & 4 else full
 
 
 def _directories(data: bytes) -> Iterator[dict[int, tuple[int, ...]]]:
-    """The numbers of the tags of a TIFF's directories and of those below."""
+    """The numeric tags of a TIFF's directories and sub-directories."""
     order = "<" if data[:2] == b"II" else ">"
     try:
         waiting = [struct.unpack_from(f"{order}I", data, 4)[0]]
@@ -175,12 +175,12 @@ def _directories(data: bytes) -> Iterator[dict[int, tuple[int, ...]]]:
             yield tags
             following = struct.unpack_from(f"{order}I", data, start + 2 + 12 * count)
             waiting += [n for n in (*tags.get(_SUB_DIRECTORIES, ()), *following) if n]
-    except struct.error:  # cut short: what was found counts
+    except struct.error:  # truncated: the tags found so far are used
         return
 
 
 def _entry(data: bytes, order: str, at: int) -> tuple[int, tuple[int, ...]]:
-    """Tag and numbers of a directory's entry; only sub-directories have several that matter."""
+    """Tag and numbers of a directory's entry; only sub-directories have several relevant ones."""
     tag, kind, count = struct.unpack_from(f"{order}HHI", data, at)
     if tag == _SUB_DIRECTORIES and 1 < count <= _MOST_DIRECTORIES:
         (start,) = struct.unpack_from(f"{order}I", data, at + 8)

@@ -1,4 +1,4 @@
-"""TIFF and BigTIFF files, of 8 and 16 bits and floats; the first of several pages."""
+"""TIFF and BigTIFF files of 8 and 16 bits and floats; only the first page."""
 
 import io
 from pathlib import Path

@@ -1,17 +1,17 @@
-"""The samples of a TIFF of 16 bits and floats, which Pillow reduces to 8 bits or does not know.
+"""Samples of TIFF files of 16 bits and floats, which Pillow reduces to 8 bits or does not support.
 
-Problem: libtiff, which Pillow includes, unpacks all that TIFF packs in, but Pillow passes on pixels
-of few kinds.
+Problem: libtiff, which Pillow includes, decompresses all kinds of TIFF, but Pillow supports few
+pixel formats.
 
-Method: a strip or tile is a picture of grey bytes to it: the packed bytes go into a TIFF that says
-so, and what Pillow reads there is what the strip holds. The predictors are undone here: 2, each
-sample is the difference from that of the pixel before; 3, the bytes of a row's floats are sorted by
-their place in the float, and differences are between bytes.
+Method: the compressed bytes of a strip or tile are wrapped in a TIFF of grey bytes, from which
+Pillow reads its decompressed content. The predictors are undone here: with 2, each sample is stored
+as the difference from the previous pixel's; with 3, the bytes of a row's floats are sorted by their
+significance, and differences are between bytes.
 
 Citation: TIFF Revision 6.0 (1992), sections 3, 14 and 15; Adobe Photoshop TIFF Technical Note 3
 (2005).
 
-Limits: compressions of bytes (none, LZW, Deflate, PackBits, Zstandard, LZMA).
+Limits: lossless compression of bytes (none, LZW, Deflate, PackBits, Zstandard, LZMA).
 """
 
 import io
@@ -31,14 +31,14 @@ _WIDEST_TILE = 1 << 14
 
 @dataclass(frozen=True)
 class _Grid:
-    """How the pixels of a plane are divided: into strips of all columns, or into tiles.
+    """The division of a plane's pixels into strips of all columns, or into tiles.
 
     Attributes
     ----------
     rows, columns : int
         Of a strip or tile; the last strip may be shorter.
     down, across : int
-        How many there are.
+        Number of strips or tiles.
     tiled : bool
     """
 
@@ -62,12 +62,12 @@ def tiff_samples(data: bytes, tags: Mapping[int, Any]) -> np.ndarray:
     Returns
     -------
     (H, W, C) ndarray
-        uint16, float16, float32 or float64; as stored, not turned upright.
+        uint16, float16, float32 or float64; without the orientation applied.
 
     Raises
     ------
     OSError, ValueError, KeyError
-        If the file is damaged, incomplete or packed in another way.
+        If the file is damaged, incomplete or of another compression.
     """
     width, height = int(tags[256]), int(tags[257])
     samples, planar = int(tags.get(277, 1)), int(tags.get(284, 1))
@@ -87,7 +87,7 @@ def tiff_samples(data: bytes, tags: Mapping[int, Any]) -> np.ndarray:
 
 
 def sample_type(tags: Mapping[int, Any]) -> np.dtype[Any] | None:
-    """Return what all samples are, in the machine's byte order; None if it is not supported.
+    """Return the type of all samples, in native byte order; None if it is not supported.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _grid(tags: Mapping[int, Any], width: int, height: int) -> _Grid:
 
 
 def _parts(data: bytes, tags: Mapping[int, Any], grid: _Grid, count: int) -> list[bytes]:
-    """The packed bytes of all strips or tiles."""
+    """The compressed bytes of all strips or tiles."""
     at, lengths = (
         [int(n) for n in np.ravel(tags[tag])] for tag in ((324, 325) if grid.tiled else (273, 279))
     )
@@ -139,7 +139,7 @@ def _plane(
     depth: int,
     kind: np.dtype[Any],
 ) -> np.ndarray:
-    """Samples (rows, columns, depth) of strips or tiles side by side."""
+    """Samples (rows, columns, depth) of adjacent strips or tiles."""
     line = grid.columns * depth * kind.itemsize
     rows = grid.down * grid.rows if grid.tiled else height
     packed = _as_grey(parts, tags, grid, line * grid.across, rows, line)
@@ -152,7 +152,7 @@ def _plane(
 def _as_grey(
     parts: list[bytes], tags: Mapping[int, Any], grid: _Grid, width: int, rows: int, line: int
 ) -> np.ndarray:
-    """The bytes (rows, width) uint8 that strips or tiles of lines of so many bytes hold."""
+    """The decompressed bytes (rows, width) uint8 of strips or tiles with lines of `line` bytes."""
     entries = {256: width, 257: rows, 258: 8, 259: int(tags.get(259, 1)), 262: 1, 277: 1}
     entries[266] = int(tags.get(266, 1))
     entries |= {322: line, 323: grid.rows} if grid.tiled else {278: grid.rows}

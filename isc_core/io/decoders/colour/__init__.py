@@ -1,1 +1,1 @@
-"""What image files say about their colours: ICC profiles, code points, chunks."""
+"""Colour spaces of image files: ICC profiles, code points, PNG chunks."""

@@ -1,10 +1,10 @@
-"""Colours by code points: how AVIF, HEIF and PNG name their primaries and curve in numbers.
+"""Coding-independent code points: the primaries and transfer curve of AVIF, HEIF and PNG files.
 
 Citation: Recommendation ITU-T H.273 (2021), "Coding-independent code points for video signal type
 identification", tables 2 and 3; Display P3 as SMPTE EG 432-1 (2010).
 
-Limits: the curves of television (1, 6, 14, 15) count as sRGB's, which is what cameras mean by them.
-Curves of HDR (PQ, HLG) are refused: their white is no white of paper.
+Limits: the curves of television (1, 6, 14, 15) are treated as sRGB, since cameras label sRGB so.
+HDR curves (PQ, HLG) are not supported: their peak is not diffuse white.
 """
 
 from pathlib import Path
@@ -27,7 +27,7 @@ _HDR = {16: "PQ", 18: "HLG"}
 
 
 def space_of_code_points(primaries: int, transfer: int, path: Path) -> ColourSpace | None:
-    """Return the colour space that code points name.
+    """Return the colour space of code points.
 
     Parameters
     ----------
@@ -39,12 +39,12 @@ def space_of_code_points(primaries: int, transfer: int, path: Path) -> ColourSpa
     Returns
     -------
     ColourSpace or None
-        None for sRGB and for what is unspecified or unknown.
+        None for sRGB and for unspecified or unknown code points.
 
     Raises
     ------
     InputError
-        For a curve of HDR.
+        For an HDR curve.
     """
     if transfer in _HDR:
         raise InputError(

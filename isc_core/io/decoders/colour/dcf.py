@@ -1,4 +1,4 @@
-"""Adobe RGB as cameras mark it: by EXIF alone, without a profile.
+"""Adobe RGB in files of cameras: marked in EXIF, without a profile.
 
 Citation: CIPA DC-009-2010, "Design rule for Camera File system: DCF version 2.0": a file of the
 optional colour space has the interoperability index "R03"; Adobe Systems, "Adobe RGB (1998) Color
@@ -17,7 +17,7 @@ _ADOBE_RGB = ((0.64, 0.33), (0.21, 0.71), (0.15, 0.06), (0.3127, 0.3290))
 
 
 def space_of_exif(image: Image.Image) -> ColourSpace | None:
-    """Return Adobe RGB for a picture that a camera marked so.
+    """Return Adobe RGB if a camera marked the picture so.
 
     Parameters
     ----------

@@ -1,16 +1,16 @@
-"""ICC profiles: the colour space that an image file names, as curves and colorants.
+"""ICC profiles: the colour space of an image file, as curves and colorants.
 
-Problem: LittleCMS in Pillow converts 8 bits a channel. A photo of 16 bits keeps its precision where
-its profile is three colorants and curves, as those of cameras, displays and editors are: the tags
-`rXYZ`, `gXYZ`, `bXYZ` and `rTRC`, `gTRC`, `bTRC`, or `kTRC` of grey. The rest of `photo` converts
-them in floats. A profile that is a table of colours alone goes through LittleCMS, see
-`table_profile`.
+Problem: LittleCMS in Pillow converts with 8 bits per channel. A photo of 16 bits keeps its
+precision if its profile consists of three colorants and curves, as those of cameras, displays and
+editors do: the tags `rXYZ`, `gXYZ`, `bXYZ` and `rTRC`, `gTRC`, `bTRC`, or `kTRC` for grey. `photo`
+converts such colours in floating point. A profile with only a table of colours is applied by
+LittleCMS, see `table_profile`.
 
 Citation: International Color Consortium, Specification ICC.1:2022 (profile version 4.4), and
 ICC.1:2001-04 (version 2.4).
 
-Limits: with both, curves and colorants are used, not the table. The profile of another colour model
-than that of the pixels is broken.
+Limits: if a profile has both, curves and colorants are used, not the table. A profile of another
+colour model than that of the pixels is treated as broken.
 """
 
 import struct
@@ -37,7 +37,7 @@ def space_of_profile(
     Parameters
     ----------
     profile : bytes or None
-        The profile as embedded; None where its parts are incomplete.
+        The embedded profile; None where parts of it are missing.
     channels : int
         Of the pixels without alpha, 1 or 3.
 
@@ -71,7 +71,7 @@ def read_profile(profile: bytes, channels: int) -> ColourSpace:
     Raises
     ------
     ValueError
-        If the profile is damaged, or not one of grey or RGB pixels.
+        If the profile is damaged, or not for grey or RGB pixels.
     """
     try:
         tags, model = _tags(profile), profile[16:20]
@@ -106,7 +106,7 @@ def _tags(profile: bytes) -> dict[bytes, bytes]:
 
 
 def _curve(content: bytes) -> ToneCurve:
-    """A tag of type `curv` or `para`; raises ValueError for one that falls or is flat."""
+    """A tag of type `curv` or `para`; raises ValueError for a decreasing or constant curve."""
     kind, curve = content[:4], None
     if kind == b"curv":
         curve = _sampled(content)

@@ -1,4 +1,4 @@
-"""What a PNG says about its colours, in the order in which the chunks count.
+"""The colour space of a PNG, from its chunks in order of precedence.
 
     cICP   code points, see `cicp`
     iCCP   an ICC profile, see `icc`
@@ -7,8 +7,7 @@
 
 Citation: W3C, "Portable Network Graphics (PNG) Specification", third edition (2025), section 4.3.
 
-Limits: a gAMA within 1 % of 1 / 2.2 is sRGB's curve, as the specification has it for what writers
-of sRGB store.
+Limits: a gAMA within 1 % of 1 / 2.2 is treated as the curve of sRGB, for which writers store it.
 """
 
 import struct
@@ -43,13 +42,13 @@ def space_of_chunks(
     Returns
     -------
     space : ColourSpace or None
-        None for sRGB and where nothing is said.
+        None for sRGB and without colour chunks.
     notes : tuple of ReadingNote
 
     Raises
     ------
     InputError
-        For a curve of HDR.
+        For an HDR curve.
     """
     if len(chunks.get(b"cICP", b"")) == 4:
         return space_of_code_points(chunks[b"cICP"][0], chunks[b"cICP"][1], path), ()

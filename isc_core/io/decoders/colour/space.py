@@ -1,4 +1,4 @@
-"""What the codes of an image file mean where they are not plain sRGB: tone curves and primaries.
+"""Colour spaces of image files other than sRGB: tone curves and primaries.
 
 Equation: linear light of a channel is curve(code / peak); its colour in CIE XYZ is the sum of the
 three colorants, each times its channel.
@@ -8,7 +8,7 @@ three colorants, each times its channel.
 
 Citation: International Color Consortium, Specification ICC.1:2022, sections 10.6 and 10.18.
 
-Limits: the curves are clamped to [0, 1]. How colours are converted to Rec.709: `photo.primaries`.
+Limits: the curves are clamped to [0, 1]. The conversion to Rec.709 is in `photo.primaries`.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ import numpy as np
 
 
 class ToneCurve(Protocol):
-    """From codes to linear light, both in [0, 1]; never falling."""
+    """From codes to linear light, both in [0, 1]; monotonic."""
 
     def __call__(self, codes: np.ndarray) -> np.ndarray:
         """Return the linear light of codes.
@@ -109,13 +109,13 @@ class ColourSpace:
     Attributes
     ----------
     name : str
-        For people, in printable characters.
+        For messages, in printable characters.
     curves : tuple of ToneCurve
-        One a channel, or one for all; none: the usual curve of the format.
+        One per channel, or one for all; empty: the default curve of the format.
     colorants : (3, 3) ndarray or None
         CIE XYZ of the primaries in the columns, whose sum is white; None: Rec.709.
     profile : bytes
-        The ICC profile that it comes from, empty without one.
+        The ICC profile, empty without one.
     is_table : bool
         The profile is a table of colours, without curves and colorants.
     """
@@ -143,8 +143,8 @@ def colorants_of(chromaticities: np.ndarray) -> np.ndarray:
     Raises
     ------
     ValueError
-        If they are no primaries: not finite, all on one line, or a white without light or outside
-        of their triangle.
+        If they are invalid: not finite, collinear, or a white without light or outside the triangle
+        of the primaries.
     """
     xy = np.asarray(chromaticities, float)
     if not np.isfinite(xy).all() or np.abs(xy).max() > 10 or not xy[3, 1] > 1e-3:

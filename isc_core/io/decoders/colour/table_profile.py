@@ -1,10 +1,10 @@
-"""ICC profiles that are tables of colours, applied by LittleCMS.
+"""ICC profiles with tables of colours, applied by LittleCMS.
 
 Problem: scanners and printers, and a few editors, describe colours by a table (`A2B0`) instead of
 curves and colorants. LittleCMS interpolates it.
 
-Limits: Pillow's binding converts 8 bits a channel, so 16 bits lose half of theirs; colours outside
-of sRGB are clipped. Perceptual intent, LittleCMS's default.
+Limits: Pillow's binding converts with 8 bits per channel, so 16-bit photos lose half of theirs;
+colours outside sRGB are clipped. Perceptual intent, LittleCMS's default.
 """
 
 import io
