@@ -26,7 +26,7 @@ from ..io.regular_files import read_regular
 from .commands.registry import all_commands, find_command
 from .interface.parser import GENERAL, actions_of
 
-DEFAULT_LIMITS = Path("isc.toml")
+DEFAULT_FILE = Path("isc.toml")
 _ONLY_IF_NAMED = frozenset({"scheduler"})
 _MAX_BYTES = 1 << 20
 
@@ -80,7 +80,7 @@ def _find(arguments: Sequence[str]) -> tuple[Path | None, bool]:
     known, _ = finder.parse_known_args(arguments)
     if known.config is not None:
         return Path(known.config), True
-    return (None if known.no_config or not DEFAULT_LIMITS.is_file() else DEFAULT_LIMITS), False
+    return (None if known.no_config or not DEFAULT_FILE.is_file() else DEFAULT_FILE), False
 
 
 def _read(path: Path) -> dict[str, object]:

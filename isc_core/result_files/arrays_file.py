@@ -1,8 +1,8 @@
-"""All of a result as plain arrays in one file, for programs that have only NumPy, such as Blender.
+"""A whole result as plain arrays in one file, for programs that have only NumPy, such as Blender.
 
-Problem: maps are OpenEXR, the mesh is glTF, and the light is nine coefficients of a logarithm: a
-program needs libraries to read them and mathematics to use them. `arrays.npz` (uncompressed, no
-pickles) holds what such a program needs, float32 unless stated otherwise:
+Problem: maps are OpenEXR, the mesh is glTF, and the light is nine SH coefficients of log shading: a
+program needs libraries to read them and code to evaluate them. `arrays.npz` (uncompressed, no
+pickles) contains all of it as arrays, float32 unless stated otherwise:
 
     image, diffuse, specular, residual, reflectance, shading   (H, W, 3), linear Rec.709, 0 outside
     normal (H, W, 3), height, confidence (H, W), mask (H, W) bool   as in maps.exr
@@ -120,9 +120,9 @@ def mesh_of(
     d : Decomposition
     options : MeshOptions, optional
     cover : ObjectCover, optional
-        Whose outline it follows, unless the object is too thin to have one: smoothed, it vanishes.
+        The mesh follows its outline, unless the object is so thin that smoothing would remove it.
     gloss : SpecularFit, optional
-        That of another mesh of this result.
+        From another mesh of this result, if it is known.
 
     Returns
     -------
@@ -135,13 +135,13 @@ def mesh_of(
     """
     if gloss is not None:
         return _coated(d, _surface_of(d, options, cover), gloss)
-    with ThreadPoolExecutor(1) as aside:  # half of the work
-        found = aside.submit(bounded_specular, d)
+    with ThreadPoolExecutor(1) as pool:  # half of the work
+        found = pool.submit(bounded_specular, d)
         return _coated(d, _surface_of(d, options, cover), found.result())
 
 
 def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResult:
-    """The mesh with its gloss, and with the light that this mirrors, if any."""
+    """The mesh with its gloss, and with the light that it reflects, if any."""
     if not gloss.specular:
         return replace(built, gloss=gloss)
     from ..lobe_fitting.specular_layer import ENVIRONMENT_ROWS, CoatedSurface

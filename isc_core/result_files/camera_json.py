@@ -1,9 +1,9 @@
 """The camera of a result in decomposition.json.
 
 The entry `camera` has `type` ("perspective" or "orthographic") and `source` ("exif", "option" or
-"none"); before a camera also `focal_length`, pixels of the maps, `principal_point`, (x, y) in
-pixels from the left and upper edge of the maps, and `axis`, the unit vector from the camera to the
-object from which heights are counted. Results of earlier versions have no such entry, and are
+"none"); for a perspective camera also `focal_length`, pixels of the maps, `principal_point`, (x, y)
+in pixels from the left and upper edge of the maps, and `axis`, the unit vector from the camera to
+the object along which heights are measured. Results of earlier versions have no such entry, and are
 orthographic. The file is not trusted.
 """
 
@@ -27,7 +27,7 @@ def camera_to_json(d: Decomposition) -> dict[str, Any]:
     Returns
     -------
     dict
-        Ready for JSON but for its arrays.
+        Ready for JSON except for its arrays.
     """
     if d.camera is None:
         return {"type": ORTHOGRAPHIC, "source": "none"}
@@ -46,7 +46,7 @@ def camera_from_json(record: Any) -> Camera | None:
     Parameters
     ----------
     record : Any
-        The entry as JSON values; None where there is none.
+        The entry as JSON values; None without one.
 
     Returns
     -------
@@ -56,7 +56,7 @@ def camera_from_json(record: Any) -> Camera | None:
     Raises
     ------
     ValueError
-        If the entry is no camera.
+        If the entry is not a camera.
     """
     if record is None or (isinstance(record, dict) and record.get("type") == ORTHOGRAPHIC):
         return None

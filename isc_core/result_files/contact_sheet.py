@@ -2,12 +2,12 @@
 
 Exposure: input, diffuse and specular share one exposure, so that they can be compared; reflectance
 has its own, and so has shading, which the light shares unless it would be too bright. An exposure
-puts the 99.5th percentile of the largest channel inside the mask at 0.95. Everything is blended in
+maps the 99.5th percentile of the largest channel inside the mask to 0.95. Pictures are blended in
 linear light and encoded as sRGB at the end. Maps are cropped to the object and scaled with their
 mask as weight, so that no black bleeds in at the edge.
 
-The height is drawn as a relief lit from the upper left, with contour lines at round distances; the
-light as a white sphere. `other_views` draws the object from both sides and in another light.
+The height is shown as a relief lit from the upper left, with contour lines at round numbers; the
+light as a white sphere. `other_views` renders the object from both sides and in another light.
 """
 
 from collections.abc import Mapping, Sequence
@@ -89,8 +89,8 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
             "x right, y up, z to viewer",
         )
     )
-    with ThreadPoolExecutor(1) as aside:  # half of the work
-        turned = aside.submit(turned_panels, d, frame, small, photo)
+    with ThreadPoolExecutor(1) as pool:  # half of the work
+        turned = pool.submit(turned_panels, d, frame, small, photo)
         panels += [_relief(d, frame, small), _light_panel(d, light)]
         last = [relit_panel(d, frame, small), _error_panel(d, frame)]
         panels += [*turned.result(), *last]
@@ -98,8 +98,8 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
 
 
 def _light_panel(d: Decomposition, gain: float) -> Panel:
-    """The light on a white sphere, which shows more directions than the object: darker than `gain`
-    where it would be too bright.
+    """The light on a white sphere, which has more normals than the object; darker than by `gain` if
+    it would be too bright.
     """
     ball, coverage = _ball(d.illumination)
     gain = min(gain, exposure(ball[coverage > 0.5]))
@@ -107,7 +107,7 @@ def _light_panel(d: Decomposition, gain: float) -> Panel:
 
 
 def _error_panel(d: Decomposition, frame: Frame) -> Panel:
-    """The expected error of the normals; the confidence where it is not known."""
+    """The expected error of the normals, or the confidence if it is unknown."""
     if d.expected_error is None:
         grey = srgb_to_linear(np.clip(frame.scaled(d.confidence), 0, 1))
         color = np.repeat(grey[..., None], 3, axis=2)
@@ -172,7 +172,7 @@ def separation_sheet(
 
 @dataclass(frozen=True)
 class LabelledSeparation:
-    """A separation to compare with others: the method's name, a remark in grey, and the layers."""
+    """A separation in a comparison: the method's name, a remark in grey, and the layers."""
 
     label: str
     remark: str
@@ -189,9 +189,9 @@ def comparison_sheet(
     """Draw many separations of one photo: diffuse layer, specular layer and error of each.
 
     Errors of the diffuse layer are orange where too much light remains and blue where too much was
-    removed, saturated from a tenth of the photo's white. Without ground truth the confidence takes
-    their place, white where it is 1. The first three panels are the photo and the ground truth, or
-    the photo, its smallest channel and its chromaticity, the inputs of colour-based methods.
+    removed, saturated from a tenth of the photo's white. Without ground truth the confidence is
+    shown instead, white where it is 1. The first three panels are the photo and the ground truth,
+    or the photo, its smallest channel and its chromaticity, the inputs of colour-based methods.
 
     Parameters
     ----------
@@ -266,7 +266,7 @@ class MapPanel:
     mask : (H, W) bool ndarray
     label, remark : str
     own_exposure : bool
-        Scale to its own exposure instead of the first map's.
+        Whether to use its own exposure instead of the first map's.
     """
 
     values: np.ndarray
@@ -289,7 +289,7 @@ def edit_sheet(
     ----------
     title, subtitle : str
     maps : sequence of MapPanel
-        In the exposure of the first of them.
+        Shown with the exposure of the first.
     others : sequence of Panel
         (320, 320) pixels each, unchanged.
     columns : int
@@ -328,7 +328,7 @@ def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
 
 
 def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A white ball under the light, (N, N, 3), and its coverage, (N, N)."""
+    """A white sphere under the light, (N, N, 3), and its coverage, (N, N)."""
     radius = SIDE * (0.5 - MARGIN) * 0.9
     axis = (np.arange(SIDE) + 0.5 - SIDE / 2) / radius
     x, y = np.meshgrid(axis, -axis)
@@ -338,7 +338,7 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     x, y, distance = x[seen], y[seen], distance[seen]
     shrink = np.minimum(
         1, 1 / np.maximum(distance, 1e-9)
-    )  # outside the outline: its normal, for the pixels that it crosses
+    )  # outside the outline: the normal at the outline, for partly covered pixels
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
     color[seen] = np.exp(real_sh(normal) @ illumination)
     return color, coverage
@@ -444,9 +444,7 @@ def _write_keys(
     place: tuple[float, float],
     keys: Sequence[tuple[str, tuple[int, int, int]]],
 ) -> float:
-    """Draw squares of colour with their texts, the last at the right end `place`; return where they
-    begin.
-    """
+    """Draw a legend of coloured squares and texts, right-aligned at `place`; return its left end."""
     right, baseline = place
     font = _font(14)
     for text, color in reversed(keys):
@@ -484,7 +482,7 @@ def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
 
 def _picture(panel: Panel) -> Image.Image:
     """The panel on its card, blended in linear light."""
-    covered = np.flatnonzero(panel.coverage)  # all around is the card alone
+    covered = np.flatnonzero(panel.coverage)  # elsewhere only the card is visible
     alpha = panel.coverage.ravel().take(covered).astype(np.float32)
     rest, planes = 1 - alpha, []
     for channel, card in enumerate(_CARD):
@@ -499,7 +497,7 @@ def _picture(panel: Panel) -> Image.Image:
 
 
 def _rounded() -> Image.Image:
-    """The card's shape, with smooth round corners: those of a small card."""
+    """The coverage of the card, with antialiased round corners taken from a small card."""
     half = 2 * _RADIUS
     drawn = Image.new("L", (8 * half, 8 * half), 0)
     box = (0, 0, 8 * half - 1, 8 * half - 1)

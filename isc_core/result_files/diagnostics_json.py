@@ -1,7 +1,7 @@
 """Reading the diagnostics of a result from decomposition.json.
 
-Schema 2 holds what `Diagnostics.to_json` writes. Schema 1 held sentences: the entries "gloss" and
-"joint", and the list "doubts"; they are recognised by their beginnings. The file is not trusted:
+Schema 2 is the format of `Diagnostics.to_json`. Schema 1 had sentences: the entries "gloss" and
+"joint", and the list "doubts"; they are recognised by their prefixes. The file is not trusted:
 parts of the wrong type or with unknown values are ignored.
 """
 
@@ -109,7 +109,7 @@ def old_lobe_outcome(reason: str) -> LobeFitOutcome:
     Returns
     -------
     LobeFitOutcome
-        What it meant.
+        The corresponding outcome.
 
     Raises
     ------

@@ -17,7 +17,7 @@ from ..scene.diagnostics import (
 )
 from .diagnostics_json import diagnostics_from_json
 
-_MOST_LOG = 10.0  # larger errors of the logarithm come from somebody else's file
+_MOST_LOG = 10.0  # larger errors of the logarithm occur only in invalid files
 STOPPED_EARLY = "the solver reached its limit of evaluations: try a cleaner mask"
 STRONG_COLOUR = "the light or the whole object has a strong colour: photograph it in white light"
 CROPPED = (
@@ -88,7 +88,7 @@ def status_lines(status: Any) -> list[str]:
     Parameters
     ----------
     status : Any
-        The entry, of any schema; the file may be anybody's, and unusable parts are ignored.
+        The entry, of any schema; the file is not trusted, and invalid parts are ignored.
 
     Returns
     -------
@@ -152,7 +152,7 @@ def outcome_text(outcome: LobeFitOutcome) -> str:
 
 
 def lobe_text(lobe: LobeDiagnostics) -> str:
-    """Write the roughness with its interval, or why it is not determined.
+    """Write the roughness with its interval, or the reason why it is not determined.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def lobe_text(lobe: LobeDiagnostics) -> str:
 
 
 def expected_error_text(error: ExpectedErrorDiagnostics) -> str:
-    """Write how wrong a result probably is.
+    """Write the expected error of a result.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def expected_error_text(error: ExpectedErrorDiagnostics) -> str:
 
 
 def light_colour_advice(light: LightColourDiagnostics | None) -> str:
-    """Write what to do about the light's colour.
+    """Write the recommended setting for the light's colour.
 
     Parameters
     ----------
@@ -202,7 +202,7 @@ def light_colour_advice(light: LightColourDiagnostics | None) -> str:
     Returns
     -------
     str
-        "" for nothing.
+        "" without a recommendation.
     """
     if light is None:
         return ""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-# Degrees, and the colour in sRGB codes; in between, colours are mixed by the logarithm.
+# Degrees, and the colour in sRGB codes; colours are interpolated over the logarithm.
 SCALE = (
     (10, (54, 110, 214)),
     (20, (66, 178, 150)),
@@ -17,7 +17,7 @@ def error_colors(degrees: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     degrees : (...) ndarray
-        At least 0; errors beyond the ends of the scale have the colours of its ends.
+        At least 0; errors beyond the scale have the colours of its ends.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Reading known inputs of a scene: height maps and lights, from the file formats in use."""
+"""Reading known height maps and lights of a scene from common file formats."""
 
 from pathlib import Path
 from typing import Any
@@ -80,7 +80,7 @@ def read_light(path: str | Path) -> np.ndarray:
     Raises
     ------
     InputError
-        If the file holds no light.
+        If the file has no light.
     """
     path = Path(path)
     path = path / "decomposition.json" if path.is_dir() else path
@@ -161,7 +161,7 @@ def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
             f"{folder} is the result of a photo of another size than {_size(shape)}: use a result "
             "of this photo"
         )
-    # The inverse of the resampling to the working grid, so that a round trip changes nothing.
+    # The inverse of the resampling to the working grid, so that a round trip is exact.
     return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale
 
 

@@ -1,10 +1,10 @@
-"""The layers of a result as PNG files, for programs that read no EXR.
+"""The layers of a result as PNG files, for programs that cannot read EXR.
 
 Files: `diffuse`, `specular`, `reflectance` and `shading` in 8-bit sRGB with the mask as alpha;
 `normal` as (n + 1) / 2 (x right, y up, z toward the viewer: OpenGL's convention) in 8 bits;
 `height` in 16 bits, from 0 to the largest height.
 
-Limits: 8 bits clip light above 1. Shading, whose scale no photo determines, is divided by its
+Limits: 8 bits clip light above 1. Shading, whose scale a photo cannot determine, is divided by its
 maximum first. The EXR files have the exact values.
 """
 

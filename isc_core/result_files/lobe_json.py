@@ -19,7 +19,7 @@ def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> Lobe
     ----------
     record : mapping
     predicted : (H, W, 3) ndarray
-        Its specular image, which is not part of the record.
+        The specular image, which is not part of the record.
 
     Returns
     -------
@@ -28,7 +28,7 @@ def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> Lobe
     Raises
     ------
     KeyError, TypeError, ValueError
-        If the record is not one of a fit.
+        If the record is not that of a fit.
     """
     alpha, strength = record["alpha"], record["strength"]
     if record["model"] not in CONVENTION.values():

@@ -1,6 +1,6 @@
-"""Where the results of the objects of one photo lie.
+"""The folders of results of several objects in one photo.
 
-Programs that show results read it too, so that it needs no numerical library.
+Without numerical libraries, for programs that only show results.
 """
 
 from pathlib import Path
@@ -19,7 +19,7 @@ def object_folders(folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        Those of its folders 1, 2 and so on that are there.
+        The existing folders of 1, 2 and so on.
     """
     found = (path.parent for path in folder.glob(f"*/{_RESULT}"))
     return sorted((one for one in found if one.name.isdecimal()), key=lambda one: int(one.name))

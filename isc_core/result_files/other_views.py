@@ -1,16 +1,16 @@
-"""The object as a photo does not show it: from the left, from the right, and in another light.
+"""Novel views of the object: from the left, from the right, and under another light.
 
-Equation: diffuse light is the same from all sides, so that the turned mesh carries the diffuse
-image; the fitted lobe is evaluated toward the new viewer under the fitted lights, which stay where
-they are. The relit view is reflectance x (key max(0, n . l) + fill), plus the same lobe under its
-brightest light moved to l; key and fill have the mean colour of the recovered light, and l is on
-the other side than that light. Where a lobe predicts more light than the specular layer has, it is
-scaled down to it.
+Equation: diffuse radiance does not depend on the view, so that the turned mesh is textured with the
+diffuse image; the fitted lobe is evaluated toward the new viewer under the fitted lights, which are
+fixed to the object. The relit view is reflectance x (key max(0, n . l) + fill), plus the same lobe
+under its brightest light moved to l; key and fill have the mean colour of the recovered light, and
+l is on the opposite side of that light. Where a lobe predicts more light than the specular layer
+has, it is scaled down to it.
 
-Sides and back, which the photo does not show, are those of a rounded body (`solids`) and take the
-light and colour of the visible side.
+Unobserved sides and back are those of a rounded solid (`solids`) with the light and colour of the
+visible side.
 
-Limits: everything is drawn from maps of a panel's size, from far away; no cast shadows, no
+Limits: the views are orthographic, from maps of a panel's size; no cast shadows, no
 interreflection. Without a fitted lobe there are no highlights.
 """
 
@@ -35,7 +35,7 @@ from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
 from .solids.back import Back
 from .solids.rim import Rim
 from .solids.solid_mesh import SolidMesh, make_solid_mesh
-from .solids.surface import heights_seen, placed
+from .solids.surface import vertex_positions, view_heights
 from .turned_view import turned_view
 
 ANGLE = 30.0  # degrees
@@ -47,7 +47,7 @@ _NARROWEST = 0.03  # alpha: narrower highlights are smaller than a panel's pixel
 def turned_panels(
     d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray], gain: float
 ) -> list[Panel]:
-    """Draw the object from the left and from the right.
+    """Render the object from the left and from the right.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def turned_panels(
     def panel(name: str, yaw: float) -> Panel:
         texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
 
-        def painted(places: np.ndarray) -> np.ndarray:
+        def colors_of(places: np.ndarray) -> np.ndarray:
             column, row = places.T
             layers = [
                 ndimage.map_coordinates(layer, (row, column), order=1, mode="nearest")
@@ -84,7 +84,7 @@ def turned_panels(
             return np.stack(layers, -1)
 
         room = 1 - 2 * MARGIN
-        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, painted)
+        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, colors_of)
         return Panel(gain * view.values, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
 
     with ThreadPoolExecutor(2) as pool:
@@ -94,8 +94,8 @@ def turned_panels(
 def _coarse_body(
     frame: Frame, small: Mapping[str, np.ndarray], camera: Camera | None
 ) -> tuple[SolidMesh, np.ndarray] | None:
-    """The closed body of a panel's maps, a vertex every `_STEP` pixels, and its vertices in the
-    panel's pixels; None for an object too thin for it.
+    """The solid of a panel's maps with a vertex every `_STEP` pixels, and its vertices in the
+    panel's pixels; None for an object that is too thin.
     """
     share = _blocks(frame.coverage)
     inside = share > 0.5
@@ -112,9 +112,9 @@ def _coarse_body(
             principal_point=(x / _STEP, y / _STEP),
         )
     limited = limit_rim(height, inside, MeshOptions().rim)
-    seen = heights_seen(limited, inside, camera)
+    seen = view_heights(limited, inside, camera)
     body = make_solid_mesh(seen, np.ones(inside.shape), inside, Rim(share), Back.ROUNDED, 0)
-    return body, placed(body, camera) * _STEP
+    return body, vertex_positions(body, camera) * _STEP
 
 
 def _blocks(plane: np.ndarray) -> np.ndarray:
@@ -124,7 +124,7 @@ def _blocks(plane: np.ndarray) -> np.ndarray:
 
 
 def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
-    """Draw the object under a light from the other side.
+    """Render the object under a light from the other side.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray])
     Returns
     -------
     Panel
-        In its own exposure.
+        With its own exposure.
     """
     inside = frame.coverage > 0
     reflectance, light = small["reflectance"][inside], small["shading"][inside]
@@ -159,7 +159,7 @@ def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray])
 
 
 def _other_side(d: Decomposition) -> tuple[np.ndarray, str]:
-    """A unit vector (3,) toward the upper left or right, away from the present light, and which."""
+    """A unit vector (3,) to the upper left or right, opposite the present light, and its name."""
     around = sphere_directions(256)
     around = around[around[:, 2] > 0]
     present = luminance(sh_shading(around, d.illumination)) @ around
@@ -177,8 +177,8 @@ def _highlights(
     view: np.ndarray,
     moved: np.ndarray | None,
 ) -> np.ndarray:
-    """Specular light (N, N, 3) toward `view`; under the brightest light moved to `moved`, or under
-    all lights where they are.
+    """Specular light (N, N, 3) toward `view`, under the brightest light moved to `moved`, or under
+    all lights at their positions.
     """
     layer = np.zeros((SIDE, SIDE, 3))
     if fit is None or fit.alpha is None or not fit.lights:

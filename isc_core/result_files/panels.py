@@ -1,4 +1,4 @@
-"""The panels of a contact sheet: squares of one size, each with the object in the same place."""
+"""The panels of a contact sheet: squares of one size, with the object at the same position."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -25,7 +25,7 @@ class Panel:
         In [0, 1].
     label, remark : str
     keys : tuple of (str, tuple of int)
-        What colours mean: text and sRGB code, drawn in place of the remark.
+        Legend of colours: text and sRGB code, drawn instead of the remark.
     """
 
     color: np.ndarray
@@ -37,7 +37,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Frame:
-    """Placement of a map in a panel: the object's box, scaled and centred.
+    """Placement of a map in a panel: the object's bounding box, scaled and centred.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Frame:
     box : tuple of int
         First row, end row, first column, end column.
     zoom : float
-        Pixels of the panel for a pixel of the map.
+        Panel pixels per map pixel.
     """
 
     mask: np.ndarray
@@ -100,7 +100,7 @@ class Frame:
         return found
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Return where a place of the map is in the panel.
+        """Convert a position in the map to the panel.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Frame:
 
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:
-        """Top, left, height and width in the panel of the box with a border of one pixel."""
+        """Top, left, height and width, in the panel, of the box with a border of one pixel."""
         first_row, end_row, first_column, end_column = self.box
         height, width = (
             min(SIDE, max(1, round(self.zoom * (n + 2))))
@@ -138,7 +138,7 @@ class Frame:
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
         first_row, end_row, first_column, end_column = self.box
-        # An empty border, so that the object's outline is soft all around.
+        # An empty border, so that the object's outline is antialiased on all sides.
         window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
         top, left, height, width = self._window
         panel = np.zeros((SIDE, SIDE), np.float32)
@@ -149,7 +149,7 @@ class Frame:
 
 
 def exposure(inside: np.ndarray) -> float:
-    """Return the gain that puts the 99.5th percentile of the largest channel at .95.
+    """Return the gain that maps the 99.5th percentile of the largest channel to .95.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def exposure(inside: np.ndarray) -> float:
     Returns
     -------
     float
-        1 for a black object, and for none.
+        1 for a black or empty object.
     """
     bright = float(np.percentile(largest(inside), 99.5)) if inside.size else 0.0
     return 0.95 / bright if bright > 0 else 1.0
@@ -171,12 +171,12 @@ def unit_normals(scaled: np.ndarray) -> np.ndarray:
     Parameters
     ----------
     scaled : (..., 3) ndarray
-        As `Frame.scaled` gives them: shorter, and 0 outside the object.
+        From `Frame.scaled`: shorter than 1, and 0 outside the object.
 
     Returns
     -------
     (..., 3) ndarray
-        (0, 0, 1) where they have no length.
+        (0, 0, 1) for zero vectors.
     """
     size = length(scaled)
     unit = scaled / np.maximum(size, 1e-6)[..., None]

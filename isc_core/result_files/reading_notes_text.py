@@ -1,4 +1,4 @@
-"""What was assumed or left out when a photo was read, as sentences for commands."""
+"""Sentences for the notes on assumptions and omissions in reading a photo."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -29,7 +29,7 @@ _TEXTS = {
 
 
 def reading_note_lines(notes: Iterable[ReadingNote]) -> list[str]:
-    """Return the lines that a command prints about how it read a photo.
+    """Return the lines that a command prints about the reading of a photo.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def stored_note_lines(stored: Any) -> list[str]:
     Parameters
     ----------
     stored : Any
-        The entry; the file may be anybody's, and unusable parts are ignored.
+        The entry; the file is not trusted, and invalid parts are ignored.
 
     Returns
     -------

@@ -1,11 +1,11 @@
 """The folder of a result: maps, mesh, preview and provenance.
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
-`mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
-that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, where the
-mask was found in the photo or is soft. With a fitted lobe, `maps.exr` has one more layer, `lobe`:
-the specular image that the fit predicts; where errors can be expected, `expected_error` has them. A
-refined result has one more layer, `visibility`, and its light as `environment.exr`. A separation's
+`mesh.glb`, `preview.png`, and under `maps/` the main maps also as single-layer files, for programs
+that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, if the
+mask was found in the photo or is soft. With a fitted lobe, `maps.exr` has another layer, `lobe`:
+the specular image predicted by the fit; `expected_error` has the expected errors, if known. A
+refined result has another layer, `visibility`, and its light as `environment.exr`. A separation's
 folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
 completely or not at all (see `io.atomic`).
 """
@@ -78,7 +78,7 @@ _RESULT_FILES = (
     ENVIRONMENT,
     *LAYER_PNGS,
 )  # including files written on demand
-_PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the usual 6 for 18 % more bytes
+_PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the default 6 for 18 % more bytes
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
@@ -104,13 +104,13 @@ def save(
     folder : Path or str
     mesh : MeshOptions, optional
     arrays : bool
-        Write `arrays.npz` too.
+        Whether to write `arrays.npz`, too.
     texture : (h, w, 3) uint8 ndarray, optional
         Fine base colour for `arrays.npz`, see `exports.full_texture`.
     png : bool
-        Write the layers as PNG files too, see `layer_pngs`.
+        Whether to write the layers as PNG files, too, see `layer_pngs`.
     cover : (H, W) ndarray, optional
-        How much of each of the photo's pixels the object covers, to write as `mask.png`.
+        Coverage of the photo's pixels by the object, to write as `mask.png`.
     monitor : Monitor, optional
 
     Raises
@@ -120,7 +120,7 @@ def save(
     Cancelled
         If the user cancels.
     ValueError
-        If a map holds NaN or infinite values.
+        If a map has NaN or infinite values.
     """
     monitor = monitor or Monitor()
     channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
@@ -132,7 +132,8 @@ def save(
         channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
     if broken := sorted(_broken(channels)):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
-    # The pool inside the folder: its files are done, or have failed, before the folder is removed.
+    # The pool is inside the folder's block, so that its files are finished, or have failed, before
+    # the folder is removed.
     with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(2) as pool:
         monitor.report("writing maps", 0.0)
         d = decomposition
@@ -148,7 +149,7 @@ def save(
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
-            # Their vertices are pixels, which an outline between the pixels has not.
+            # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
             plain = built if edge is None else mesh_of(d, mesh, gloss=built.gloss)
             write_arrays(d, partial / ARRAYS, plain, texture, edge)
         if png:
@@ -198,7 +199,7 @@ def _write_description(decomposition: Decomposition, built: MeshResult, path: Pa
 
 
 def load(folder: Path | str) -> Decomposition:
-    """Read a folder of `save`.
+    """Read a folder that `save` wrote.
 
     Parameters
     ----------
@@ -211,7 +212,7 @@ def load(folder: Path | str) -> Decomposition:
     Raises
     ------
     InputError
-        If something is missing, damaged, or inconsistent.
+        If a file is missing, damaged, or inconsistent.
     """
     folder = Path(folder)
     if not (folder / "decomposition.json").is_file():
@@ -303,7 +304,7 @@ def require_writable_result(
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
-    """Raise `InputError` if the disk certainly has no room for a result.
+    """Raise `InputError` if the disk has less space than the lower bound of a result's size.
 
     Parameters
     ----------
@@ -352,8 +353,8 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """The value in the types of JSON: arrays as lists, paths as printable text, non-finite numbers
-    as null.
+    """The value as JSON types: arrays as lists, paths as printable text, non-finite numbers as
+    null.
     """
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
@@ -468,14 +469,14 @@ def _expected_error(channels: Mapping[str, np.ndarray], path: Path) -> ExpectedE
 
 
 def _visibility(channels: Mapping[str, np.ndarray], path: Path) -> np.ndarray | None:
-    """None where nothing was refined."""
+    """None if the result was not refined."""
     if "visibility.R" not in channels:
         return None
     return np.asarray(_layers(channels, VISIBILITY, path)["visibility"])
 
 
 def _environment(path: Path) -> np.ndarray | None:
-    """The light as an image; None where nothing was refined."""
+    """The light as an image; None if the result was not refined."""
     if not path.is_file():
         return None
     channels = read_channels(path)
@@ -509,7 +510,7 @@ def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
 
 
 def _wrong_input(given: Mapping[str, Any]) -> str:
-    """The first invalid entry of the record of the photo, "" if there is none. All are optional."""
+    """The first invalid entry of the record of the photo, or "". All entries are optional."""
     scale, size = numbers(given.get("scale", 1.0), ()), given.get("size", [1, 1])
     if scale is None or not 0 < scale <= 1:
         return "scale"

@@ -1,23 +1,23 @@
 # mypy: disable-error-code="no-untyped-def"
-"""A triangle mesh seen from another side, drawn in software.
+"""Software rasteriser for a triangle mesh, turned about the vertical axis.
 
-Problem: a contact sheet is to show what a mesh looks like from the left and from the right, on any
-machine, without a graphics library, the same bytes everywhere.
+Problem: a contact sheet shows a mesh from the left and from the right, on any machine, without a
+graphics library, with identical bytes everywhere.
 
-Equation: the vertices are turned about the vertical axis and projected in parallel. A triangle
-(a, b, c) covers the pixel centres p whose barycentric coordinates, u = [p, b, c] / [a, b, c] and so
-on, [.] being the signed area, are not negative. Depth and values are sums of those of the vertices
-weighted by them, and of all triangles at a pixel the nearest is seen, of equally near ones the
-first. Each is tested at all pixel centres of its box. The picture is drawn twice as fine and
-averaged; where values are places in a texture, its colours are, for a mean of places of two
-surfaces is a place of neither.
+Equation: the vertices are rotated about the vertical axis and projected orthographically. A
+triangle (a, b, c) covers the pixel centres p whose barycentric coordinates, u = [p, b, c] / [a, b,
+c] and so on, [.] being the signed area, are not negative. Depth and values are interpolated with
+them, and of all triangles at a pixel the nearest is visible, of equally near ones the first. Each
+is tested at all pixel centres of its bounding box. The picture is supersampled by 2 and averaged;
+where values are texture coordinates, the looked-up colours are averaged, because a mean of the
+coordinates of two surfaces would be meaningless.
 
 Citation: J. Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988,
 doi:10.1145/54852.378457; the depth buffer: E. Catmull, "A subdivision algorithm for computer
 display of curved surfaces", thesis, University of Utah, 1974.
 
-Limits: no perspective; values are interpolated linearly. Made for triangles of a
-few pixels: a triangle costs as much as its box.
+Limits: no perspective; values are interpolated linearly. Efficient for triangles of a few pixels:
+the cost of a triangle is that of its bounding box.
 """
 
 from collections.abc import Callable
@@ -29,8 +29,8 @@ from ..numerics.jit import jit
 from ..shading.lights import turn
 
 _FINE = 2  # subpixels along a pixel's side
-_EDGE = -1e-9  # barycentric coordinates from which a pixel centre lies inside
-_FEWEST = 1e-12  # twice the area of a triangle that can be seen, subpixels
+_EDGE = -1e-9  # tolerance of the barycentric coordinates of a pixel centre inside
+_FEWEST = 1e-12  # twice the smallest area of a visible triangle, subpixels
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class View:
     values : (N, N, C) ndarray
         Mean of the vertices' values over the covered part of each pixel; 0 outside.
     coverage : (N, N) ndarray
-        Share of each pixel that the mesh covers, in [0, 1].
+        Coverage of each pixel by the mesh, in [0, 1].
     """
 
     values: np.ndarray
@@ -58,9 +58,9 @@ def turned_view(
     zoom: float,
     room: float = 1.0,
     closed: bool = False,
-    painted: Callable[[np.ndarray], np.ndarray] | None = None,
+    colors_of: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> View:
-    """Draw a mesh that is turned about the vertical axis.
+    """Render a mesh that is rotated about the vertical axis.
 
     Parameters
     ----------
@@ -69,25 +69,24 @@ def turned_view(
     faces : (F, 3) ndarray of int
         Vertices of each triangle.
     values : (V, C) ndarray
-        Colours, or whatever else the vertices carry.
+        Colours or other vertex attributes.
     yaw : float
-        Degrees; positive ones turn the front to the right, so that the left side is seen.
+        Degrees; positive angles turn the front to the right, so that the left side is visible.
     side : int
         Pixels of the picture's side.
     zoom : float
-        Pixels of the picture for a unit length of the vertices, reduced where the mesh would not
-        fit.
+        Picture pixels per unit length of the vertices, reduced if the mesh would not fit.
     room : float
         Share of the picture's side that the mesh may fill, in (0, 1].
     closed : bool
-        Leave out what faces away: a closed mesh hides it.
-    painted : callable, optional
-        Of values (N, C), the colours (N, D) that are averaged in their place.
+        Whether the mesh is closed, so that back faces are culled.
+    colors_of : callable, optional
+        Maps values (N, C) to colours (N, D), which are averaged instead.
 
     Returns
     -------
     View
-        The middle of the turned mesh's box is the middle of the picture.
+        The turned mesh's bounding box is centred in the picture.
     """
     turned = np.asarray(vertices, np.float64) @ turn(yaw).T * (1, -1, 1)
     low, high = turned.min(axis=0), turned.max(axis=0)
@@ -96,10 +95,10 @@ def turned_view(
     points = (turned - (low + high) / 2) * scale + (_FINE * side / 2, _FINE * side / 2, 0)
     if closed:
         a, b, c = points[faces, :2].transpose(1, 0, 2)
-        faces = faces[_cross(b - a, c - a) < 0]  # rows count downward
+        faces = faces[_cross(b - a, c - a) < 0]  # rows point downward
     fine = _nearest(points, faces, values, _FINE * side)
-    if painted is not None:
-        fine = _painted(fine, painted)
+    if colors_of is not None:
+        fine = _with_colors(fine, colors_of)
     steps = [(row, column) for row in range(_FINE) for column in range(_FINE)]
     cells = np.zeros((side, side, fine.shape[2]))
     for row, column in steps:
@@ -108,9 +107,9 @@ def turned_view(
     return View(cells[..., :-1] / np.maximum(covered, 1)[..., None], covered / _FINE**2)
 
 
-def _painted(fine: np.ndarray, painted: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def _with_colors(fine: np.ndarray, colors_of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     covered = fine[..., -1] > 0
-    colors = painted(fine[covered, :-1])
+    colors = colors_of(fine[covered, :-1])
     picture = np.zeros((*covered.shape, colors.shape[1] + 1))
     picture[covered, :-1] = colors
     picture[..., -1] = covered
@@ -121,7 +120,8 @@ def _nearest(points: np.ndarray, faces: np.ndarray, values: np.ndarray, side: in
     """The values of the nearest triangle at each pixel centre, and 1; (side, side, C + 1), 0 where
     there is none.
 
-    `points` (V, 3): column and row in pixels, the first pixel from 0 to 1, and nearness.
+    `points` (V, 3): column and row in pixels, the first pixel from 0 to 1, and depth (larger is
+    nearer).
     """
     carried = np.concatenate([values, np.ones((len(values), 1))], axis=1, dtype=np.float64)
     picture, nearest = np.zeros((side, side, carried.shape[1])), np.full((side, side), -np.inf)
@@ -132,8 +132,8 @@ def _nearest(points: np.ndarray, faces: np.ndarray, values: np.ndarray, side: in
 
 @jit(types="f8[2] i8[2] f8[2] f8[2] f8[3]")
 def _draw(points, faces, carried, nearest, picture):
-    """Draw each triangle where it is nearer than those before: its corners' `carried` (V, C) into
-    `picture` (N, N, C), its nearness into `nearest` (N, N).
+    """Draw each triangle where it passes the depth test: its corners' `carried` (V, C) into
+    `picture` (N, N, C), its depth into `nearest` (N, N).
     """
     side = nearest.shape[0]
     for face in range(faces.shape[0]):

@@ -1,1 +1,1 @@
-"""A result as files for other programs: texture sets and meshes."""
+"""Export of a result for other programs: texture sets and meshes."""

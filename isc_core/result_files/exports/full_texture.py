@@ -1,24 +1,24 @@
 """The base colour at the resolution of the photo, where the maps are coarser.
 
-Problem: light and shape vary slowly, the pattern of a surface does not: maps of 512 pixels lose
-what a photo of 2,400 shows. With (.)^ for bilinear upsampling, I the photo, D its diffuse layer,
-S its specular layer and B the base colour of the maps, all linear, and <I> the photo averaged over
-the pixels of the maps,
+Problem: light and shape vary slowly, but texture does not: maps of 512 pixels lose detail of a
+photo of 2,400. With (.)^ for bilinear upsampling, I the photo, D its diffuse layer, S its specular
+layer and B the base colour of the maps, all linear, and <I> the photo averaged over the pixels of
+the maps,
 
     d = D^ + g (I - <I>^)                  d = I - S^, where g = 1
     T = B^ min(4, max(1/4, d / D^))
     T <- T (B / <T>)^                      twice, so that <T> = B
 
-g falls from 1 to 0 where the specular layer's share of the light grows from 0.4 to 0.8: there, what
-is finer than the maps belongs to the highlight. The outermost pixel of the mask, which often shows
-the background, too, and all of an outline that fades to black (`mesh.dark_rings`), take the ratio
-of the nearest pixel inside, and the surroundings its colour.
+g falls from 1 to 0 where the specular layer's share of the light grows from 0.4 to 0.8: there,
+detail finer than the maps belongs to the highlight. The outermost pixel of the mask, which often
+includes background, and all of an outline that fades to black (`mesh.dark_rings`), take the ratio
+of the nearest interior pixel, and the surroundings its colour.
 
 Citation: the ratio of a fine to a coarse image that multiplies a coarse layer is that of
 G. Petschnigg et al., "Digital photography with flash and no-flash image pairs", ACM Transactions on
 Graphics 23 (2004), 664-672, doi:10.1145/1015706.1015777.
 
-Limits: shading and highlights that are finer than the maps count as base colour.
+Limits: shading and highlights that are finer than the maps become base colour.
 """
 
 from dataclasses import dataclass
@@ -36,9 +36,9 @@ from ..mesh.options import MeshOptions
 from ..mesh.texture_codes import color_codes
 
 _MOST = 4.0  # the largest ratio of fine to coarse diffuse light, and the inverse of the smallest
-_ALL_DETAIL, _NO_DETAIL = 0.4, 0.8  # specular share up to which, from which
+_ALL_DETAIL, _NO_DETAIL = 0.4, 0.8  # specular shares: all detail up to, none from
 _ROUNDS = 2
-_RIM = 2  # map pixels beyond the mask that take the colours along its rim
+_RIM = 2  # map pixels beyond the mask that are filled with colours of its rim
 _BLEED = MeshOptions().bleed
 
 
@@ -48,15 +48,15 @@ def full_texture(photo: Photo, d: Decomposition, longest: int = 0) -> np.ndarray
     Parameters
     ----------
     photo : Photo
-        The photo of which `d` is the decomposition, at its own resolution.
+        The photo that was decomposed, at full resolution.
     d : Decomposition
     longest : int
-        Largest longest side of the texture; 0 for the photo's.
+        Upper limit of the texture's long side; 0 for the photo's.
 
     Returns
     -------
     (H', W', 3) uint8 ndarray or None
-        sRGB codes; None where the maps are as fine.
+        sRGB codes; None if the maps have the same resolution.
     """
     scale = float(d.provenance.input.get("scale", 1.0))
     sharp = _limited(photo, longest, max(d.mask.shape) * photo.scale / scale)
@@ -74,7 +74,9 @@ def full_texture(photo: Photo, d: Decomposition, longest: int = 0) -> np.ndarray
 
 
 def _limited(photo: Photo, longest: int, frame: float) -> Photo:
-    """The photo reduced so that the frame of the maps, now `frame` pixels, is `longest` at most."""
+    """The photo downscaled so that the frame of the maps, now `frame` pixels, has at most
+    `longest`.
+    """
     if longest <= 0 or frame <= longest:
         return photo
     return photo.resized_to_object(max(1, int(max(photo.box[2:]) * longest / frame)))
@@ -90,11 +92,11 @@ def _box(mask: np.ndarray, margin: int) -> tuple[slice, slice]:
 
 @dataclass(frozen=True)
 class _Grids:
-    """Between a part of the photo and the maps.
+    """The relation of a part of the photo to the maps.
 
     `inside`: (h, w) bool, the object in that part. `area`: from the part to the maps. `factor`:
-    photo pixels per map pixel. `start`: row and column of the part. `nearest`: of the object's
-    pixel of the maps that is nearest to each.
+    photo pixels per map pixel. `start`: row and column of the part. `nearest`: for each pixel of
+    the maps, the nearest one of the object.
     """
 
     inside: np.ndarray
@@ -107,7 +109,7 @@ class _Grids:
         return enlarged(plane.astype(np.float32), self.inside.shape, self.factor, self.start)
 
     def filled(self, plane: np.ndarray) -> np.ndarray:
-        """A map that continues beyond the object."""
+        """A map, extended beyond the object."""
         return np.asarray(plane[self.nearest])
 
     def down(self, plane: np.ndarray, default: np.ndarray) -> np.ndarray:
@@ -164,6 +166,6 @@ def _texture(
 
 
 def _interior(mask: np.ndarray, rim: int) -> np.ndarray:
-    """The mask without its outermost pixels; the whole mask if that is all."""
+    """The mask without its outermost pixels; the whole mask if nothing would remain."""
     inner = ndimage.binary_erosion(mask, iterations=rim, border_value=1)
     return inner if inner.any() else mask

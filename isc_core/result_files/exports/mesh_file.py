@@ -1,9 +1,9 @@
 """The mesh of a result as a file for other programs, with its textures.
 
-A `.glb` and a `.usdz` hold everything. Beside an `.obj` (with its `.mtl`) and a `.usd`, `.usda` or
-`.usdc` are the textures NAME_basecolor.png, NAME_mesh_normal.png (where the mesh has fewer vertices
-than pixels), NAME_specular.png (where the level varies) and NAME_alpha.png (where the rim is soft),
-NAME being that of the file.
+A `.glb` and a `.usdz` contain all data. Next to an `.obj` (with its `.mtl`) and a `.usd`, `.usda`
+or `.usdc` are the textures NAME_basecolor.png, NAME_mesh_normal.png (where the mesh has fewer
+vertices than pixels), NAME_specular.png (where the level varies) and NAME_alpha.png (where the rim
+is soft), NAME being that of the file.
 """
 
 from collections.abc import Callable, Mapping
@@ -56,7 +56,7 @@ def check_mesh_path(path: Path, kind: str) -> None:
 
 
 def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
-    """Write a mesh and what belongs to it: all files or none.
+    """Write a mesh and its textures: all files or none.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
     contents = _ENCODERS[kind](built, path)
     targets = [path.with_name(name) for name in contents]
     with ExitStack() as stack:
-        # All are complete before the first one gets its name; the mesh is the last.
+        # All are complete before the first is renamed; the mesh is renamed last.
         for target, content in zip(targets, contents.values(), strict=True):
             stack.enter_context(new_file(target)).write_bytes(content)
     return targets

@@ -4,11 +4,12 @@ Format: lines of vertices (`v`), texture coordinates (`vt`, v from the bottom), 
 faces (`f`), whose indices begin at 1. The material's roughness `Pr`, metallic `Pm` and normal map
 `norm` are the extension for physically based materials (R. Mach, exocortex, 2013), which Blender
 and others read; `Ns` and `Ks` are what Blender writes for the same roughness and specular level, .5
-being plastic. Blender takes the normal map from `map_Bump`, which programs that know `norm` ignore.
+being plastic. Blender reads the normal map from `map_Bump`, which programs that support `norm`
+ignore.
 
 Citation: M. Ramey et al., "Object files (.obj)", Wavefront Technologies 1995 (no DOI).
 
-Limits: no tangents: programs compute them from the texture coordinates.
+Limits: no tangents; programs compute them from the texture coordinates.
 """
 
 from collections.abc import Iterator
@@ -19,7 +20,7 @@ import numpy as np
 from ..mesh.result import MeshResult
 from .textures import PLASTIC, MeshTextures, plain_stem
 
-_ROWS = 1 << 14  # formatted at once
+_ROWS = 1 << 14  # formatted at a time
 
 
 def encode_obj(built: MeshResult, path: Path) -> dict[str, bytes]:

@@ -1,4 +1,4 @@
-"""The textures that other programs expect, and how they pack values into the channels of a file.
+"""The textures that other programs expect, and their channel packing.
 
 Sources: those of `texture_set`; Godot manual, "Standard Material 3D and ORM Material 3D" (green
 upward, the packing of glTF).
@@ -12,14 +12,14 @@ _SEPARATE = ("basecolor", "normal", "mesh_normal", "roughness", "specular", "hei
 
 @dataclass(frozen=True)
 class TextureTarget:
-    """What a program expects.
+    """The textures of a program.
 
     Attributes
     ----------
     textures : tuple of str
         Their names; `height` is written as PNG and as EXR.
     green_down : bool
-        Normal maps are DirectX's.
+        Whether normal maps follow the convention of DirectX.
     """
 
     textures: tuple[str, ...]

@@ -1,12 +1,12 @@
-"""A result as textures under the names and in the packings that other programs expect.
+"""Export of a result as textures with the names and packing that other programs expect.
 
-Problem: each program wants the same quantities in files of its own: green of normal maps upward or
-downward, roughness or smoothness, several values in the channels of one file.
+Problem: programs expect the same quantities in different files: green of normal maps upward or
+downward, roughness or smoothness, several values packed into the channels of one file.
 
-The textures describe the surface over the plane of the photo: height, normal and occlusion belong
-together, on a flat sheet with the photo's proportions. Base colour, roughness, specular and
-occlusion serve the mesh, too (its texture coordinates are those of the photo), with `mesh_normal`
-in place of `normal`, which is written where the mesh needs one.
+The textures describe the surface over the plane of the photo: height, normal and occlusion are for
+a flat plane with the photo's aspect ratio. Base colour, roughness, specular and occlusion are also
+for the mesh (its texture coordinates are those of the photo), with `mesh_normal` instead of
+`normal`, which is written if the mesh needs one.
 
     basecolor             sRGB, 8 bits: k * reflectance under the gloss, as in the mesh; alpha is
                           the object's cover
@@ -20,7 +20,7 @@ in place of `normal`, which is written where the mesh needs one.
     metallic_smoothness   red metallic, alpha 1 - roughness
     mask_map              red metallic, green occlusion, blue detail mask, alpha 1 - roughness
 
-A JSON file beside them has the scales, the conventions and where roughness and specular come from.
+A JSON file records the scales, the conventions and the sources of roughness and specular.
 
 Sources of the conventions: B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 courses
 (the specular scale, which Unreal and Blender share). Epic Games, Unreal Engine documentation,
@@ -30,8 +30,8 @@ alpha) and "Normal map" (green upward); Unity HDRP manual, "Mask and detail maps
 "Normal Map Node" (green upward) and "Node Wrangler" (recognises the names above).
 
 Limits: 8 bits clip base colours above 1 (.5 % of the pixels) and specular levels above that of f0 =
-.08. Unity's metallic materials have no specular level. Metallic is 0. Beyond 16 pixels around the
-object, textures hold the mean colour or a flat surface.
+.08. Unity's metallic materials have no specular level. Metallic is 0. Farther than 16 pixels from
+the object, textures have the mean colour or a flat surface.
 """
 
 import json
@@ -57,11 +57,11 @@ from ..mesh.texture_codes import vector_codes
 from .targets import TARGETS
 from .textures import PLASTIC, share_codes
 
-_COMPRESSION = 2  # of 9: a third of the time of the usual 6
+_COMPRESSION = 2  # of 9: a third of the time of the default 6
 
 
 def texture_files(name: str) -> tuple[str, ...]:
-    """Return the files that any texture set of that name may have, the description first.
+    """Return the possible files of texture sets of a name, the description first.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def write_texture_set(
         One of `TARGETS`.
     folder : Path
     name : str
-        Begins the files' names.
+        Prefix of the file names.
     monitor : Monitor, optional
 
     Raises
@@ -111,7 +111,7 @@ def write_texture_set(
         raise InputError(f'unknown target "{target}": choose {", ".join(TARGETS)}')
     monitor, wanted = monitor or Monitor(), TARGETS[target]
     layers = _Layers(d, built, cover, *known_roughness(built), wanted.green_down)
-    textures = [one for one in wanted.textures if one != "mesh_normal" or built.bumpy]
+    textures = [one for one in wanted.textures if one != "mesh_normal" or built.needs_normal_map]
     with new_folder(folder, texture_files(name)) as partial:
         for number, texture in enumerate(textures):
             monitor.report(f"writing {texture}", number / len(textures))
@@ -124,7 +124,7 @@ def write_texture_set(
 
 
 def known_roughness(built: MeshResult) -> tuple[float, str]:
-    """Return the roughness of the textures, and where it comes from.
+    """Return the roughness of the textures, and its source.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def known_roughness(built: MeshResult) -> tuple[float, str]:
     Raises
     ------
     InputError
-        If there is none.
+        If it is unknown.
     """
     gloss = built.gloss
     if gloss.roughness is not None:
@@ -154,7 +154,7 @@ def known_roughness(built: MeshResult) -> tuple[float, str]:
 
 @dataclass(frozen=True)
 class _Layers:
-    """The textures as codes, computed when they are asked for."""
+    """The textures as codes, computed on demand."""
 
     d: Decomposition
     built: MeshResult
@@ -224,11 +224,11 @@ class _Layers:
 
     @cached_property
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Flat places of the pixels near the object, and those of their nearest of its pixels."""
+        """Flat indices of the pixels near the object, and of its nearest pixel to each."""
         return nearest_inside(self.d.mask, self.built.options.bleed)
 
     def _continued(self, values: np.ndarray, beyond: Any) -> np.ndarray:
-        """The values inside the mask, continued around it; `beyond` further out."""
+        """The values inside the mask, extended around it; `beyond` farther out."""
         mask = self.d.mask if values.ndim == 2 else self.d.mask[..., None]
         result = np.where(mask, values, np.asarray(beyond, values.dtype))
         near, source = self._nearest

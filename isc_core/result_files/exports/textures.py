@@ -1,4 +1,4 @@
-"""The textures of a mesh as PNG files, and its material in the terms of formats that name them."""
+"""The textures of a mesh as PNG files, for formats that refer to them by name."""
 
 import re
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ def share_codes(values: np.ndarray) -> np.ndarray:
 
 
 def plain_stem(path: Path) -> str:
-    """Return the name of a file without its suffix, as formats allow names: without spaces.
+    """Return the name of a file without its suffix and spaces, which formats do not allow.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class MeshTextures:
         ----------
         built : MeshResult
         name : str
-            Begins the files' names.
+            Prefix of the file names.
 
         Returns
         -------
@@ -77,7 +77,7 @@ class MeshTextures:
         base_color = f"{name}_basecolor.png"
         files = {base_color: built.base_color_png()}
         normal = specular = alpha = None
-        if built.bumpy:
+        if built.needs_normal_map:
             normal = f"{name}_mesh_normal.png"
             files[normal] = built.normal_png()
         if built.gloss.variation is not None:

@@ -1,8 +1,8 @@
 """A mesh as Universal Scene Description, with the material UsdPreviewSurface.
 
-Layout: the default prim is named after the file and holds the mesh and its material. The Y axis
-points up, the unit is the metre. A specular level is the index of refraction that has its f0 = .04
-level; where it varies, the material is of the specular workflow, with f0 in a texture.
+Layout: the default prim is named after the file and contains the mesh and its material. The Y axis
+points up, the unit is the metre. A specular level becomes the index of refraction with f0 = .04
+level; where it varies, the material uses the specular workflow, with f0 in a texture.
 
 Reference: Pixar, "UsdPreviewSurface specification", version 2.6,
 https://openusd.org/release/spec_usdpreviewsurface.html.
@@ -24,7 +24,7 @@ from ...shading.brdf.ggx import F0
 from ..mesh.result import MeshResult
 from .textures import PLASTIC, MeshTextures, plain_stem
 
-_MOST = 0.96  # of f0: an index of refraction is finite
+_MOST = 0.96  # of f0, so that the index of refraction is finite
 
 
 def encode_usd(built: MeshResult, path: Path) -> dict[str, bytes]:
@@ -39,7 +39,7 @@ def encode_usd(built: MeshResult, path: Path) -> dict[str, bytes]:
     Returns
     -------
     dict of str to bytes
-        Name and content of each file, that of `path` first. A `.usdz` holds its textures.
+        Name and content of each file, that of `path` first. A `.usdz` contains its textures.
 
     Raises
     ------
@@ -71,7 +71,7 @@ def require_usd(path: Path) -> None:
     Parameters
     ----------
     path : Path
-        What needs it.
+        The file to write, for the error message.
 
     Raises
     ------

@@ -1,8 +1,8 @@
-"""The base colour of a mesh: reflectance at a common scale, continued beyond the mask.
+"""The base colour of a mesh: scaled reflectance, extended beyond the mask.
 
 Equation: k * reflectance, with k such that the 99.5th percentile of the reflectance's largest
 channel becomes 0.9; the matching light is the recovered one divided by k, that is log shading - log
-k. Beyond the mask the texture repeats the nearest colour inside, so that filtering draws no dark
+k. Beyond the mask the texture repeats the nearest colour inside, so that filtering causes no dark
 fringe.
 
 Limits: reflectances above 1 / k are clipped (at most 0.5 % of the pixels).
@@ -15,8 +15,8 @@ from ...imaging.bounding_box import mask_slices
 from ...imaging.row_blocks import row_blocks
 
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
-_FADING = 0.01  # of the object's longer side: as wide a dark border may be a fading outline
-_AS_BRIGHT = 0.8  # of what lies within
+_FADING = 0.01  # of the object's longer side: widest dark border that may be a fading outline
+_AS_BRIGHT = 0.8  # of the brightness inside
 
 
 def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
@@ -27,8 +27,8 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     reflectance : (H, W, 3) ndarray
     mask : (H, W) bool ndarray
     bleed : int
-        Pixels by which it continues beyond the mask; further out it is the mean colour, which the
-        smallest mipmaps should fade to.
+        Pixels by which it is extended beyond the mask; farther out it is the mean colour, so that
+        the smallest mipmaps approach it.
 
     Returns
     -------
@@ -50,13 +50,13 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
 
 
 def _widest_fading(inside: np.ndarray) -> int:
-    """Pixels of a border that may be the fading outline of an object."""
+    """Largest width in pixels of a border that may be the fading outline of an object."""
     return max(1, round(_FADING * max(inside[mask_slices(inside)].shape)))
 
 
 def _depth_near(mask: np.ndarray, reach: int) -> np.ndarray:
-    """The distance (H, W) of a mask's pixels from its outside, exact up to `reach`, larger from
-    there on; 0 outside.
+    """The distance (H, W) of a mask's pixels from its outside, exact up to `reach` and larger
+    beyond; 0 outside.
     """
     depth = np.full(mask.shape, np.inf, np.float32)
     for block in row_blocks(mask.shape, reach):
@@ -67,10 +67,10 @@ def _depth_near(mask: np.ndarray, reach: int) -> np.ndarray:
 
 
 def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
-    """Count the outermost rings of a mask that show a black background rather than the object.
+    """Count the outermost rings of a mask that show black background rather than the object.
 
-    A soft outline before black fades over several pixels, which a mask may include; the sides of
-    the mesh would stretch them to a black band. A darker border that is wider is paint.
+    A soft outline against black fades over several pixels, which a mask may include; on the sides
+    of the mesh they would be stretched to a black band. A wider dark border is paint.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
     Returns
     -------
     int
-        Pixels; 0 where the border is as bright as what lies within.
+        Pixels; 0 if the border is as bright as the inside.
     """
     most = _widest_fading(depth > 0)
 
@@ -100,7 +100,7 @@ def dark_rings(reflectance: np.ndarray, depth: np.ndarray) -> int:
 
 
 def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndarray]:
-    """Find the nearest pixels of a mask to those around it.
+    """Find the nearest mask pixel to each pixel around the mask.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndar
     near : (N,) ndarray
         Flat indices of the pixels outside the mask within that distance.
     source : (N,) ndarray
-        Of the nearest pixel inside to each.
+        Flat index of the nearest pixel inside to each.
     """
     width, found = mask.shape[1], [np.zeros((2, 0), np.int64)]
     for block in row_blocks(mask.shape, distance):

@@ -1,27 +1,27 @@
-"""A mesh of the visible side of the object, or of a solid, from the maps of a result.
+"""Building a mesh of the visible side of the object, or a solid, from the maps of a result.
 
-Problem: a height map over a mask, with its normals and reflectance, is to become an object in any
-viewer, under the recovered light, that looks like the photo.
+Problem: convert a height map over a mask, with normals and reflectance, to an object that looks
+like the photo in any viewer under the recovered light.
 
 Geometry: vertices at pixel centres, one cell of two triangles where all pixels of the cell lie
-inside the mask. If that exceeds the number of triangles asked for, large triangles replace small
+inside the mask. If that exceeds the requested number of triangles, large triangles replace small
 ones where the surface is smooth (see `triangulation`); the silhouette keeps its pixels. Where the
 silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World axes
-are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the middle of the
-bounding box. Before a camera, vertices are on the rays of their pixels (see
-`shading.perspective`), and a pixel has its size at their mean distance.
+are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the centre of the
+bounding box. With a perspective camera, vertices are on the rays of their pixels (see
+`shading.perspective`), and the size of a pixel is that at their mean distance.
 
-Normals: those of vertices are the recovered ones; in a mesh of fewer triangles, their mean over the
+Normals: vertices have the recovered normals, or in a mesh of fewer triangles their mean over the
 triangles of a vertex, weighted by its barycentric coordinate. The tangent-space normal map (green
-up) holds the recovered normal of each pixel relative to the interpolated one. It is flat for a mesh
-with a vertex at each pixel. The tangent is the direction in which the texture's column grows.
+up) stores the recovered normal of each pixel relative to the interpolated one. It is flat for a
+mesh with a vertex at each pixel. The tangent is the direction of increasing texture columns.
 
-Back: an open mesh is one sheet with steps of one cell along the silhouette; `solids` closes it,
-with a smooth outline. Where the object's cover of the pixels is known, the outline of all meshes
-follows that, and where the rim is soft, the material has an opacity (see `object_cover`).
+Back: an open mesh is a single sheet with steps of one cell along the silhouette; `solids` closes
+it, with a smooth outline. Where the coverage of pixels is known, the outlines of all meshes follow
+it, and where the rim is soft, the material has an opacity (see `object_cover`).
 
-Limits: programs that compute tangents by themselves interpolate them along the triangles: their
-normals differ by the square of what the surface turns within one.
+Limits: programs that compute their own tangents interpolate them over triangles; their normals
+differ by an error quadratic in the change of the normal within a triangle.
 """
 
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ from ...shading.lights import VIEW
 from ...shading.perspective import lifted_points, object_axis, view_directions
 from ..solids.back import Back
 from ..solids.rim import Rim
-from ..solids.surface import heights_seen, make_solid, placed
+from ..solids.surface import make_solid, vertex_positions, view_heights
 from ..triangulation.adaptive_triangles import Triangulation, adaptive_triangles
 from ..triangulation.renumbering import renumbered
 from ..triangulation.vertex_normals import (
@@ -79,11 +79,11 @@ def build_mesh(
         Linear, not negative.
     options : MeshOptions, optional
     gloss : optional
-        Gloss of the surface; where unknown, the default roughness and no gloss.
+        Gloss of the surface; the default roughness and no gloss where it is unknown.
     camera : Camera, optional
         Of the maps; orthographic by default.
     cover : ObjectCover, optional
-        An outline to follow; by default the mesh ends in the steps of the mask's pixels, or, with
+        The mesh follows its outline; by default it ends in the steps of the mask's pixels, or, with
         a back, halfway between them.
 
     Returns
@@ -93,7 +93,7 @@ def build_mesh(
     Raises
     ------
     InputError
-        If the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
+        If the mask has no block of 2 x 2 pixels, or a size in the options is not positive.
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _check_inputs(height, normal, mask, reflectance, options)
@@ -186,19 +186,19 @@ def _outlined(
     options: MeshOptions,
     camera: Camera | None,
 ) -> _Shape:
-    """Without tangents: they would change their sign where the texture folds (see `solids`)."""
+    """The mesh without tangents, whose sign would change where the texture is folded (see
+    `solids`).
+    """
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    seen, sides = heights_seen(height, mask, camera), 1 if options.back is Back.OPEN else 2
+    seen, sides = view_heights(height, mask, camera), 1 if options.back is Back.OPEN else 2
     solid = make_solid(seen, normal, mask, rim, view, options.back, options.triangles // sides)
-    places = placed(solid.mesh, camera)
+    places = vertex_positions(solid.mesh, camera)
     mesh, normals = solid.mesh, solid.normals(places)
     return _Shape(places, normals, mesh.faces, solid.uv(), None, mesh.pixels, solid.detail)
 
 
 def _seen_origin(middle: np.ndarray, camera: Camera) -> tuple[float, float, float]:
-    """Column and row at which a place before the camera is seen, and its height before the focal
-    plane; in pixels.
-    """
+    """Column and row of the projection of a point, and its height above the mean depth; pixels."""
     (x, y), focal = camera.principal_point, camera.focal_length
     right, up = middle[:2] * (focal / -middle[2])
     return float(x - 0.5 + right), float(y - 0.5 - up), float(focal + middle[2])
@@ -233,10 +233,10 @@ def _check_inputs(
 def _triangulated(
     height: np.ndarray, normal: np.ndarray, mask: np.ndarray, view: np.ndarray, budget: int
 ) -> tuple[int, Triangulation, bool]:
-    """The stride of the grid, its triangles, and whether they are fewer than two a cell.
+    """The stride of the grid, its triangles, and whether there are fewer than two per cell.
 
-    They are at most `budget` (0: as many as there are), unless the object is too thin for the cells
-    of a larger stride.
+    There are at most `budget` (0: unlimited), unless the object is too thin for cells of a larger
+    stride.
     """
     cells = _cells_inside(mask, 1)
     if not cells.any():

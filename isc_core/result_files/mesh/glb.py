@@ -1,10 +1,10 @@
 """Binary glTF 2.0: one textured triangle mesh and its material as the bytes of a `.glb` file.
 
-Layout: a header of 12 bytes; the JSON tree; one buffer, which holds the arrays and pictures one
-after the other. An accessor gives an array's type, a buffer view its place. Both chunks and the
-buffer's parts begin at multiples of 4 bytes.
+Layout: a header of 12 bytes; the JSON tree; one buffer with the arrays and pictures in sequence. An
+accessor gives an array's type, a buffer view its offset. Both chunks and the buffer's parts begin
+at multiples of 4 bytes.
 
-Written by hand because a general mesh library takes longer to import than a result to write.
+No mesh library is used, because its import takes longer than writing a result.
 
 Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, sections 3.6 and 4.4.
@@ -42,8 +42,8 @@ class TexturedMesh:
     uv : (V, 2) float64 ndarray
         Texture coordinates in [0, 1]; v starts at the bottom of the texture.
     tangents : (V, 3) float64 ndarray or None
-        Unit vectors in which the normal map's first axis points; its second one is normal x
-        tangent. None where the map is flat.
+        Unit vectors along the normal map's first axis; its second one is normal x tangent. None if
+        the map is flat.
     """
 
     vertices: np.ndarray
@@ -54,13 +54,13 @@ class TexturedMesh:
 
 
 @dataclass(frozen=True)
-class Veil:
-    """A part of a mesh with a material of its own.
+class ExtraPrimitive:
+    """A second primitive: a part of a mesh with another material.
 
     Attributes
     ----------
     faces : (F,) bool ndarray
-        Which triangles; neither none nor all.
+        Its triangles; neither none nor all.
     material : mapping
         A glTF material.
     """
@@ -73,7 +73,7 @@ def encode_glb(
     mesh: TexturedMesh,
     material: Mapping[str, Any],
     pictures: Sequence[bytes],
-    veil: Veil | None = None,
+    extra: ExtraPrimitive | None = None,
 ) -> bytes:
     """Encode a mesh; equal arguments give equal bytes.
 
@@ -84,7 +84,7 @@ def encode_glb(
         A glTF material. Texture n is picture n.
     pictures : sequence of bytes
         PNG files, at least one.
-    veil : Veil, optional
+    extra : ExtraPrimitive, optional
         A second primitive over the same vertices.
 
     Returns
@@ -100,7 +100,7 @@ def encode_glb(
     }
     if mesh.tangents is not None:  # the fourth number is the sign of the bitangent
         arrays["TANGENT"] = np.pad(mesh.tangents, [(0, 0), (0, 1)], constant_values=1).astype("<f4")
-    parts = [mesh.faces] if veil is None else [mesh.faces[~veil.faces], mesh.faces[veil.faces]]
+    parts = [mesh.faces] if extra is None else [mesh.faces[~extra.faces], mesh.faces[extra.faces]]
     indices = [part.astype("<u4").reshape(-1) for part in parts]
     stored = [*indices, *arrays.values()]
     blocks = [*(values.tobytes() for values in stored), *pictures]
@@ -127,7 +127,7 @@ def encode_glb(
                 ],
             }
         ],
-        "materials": [material] if veil is None else [material, veil.material],
+        "materials": [material] if extra is None else [material, extra.material],
         "textures": [{"source": n} for n in range(len(pictures))],
         "images": [
             {"bufferView": first_picture + n, "mimeType": "image/png"} for n in range(len(pictures))
@@ -137,7 +137,7 @@ def encode_glb(
         "buffers": [{"byteLength": len(buffer)}],
     }
     if not tree["extensionsUsed"]:
-        del tree["extensionsUsed"]  # glTF allows no empty list
+        del tree["extensionsUsed"]  # glTF does not allow empty lists
     return _container(tree, buffer)
 
 
@@ -156,7 +156,7 @@ def _accessor(view: int, values: np.ndarray) -> dict[str, Any]:
 def _joined(
     blocks: Sequence[bytes], targets: Sequence[int | None]
 ) -> tuple[list[dict[str, Any]], bytes]:
-    """The buffer views of blocks that follow each other, and the buffer."""
+    """The buffer views of consecutive blocks, and the buffer."""
     views, buffer = [], bytearray()
     for block, target in zip(blocks, targets, strict=True):
         buffer += _padding(len(buffer), b"\0")

@@ -1,18 +1,18 @@
-"""How much of each pixel of the maps the object covers.
+"""Fractional coverage of the maps' pixels by the object.
 
 Problem: the maps of a result end at pixels that the object covers by half. The edge of a mask that
-was found in the photo, of a soft mask and of an alpha channel is known more finely: `mask.png` has
-the cover of each of the photo's pixels.
+was found in the photo, of a soft mask and of an alpha channel is known with subpixel accuracy:
+`mask.png` has the coverage of each of the photo's pixels.
 
-Equation: the cover of a pixel of the maps is the mean over its area. Beyond two pixels from the
-object it is 0, for the photo may show other objects, unless the rim is soft (`photo.soft_rim`) and
-the way there leads over pixels that the object covers in part. There the cover is the opacity of
-the surface.
+Equation: the coverage of a pixel of the maps is the mean over its area. Beyond two pixels from the
+object it is 0, because the photo may show other objects, unless the rim is soft (`photo.soft_rim`)
+and the pixel is connected to the object by partly covered pixels. There the coverage is the opacity
+of the surface.
 
-Citation: the cover as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
+Citation: coverage as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
 doi:10.1145/800031.808606.
 
-Limits: without that file the edge is that of the maps, of pixels that are the object's or not.
+Limits: without that file the edge is that of the maps' binary mask.
 """
 
 from dataclasses import dataclass
@@ -28,23 +28,23 @@ from ...photo.soft_rim import soft_rim
 from ...scene.decomposition import Decomposition
 
 _NEAR = 2  # pixels
-_SOME = 0.02  # of a pixel: less is none
+_SOME = 0.02  # of a pixel: less is ignored
 
 
 @dataclass(frozen=True)
 class ObjectCover:
-    """The object's cover of the pixels of the maps.
+    """The object's coverage of the maps' pixels.
 
     Attributes
     ----------
     share : (H, W) float32 ndarray
         In [0, 1].
     soft : (H, W) bool ndarray or None
-        Where the rim is soft, and some pixels around; None where it is nowhere.
+        Where the rim is soft, and some pixels around; None without a soft rim.
     fine : (h, w) uint8 ndarray or None
-        The photo's own cover, in codes.
+        The coverage of the photo's pixels, in codes.
     scale : float
-        Pixels of the maps to one of `fine`.
+        Map pixels per pixel of `fine`.
     """
 
     share: np.ndarray
@@ -53,7 +53,7 @@ class ObjectCover:
     scale: float = 1.0
 
     def alpha(self, shape: tuple[int, int] | None = None) -> np.ndarray | None:
-        """Return the opacity of the surface: 1 where the rim is not soft.
+        """Return the opacity of the surface, which is 1 except at soft rims.
 
         Parameters
         ----------
@@ -75,7 +75,7 @@ class ObjectCover:
 
 
 def read_cover(mask_file: Path) -> np.ndarray | None:
-    """Return the cover that a result's `mask.png` has.
+    """Read the coverage in a result's `mask.png`.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def read_cover(mask_file: Path) -> np.ndarray | None:
     Raises
     ------
     InputError
-        If the file is no image.
+        If the file is not an image.
     """
     if not mask_file.is_file():
         return None
@@ -100,18 +100,18 @@ def read_cover(mask_file: Path) -> np.ndarray | None:
 
 
 def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | None:
-    """Return the object's cover of the pixels of the maps.
+    """Return the object's coverage of the maps' pixels.
 
     Parameters
     ----------
     d : Decomposition
     given : (h, w) ndarray or None
-        That of the photo's pixels, 0 to 1.
+        Coverage of the photo's pixels, 0 to 1.
 
     Returns
     -------
     ObjectCover or None
-        None where no more is known than the mask says.
+        None if only the mask is known.
     """
     if given is None:
         return None
@@ -133,7 +133,7 @@ def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | No
 
 
 def _resized(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> np.ndarray:
-    """The cover (H, W) float32 at a scale; 0 beyond the photo, from 1 on as it is."""
+    """The coverage (H, W) float32 at a scale, unchanged from 1; 0 beyond the photo."""
     cover = codes.astype(np.float32) / 255
     if scale < 1:
         area = AreaFilter.of(cover.shape, scale)

@@ -1,4 +1,4 @@
-"""How the mesh of a result is built."""
+"""Options of the mesh of a result."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from ..solids.back import Back
 
 @dataclass(frozen=True)
 class MeshOptions:
-    """How the mesh is built.
+    """Options of the mesh.
 
     Attributes
     ----------
@@ -16,15 +16,15 @@ class MeshOptions:
     metres_per_pixel : float or None
         Replaces `longest_side`.
     triangles : int
-        The most that the mesh may have; 0 for a vertex at each pixel.
+        Largest number of triangles; 0 for a vertex at each pixel.
     rim : int
         Rings of border pixels whose height is limited; 0 for none.
     bleed : int
-        Pixels by which the texture continues beyond the mask.
+        Pixels by which the texture is extended beyond the mask.
     roughness, metallic : float
-        Default glTF factors in [0, 1]; a fitted gloss has its own roughness.
+        Default glTF factors in [0, 1]; a fitted roughness takes precedence.
     back : Back
-        What the mesh has on the side that the photo does not show.
+        The kind of back, on the side that the photo does not show.
     """
 
     longest_side: float = 0.1

@@ -1,10 +1,10 @@
 """A mesh with its material, and its files.
 
-Gloss: roughness and specular level are given (see `lobe_fitting.specular_upper_bound`), the level
-times the scale k of the base colour. A level up to 1, and its variation over the object in a
-texture's alpha, are KHR_materials_specular's factor; the excess above 1 is its colour. Where no
-level is known the factor is 0: without the extension the file would look as glossy as plastic.
-Textures of files have the base colour under the gloss of the same file, see
+Gloss: roughness and specular level come from `lobe_fitting.specular_upper_bound`, with the level
+times the scale k of the base colour. A level up to 1, with its variation over the object in a
+texture's alpha, is the factor of KHR_materials_specular; the excess above 1 is its colour. Where
+the level is unknown the factor is 0, because without the extension the mesh would look as glossy as
+plastic. The base colour in files is that under the gloss of the same file, see
 `lobe_fitting.specular_layer`; `MeshResult.base_color` is that without gloss.
 
 Reference: Khronos Group (2021), glTF 2.0 specification,
@@ -22,7 +22,7 @@ from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
 from ..solids.back import Back
 from ..solids.rim import Rim
-from .glb import TexturedMesh, Veil, encode_glb
+from .glb import ExtraPrimitive, TexturedMesh, encode_glb
 from .object_cover import ObjectCover
 from .options import MeshOptions
 from .texture_codes import alpha_codes, color_codes, encoded_png, vector_codes
@@ -32,7 +32,7 @@ _SPECULAR = "KHR_materials_specular"
 
 @dataclass(frozen=True)
 class MeshResult:
-    """A mesh with its material and how it relates to the maps.
+    """A mesh with its material and its relation to the maps.
 
     Attributes
     ----------
@@ -43,14 +43,14 @@ class MeshResult:
     metres_per_pixel : float
         Of the maps.
     origin : tuple of float
-        (column, row, height), in pixels, of the world's origin; before a camera the height counts
-        from the mean distance.
+        (column, row, height), in pixels, of the world's origin; with a perspective camera the
+        height is relative to the mean distance.
     stride : int
-        Least number of pixels from vertex to vertex.
+        Smallest distance of vertices in pixels.
     vertex_pixel : (V, 2) ndarray
         Row and column of each vertex.
     base_color : (H, W, 3) ndarray
-        Linear, k * reflectance, continued beyond the mask; without gloss above.
+        Linear, k * reflectance, extended beyond the mask; for a surface without gloss.
     detail : (H, W, 3) ndarray
         Unit vectors of the normal map in tangent space.
     options : MeshOptions
@@ -58,13 +58,13 @@ class MeshResult:
     camera : Camera or None
         Of the maps; None for an orthographic view.
     eye : (3,) ndarray or None
-        The camera's place in metres.
+        The camera's position in metres.
     texture : (h, w, 3) uint8 ndarray or None
-        Finer base colour in sRGB codes, over the same frame.
+        Base colour of higher resolution in sRGB codes, over the same frame.
     cover : ObjectCover or None
-        That the outline follows; None for the steps of the pixels.
+        Coverage that the outline follows; None for the steps of the pixels.
     coated : CoatedSurface or None
-        What the base colour under the gloss follows from; None leaves it as it is.
+        Determines the base colour under the gloss; None keeps the base colour unchanged.
     """
 
     mesh: TexturedMesh
@@ -84,8 +84,8 @@ class MeshResult:
     coated: CoatedSurface | None = None
 
     @property
-    def bumpy(self) -> bool:
-        """Whether the normal map holds more than the normals of the vertices."""
+    def needs_normal_map(self) -> bool:
+        """Whether the normal map adds detail to the normals of the vertices."""
         smooth = self.options.back is not Back.OPEN or self.cover is not None
         return smooth or self.mesh.tangents is not None
 
@@ -107,14 +107,14 @@ class MeshResult:
 
     @property
     def base_color_size(self) -> tuple[int, int]:
-        """Width and height of the base colour: the finer one where there is one."""
+        """Width and height of the base colour, of higher resolution if available."""
         height, width = (self.base_color if self.texture is None else self.texture).shape[:2]
         return width, height
 
     @property
     def base_color_codes(self) -> np.ndarray:
-        """The base colour under the gloss in sRGB codes, (h, w, 3) uint8: the finer one where there
-        is one.
+        """The base colour under the gloss in sRGB codes, (h, w, 3) uint8, of higher resolution if
+        available.
         """
         layer = None
         if self.coated is not None and self.has_layer:
@@ -126,7 +126,7 @@ class MeshResult:
 
     @property
     def has_layer(self) -> bool:
-        """Whether the base colour is one under gloss."""
+        """Whether the base colour is that under the gloss."""
         return self.coated is not None and self.specular > 0
 
     @property
@@ -145,7 +145,7 @@ class MeshResult:
         return self.options.roughness if self.gloss.roughness is None else self.gloss.roughness
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
-        """Return the light that gives the diffuse image with the mesh's texture.
+        """Return the light under which the mesh's texture gives the diffuse image.
 
         It is `recovered` / k, k the reflectance scale.
 
@@ -174,17 +174,17 @@ class MeshResult:
                 "roughnessFactor": self.roughness,
             },
             "normalTexture": {"index": 1},
-            # An open mesh should stay visible from behind.
+            # An open mesh must be visible from behind.
             "doubleSided": self.options.back is Back.OPEN,
             "extensions": {_SPECULAR: extension},
         }
         textures, soft = [self.base_color_png(), self.normal_png()], self.soft_faces
-        veil = None
+        extra = None
         if soft is not None:
-            # Viewers draw transparent triangles in any order: the rest stays opaque.
+            # Viewers do not sort transparent triangles: all others stay opaque.
             fading = {"name": "soft rim", "doubleSided": True, "alphaMode": "BLEND"}
-            veil = Veil(soft, material | fading)
-        return encode_glb(self.mesh, material, textures + pictures, veil)
+            extra = ExtraPrimitive(soft, material | fading)
+        return encode_glb(self.mesh, material, textures + pictures, extra)
 
     def base_color_png(self) -> bytes:
         """Return the base colour as the bytes of a PNG, 8-bit sRGB, with the opacity if any."""
@@ -208,7 +208,7 @@ class MeshResult:
         return extension, [encoded_png(alpha_codes(variation / largest))]
 
     def describe(self) -> dict[str, Any]:
-        """Return what a reader needs beside the file, ready for JSON."""
+        """Return the metadata of the mesh, ready for JSON."""
         return {
             "reflectance_scale": self.reflectance_scale,
             "metres_per_pixel": self.metres_per_pixel,

@@ -1,13 +1,12 @@
-"""Heights near the silhouette, limited by those further inside.
+"""Regularised heights near the silhouette.
 
 Problem: the true slope of a smooth object is infinite at its silhouette, so the outermost heights
 of a reconstruction are the least certain and may spike.
 
-Method: from the inside out, a height in the last rings of pixels may differ from its neighbours
-further inside by no more than 1.5 times what these differ from theirs, plus half a pixel; a sphere
-keeps its shape under this rule. Then the outermost ring is averaged along itself over 5 x 5 pixels:
-the silhouette follows the steps of the pixel grid, and on a steep rim each step of one pixel
-sideways would be a tooth of many pixels in depth.
+Method: from the inside out, the step of a height in the outermost rings from its inner neighbours
+is limited to 1.5 times their own step plus half a pixel; this rule preserves a sphere. Then the
+outermost ring is averaged along itself over 5 x 5 pixels: the silhouette has the steps of the pixel
+grid, and on a steep rim each of them would be a tooth of many pixels in depth.
 
 Limits: a true spike at the silhouette is flattened, too.
 """
@@ -17,7 +16,7 @@ from scipy import ndimage
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
-    """Limit the heights of the outermost rings by extrapolation from the inside (see the module).
+    """Limit the heights of the outermost rings by those inside (see the module).
 
     Parameters
     ----------

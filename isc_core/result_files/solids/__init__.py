@@ -1,1 +1,1 @@
-"""A smooth outline, and a side and a back, for the sheet that a photo shows."""
+"""Solids from the visible side of an object: a smooth outline, a side and a back."""

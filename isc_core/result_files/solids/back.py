@@ -1,21 +1,21 @@
-"""Names of the kinds of back, for options too: nothing else is imported."""
+"""The kinds of back, without other imports, for options."""
 
 from enum import StrEnum
 
 
 class Back(StrEnum):
-    """What a body has on the side that the photo does not show.
+    """The unobserved side of a solid.
 
     Attributes
     ----------
     OPEN
-        Nothing.
+        No back.
     FLAT
         A plane, and a wall along the outline.
     ROUNDED
         A surface as round as the outline.
     MIRRORED
-        The front again.
+        The mirrored front.
     """
 
     OPEN = "open"

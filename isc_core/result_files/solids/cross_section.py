@@ -1,8 +1,8 @@
-"""The ellipse that a rounded body has as its section across the outline.
+"""Elliptical cross sections of a rounded solid near its outline.
 
-Problem: the membrane u of a body (see `solid_mesh`) ends at pixels, so that close to the outline it
-has their steps. Where the surface turns away from the viewer, a step of a pixel is many pixels
-deep.
+Problem: the membrane u of a solid (see `solid_mesh`) ends at pixels, so that it has their steps
+close to the outline. Where the surface turns away from the viewer, a step of one pixel is many
+pixels deep.
 
 Equation: along its gradient g, u has the second derivative -c, limited to c = 2 (a ball) to 4 (a
 bar). So u is c / 2 (a^2 - r^2) at r = |g| / c pixels from the axis, with
@@ -10,13 +10,13 @@ bar). So u is c / 2 (a^2 - r^2) at r = |g| / c pixels from the axis, with
     a^2 = |g|^2 / c^2 + 2 u / c,
 
 and sqrt(u) an ellipse of half widths a across and sqrt(c / 2) a in depth. c and a change slowly;
-they are means over some pixels, of which those count most that are far inside, by u^2. Up to two
-pixels inside of the outline, u is that of its distance s to where u ends:
+they are means over some pixels with the weight u^2, which is largest far inside. Up to two pixels
+inside of the outline, u is computed from the distance s to its end:
 
     u = c / 2 (a^2 - (a - s)^2),   s = 1/2 + logit(v) / 1.7,
 
-with v the smoothed cover, which falls from the inside to the outside as the integral of a normal
-distribution of a pixel's deviation.
+with v the smoothed coverage, which falls from the inside to the outside as the integral of a normal
+distribution with a standard deviation of one pixel.
 
 Citation: the logistic function for that integral: S. R. Bowling et al., "A logistic approximation
 to the cumulative normal distribution", Journal of Industrial Engineering and Management 2 (2009),
@@ -36,8 +36,8 @@ _BALL, _BAR = 2.0, 4.0  # c
 _SMOOTH = 4  # passes over blocks of 2 x 2 pixels
 _LOGIT = 1.702
 _BEYOND = 0.5  # pixels from the outline to where u ends
-_SURE, _DEEP = 0.87, 0.97  # v up to which s is taken from the cover alone, from which from u
-_FACTOR = 2.0  # by which u changes at most
+_SURE, _DEEP = 0.87, 0.97  # v up to which s is taken from the coverage alone, and from which from u
+_FACTOR = 2.0  # largest change of u
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class CrossSection:
 
 
 def _between(values: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The block before each pixel, and the share of the next one."""
+    """The block before each pixel, and the weight of the next one."""
     place = np.clip((values + 0.5) / 2 - 0.5, 0, size - 1)
     first = np.minimum(place.astype(np.int64), size - 2)
     return first, place - first
@@ -92,7 +92,7 @@ def cross_section(u: np.ndarray) -> CrossSection:
     Parameters
     ----------
     u : (H, W) ndarray
-        The membrane, 0 outside of the body.
+        The membrane, 0 outside of the solid.
 
     Returns
     -------
@@ -104,7 +104,7 @@ def cross_section(u: np.ndarray) -> CrossSection:
     def near(down: int, right: int) -> np.ndarray:
         return np.asarray(at[1 + down : len(at) - 1 + down, 1 + right : at.shape[1] - 1 + right])
 
-    # Derivatives by pixels: half of the differences between blocks, and a quarter.
+    # Derivatives per pixel: half of the differences between blocks, and a quarter.
     sides = [near(*side) for side in ((1, 0), (-1, 0), (0, 1), (0, -1))]
     down, right = (sides[0] - sides[1]) / 4, (sides[2] - sides[3]) / 4
     twist = (near(1, 1) - near(1, -1) - near(-1, 1) + near(-1, -1)) / 16
@@ -126,15 +126,15 @@ def cross_section(u: np.ndarray) -> CrossSection:
     return CrossSection(np.stack([down / bend, right / bend, bend, square], -1))
 
 
-def between_pixels(u: np.ndarray, smooth: np.ndarray, section: CrossSection) -> np.ndarray:
-    """Make a membrane end along the outline rather than in the steps of the pixels.
+def with_subpixel_outline(u: np.ndarray, smooth: np.ndarray, section: CrossSection) -> np.ndarray:
+    """Let a membrane end at the outline rather than in the steps of the pixels.
 
     Parameters
     ----------
     u : (H, W) ndarray
-        The membrane, 0 outside of the body.
+        The membrane, 0 outside of the solid.
     smooth : (H, W) ndarray
-        The cover whose contour at one half is the outline, see `outline.smooth_cover`.
+        Coverage whose contour at one half is the outline, see `outline.smooth_cover`.
     section : CrossSection
         Of `u`.
 
@@ -148,17 +148,17 @@ def between_pixels(u: np.ndarray, smooth: np.ndarray, section: CrossSection) -> 
     inward = np.minimum(_BEYOND + np.log(cover / (1 - cover)) / _LOGIT, across)
     found = np.clip(bend * inward * (across - inward / 2), before / _FACTOR, before * _FACTOR)
     ended = u.copy()
-    ended[rows, columns] += near_outline(cover) * (found - before)
+    ended[rows, columns] += outline_weights(cover) * (found - before)
     return ended
 
 
-def near_outline(smooth: np.ndarray) -> np.ndarray:
-    """Return how near the outline pixels are: 1 up to a pixel inside of it, 0 from two on.
+def outline_weights(smooth: np.ndarray) -> np.ndarray:
+    """Return weights of pixels near the outline: 1 up to one pixel inside of it, 0 from two.
 
     Parameters
     ----------
     smooth : ndarray
-        The smoothed cover.
+        The smoothed coverage.
 
     Returns
     -------

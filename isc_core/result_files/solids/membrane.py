@@ -1,7 +1,7 @@
 """A membrane over the pixels of a region, under a uniform load.
 
 Equation: lap z = -load inside, z given on the pixels around. Under a load of 4 with z = 0 around,
-sqrt(z) is the height of a sphere over a disc; over other outlines, of a body as round as they are.
+sqrt(z) is the height of a sphere over a disc, and of a similarly rounded solid over other outlines.
 
 Method: from the coarsest of a pyramid to the finest, each level starts from the one before and is
 relaxed by red-black successive over-relaxation; the larger a level, the fewer sweeps it needs.
@@ -17,7 +17,7 @@ import numpy as np
 from ...imaging.upsampling import enlarged
 
 _SWEEPS, _OVER = 40, 1.8
-# Levels longer than so many pixels: their sweeps fall with their length, to the least.
+# Levels longer than `_LONG` pixels have fewer sweeps, inversely to their length, down to `_FEWEST`.
 _LONG, _FEWEST, _OVER_LONG = 256, 8, 1.5
 _COARSEST = 12  # pixels of the shorter side
 
@@ -32,7 +32,7 @@ def membrane(inside: np.ndarray, around: np.ndarray, values: np.ndarray, load: f
     around : (H, W) bool ndarray
         Pixels of known value that enclose the region.
     values : (H, W) ndarray
-        The values there.
+        Values of these pixels.
     load : float
         Minus the Laplacian, per pixel squared.
 

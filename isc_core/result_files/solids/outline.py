@@ -1,17 +1,17 @@
-"""Triangles up to a smooth outline between the pixels.
+"""Triangulation with a smooth outline between the pixels.
 
-Problem: a mesh of whole cells of pixels ends in steps. The object's edge is known more finely: by
-the cover of its pixels, or at least by a mask, whose steps are those of the pixel grid.
+Problem: a mesh of whole cells of pixels ends in steps. The object's edge is known more accurately
+from the coverage of its pixels, or can be smoothed if only a mask is known.
 
-Method: marching squares. Cells of four pixels inside have the triangles of the adaptive mesh; a
-cell of one to three is cut where the cover, smoothed over 3 x 3 pixels, falls to one half. Two
-pixels that only meet at a corner are kept apart, so that each point of the outline lies between two
-edges of it.
+Method: marching squares. Cells with four pixels inside have the triangles of the adaptive mesh; a
+cell with one to three is cut where the coverage, smoothed over 3 x 3 pixels, falls to one half. Two
+pixels that only meet at a corner are not connected, so that each point of the outline lies between
+two of its edges.
 
 Citation: W. E. Lorensen and H. E. Cline, "Marching cubes", SIGGRAPH 1987, doi:10.1145/37402.37422.
 
-Limits: points of the outline keep a tenth of a pixel away from the pixels' centres; parts thinner
-than a pixel are lost.
+Limits: points of the outline are at least a tenth of a pixel away from the pixels' centres; parts
+thinner than a pixel are lost.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ class Outlined:
     inner : int
         Number of vertices that are pixels.
     faces : (F, 3) int64 ndarray
-        Vertices, counter-clockwise for the viewer; each face has one that is a pixel.
+        Vertices, counter-clockwise for the viewer; at least one of each face is a pixel.
     """
 
     places: np.ndarray
@@ -51,13 +51,13 @@ class Outlined:
 
     @property
     def pixel_triangles(self) -> Triangulation:
-        """The triangles between pixels alone."""
+        """The triangles whose vertices are all pixels."""
         between = (self.faces < self.inner).all(1)
         return Triangulation(self.pixels[: self.inner], self.faces[between])
 
 
 def smooth_cover(cover: np.ndarray) -> np.ndarray:
-    """Return the cover whose contour at one half is the outline.
+    """Return the coverage whose contour at one half is the outline.
 
     Parameters
     ----------
@@ -83,9 +83,10 @@ def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget:
     smooth : (H, W) ndarray
         Of `smooth_cover`.
     height, cosine : (H, W) ndarray
-        As of `adaptive_triangles`.
+        As for `adaptive_triangles`.
     budget : int
-        The most triangles wanted; 0 for two a cell. Those that the outline needs are made anyway.
+        Largest number of triangles; 0 for two per cell. Those required by the outline are always
+        made.
 
     Returns
     -------
@@ -122,8 +123,8 @@ def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget:
 def _cut_cells(corners: np.ndarray, width: int, size: int) -> np.ndarray:
     """Triangles (F, 3) of the cells that the outline crosses.
 
-    A pixel is its flat index, the point between it and the next one to the right that plus `size`,
-    to the next one below that plus 2 `size`.
+    A pixel is its flat index, the point between it and its right neighbour the index plus `size`,
+    and between it and its lower neighbour the index plus 2 `size`.
     """
     code = corners.T @ (1, 2, 4, 8)
     found = [np.zeros((0, 3), np.int64)]
@@ -140,7 +141,9 @@ def _cut_cells(corners: np.ndarray, width: int, size: int) -> np.ndarray:
 
 
 def _polygons(case: int) -> list[list[tuple[int, int]]]:
-    """Triangles of one kind of cell: (1, k) is corner k, (0, k) the point between k and k + 1."""
+    """Triangles of a case of marching squares: (1, k) is corner k, (0, k) the point between k and k
+    + 1.
+    """
     full = [bool(case >> k & 1) for k in range(4)]
     triangles = []
     for first in (k for k in range(4) if full[k] and not full[k - 1]):
@@ -155,7 +158,7 @@ def _polygons(case: int) -> list[list[tuple[int, int]]]:
 
 
 def _positions(used: np.ndarray, inner: int, smooth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest pixels inside (V, 2), and the places (V, 2)."""
+    """The nearest pixels inside (V, 2), and the positions (V, 2)."""
     width, size, values = smooth.shape[1], smooth.size, smooth.reshape(-1)
     start = used % size
     end = start + np.select([used >= 2 * size, used >= size], [width, 1], 0)

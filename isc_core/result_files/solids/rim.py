@@ -1,17 +1,17 @@
-"""Where a body ends, and where its rim is soft.
+"""The outline of a solid, and its soft rims.
 
-Problem: a smooth rim is an outline: the surface turns away from the viewer, and a back begins. Hair
-and fur have none. What they cover fades, and a back behind them would be seen through them.
+Problem: at a smooth rim the surface turns away from the viewer, and a back begins. Hair and fur
+have no such outline: their coverage fades, and a back would be visible through them.
 
-Model: where the rim is soft, the mesh goes on to where next to nothing is covered, and fades by its
-texture's opacity. The body proper, which has a rim and a back, ends where the cover falls below
-`_WHOLE`; beyond, the mesh is one sheet, so that light passes one layer and the opacity seen is the
-cover.
+Model: where the rim is soft, the mesh extends until the coverage is almost 0, and fades by its
+texture's opacity. The core, which has a rim and a back, ends where the coverage falls below
+`_WHOLE`; beyond, the mesh is a single sheet, so that the visible opacity is that of one layer, the
+coverage.
 
-Citation: the cover as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
+Citation: coverage as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
 doi:10.1145/800031.808606.
 
-Limits: strands lie in the sheet: from the side it is thin.
+Limits: strands lie in the sheet, which is thin when seen from the side.
 """
 
 from dataclasses import dataclass
@@ -24,14 +24,14 @@ _LEAST = 0.04
 
 @dataclass(frozen=True)
 class Rim:
-    """How the object ends.
+    """The rim of the object.
 
     Attributes
     ----------
     cover : (H, W) ndarray
-        Share of each pixel that the object covers.
+        Coverage of each pixel by the object.
     soft : (H, W) bool ndarray or None
-        Where the rim is soft; None for nowhere.
+        Where the rim is soft; None without a soft rim.
     """
 
     cover: np.ndarray
@@ -39,14 +39,14 @@ class Rim:
 
     @property
     def outline(self) -> np.ndarray:
-        """The map (H, W) whose contour at one half is the end of the mesh."""
+        """The map (H, W) whose contour at one half is the boundary of the mesh."""
         if self.soft is None:
             return self.cover
         return np.where(self.soft, np.clip(self.cover / (2 * _LEAST), 0, 1), self.cover)
 
     @property
     def sheet(self) -> np.ndarray:
-        """Pixels (H, W) of the single sheet: soft ones that are not wholly covered."""
+        """Pixels (H, W) of the single sheet: soft ones that are not fully covered."""
         if self.soft is None:
             return np.zeros(self.cover.shape, bool)
         return self.soft & (self.cover < _WHOLE)

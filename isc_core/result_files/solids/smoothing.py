@@ -1,6 +1,6 @@
-"""Smoothing of maps by the binomial filter, which counts pixels of a region alone.
+"""Smoothing of maps by the binomial filter, restricted to the pixels of a region.
 
-Equation: sum w v / sum w, with w the filter's weights over the pixels that count (normalised
+Equation: sum w v / sum w, with w the filter's weights over the pixels of the region (normalised
 convolution).
 
 Citation: H. Knutsson and C.-F. Westin, "Normalized and differential convolution", CVPR 1993,
@@ -20,7 +20,7 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
     plane : (H, W) ndarray
         The map, 0 beyond its borders.
     passes : int
-        How often.
+        Number of repetitions.
 
     Returns
     -------
@@ -35,7 +35,7 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
 
 
 def _filter_down(plane: np.ndarray, out: np.ndarray) -> None:
-    """Filter a map down its columns, whose ends meet."""
+    """Filter a map down its columns, with periodic boundaries."""
     np.multiply(plane, 2, out=out)
     out[1:] += plane[:-1]
     out[0] += plane[-1]
@@ -63,19 +63,19 @@ def surrounded(inside: np.ndarray) -> np.ndarray:
 def smoothed_within(
     maps: Sequence[np.ndarray], counts: np.ndarray, passes: int
 ) -> list[np.ndarray]:
-    """Smooth maps of the pixels that count, and continue them to those near these.
+    """Smooth maps over the pixels of a region, and extend them to nearby pixels.
 
     Parameters
     ----------
     maps : sequence of (H, W) ndarray
     counts : (H, W) bool ndarray
     passes : int
-        Also the reach in pixels.
+        Number of repetitions, and the radius of the extension in pixels.
 
     Returns
     -------
     list of (H, W) float64 ndarray
-        Beyond that reach as given.
+        Unchanged beyond that radius.
     """
     weight = binomial(counts, passes)
     reached = weight > 0

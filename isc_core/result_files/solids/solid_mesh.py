@@ -1,36 +1,36 @@
 """A solid mesh from the height map of its visible side: a smooth outline, a rounded rim, a back.
 
-Problem: a photo shows one side. Turned, that sheet ends in the steps of its pixels, and half of the
-form is missing.
+Problem: a photo shows one side. The height map of that side ends in the steps of its pixels, and
+half of the shape is missing.
 
 Model: u is a membrane over the inside of the outline, lap u = -4 and u = 0 around, so that sqrt(u)
 is the height of a sphere over a disc; near the outline, u follows it between the pixels (see
-`cross_section`). At the rim, where the surface turns away from the viewer, the last seen height z
-and the outline are sqrt(u) apart in depth:
+`cross_section`). At the rim, where the surface turns away from the viewer, the last visible height
+z and the outline differ by sqrt(u) in depth:
 
     rim = z - ROUND sqrt(u),   continued inward by a membrane m without load.
 
 Heights of the last two pixels before the outline are at most rim + ROUND sqrt(u): seen from the
 side, the steps of the outermost pixels would be teeth.
 
-The back at a pixel is
+The height of the back at a pixel is
 
     flat       the furthest rim less a share of the size, with a wall
     rounded    m - FULLNESS sqrt(u)
     mirrored   m - (z - m)
 
-and at least `_LEAST` sqrt(u) behind the front, so that the two meet in the outline alone. Both are
-graphs over the same triangles: they do not cross each other, and before a pinhole camera, along
-whose rays the back lies, neither. The texture of a rounded back is folded in at the outline (see
-`texture_places`), that of the others is the texture of the pixel in front. Where the rim is soft,
-the closed part ends at its core, and the sheet goes on alone (see `rim`).
+and at least `_LEAST` sqrt(u) behind the front, so that the two meet only at the outline. Both are
+graphs over the same triangles and do not intersect, also with a pinhole camera, along whose rays
+the back lies. The texture of a rounded back is folded at the outline (see `texture_places`), that
+of the others is the texture of the pixel in front. Where the rim is soft, the closed part ends at
+its core, beyond which there is only the sheet (see `rim`).
 
 Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
 artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
 Igarashi, S. Matsuoka and H. Tanaka, "Teddy", SIGGRAPH 1999, doi:10.1145/311535.311602.
 
-Limits: the back is invented. Parts that hide others are joined to them: a step in depth inside the
-outline stays a slope. Cuts along it were tried, see the research log ("Depth edges").
+Limits: the back is a guess. Parts that occlude others are connected to them: a depth discontinuity
+inside the outline becomes a slope. Cuts along it were tried, see the research log ("Depth edges").
 """
 
 from dataclasses import dataclass
@@ -40,12 +40,12 @@ import numpy as np
 from ..triangulation.adaptive_triangles import Triangulation
 from ..triangulation.renumbering import renumbered
 from .back import Back
-from .cross_section import between_pixels, cross_section, near_outline
+from .cross_section import cross_section, outline_weights, with_subpixel_outline
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 from .rim import Rim
 from .smoothing import smoothed_within, surrounded
-from .texture_places import folded_places
+from .texture_places import folded_positions
 
 ROUND, FULLNESS = 1.0, 1.0
 _LEAST = 0.2
@@ -70,11 +70,11 @@ class SolidMesh:
     faces : (F, 3) int64 ndarray
         Counter-clockwise from outside.
     front : (V,) bool ndarray
-        Vertices at pixels that the photo shows; not those of the outline.
+        Vertices at visible pixels; not those of the outline.
     visible : Triangulation
         The triangles between these vertices, which come first.
     texture : (V, 2) float64 ndarray
-        Row and column from which each vertex takes its texture.
+        Row and column of the texture at each vertex.
     """
 
     places: np.ndarray
@@ -107,12 +107,12 @@ def make_solid_mesh(
     rim : Rim
     back : Back
     triangles : int
-        The most of the visible side, where its outline allows; 0 for two at each pixel.
+        Largest number on the visible side, if its outline allows; 0 for two at each pixel.
 
     Returns
     -------
     SolidMesh
-        Closed but for `Back.OPEN` and the sheets of a soft rim.
+        Closed except for `Back.OPEN` and the sheets of a soft rim.
 
     Raises
     ------
@@ -128,9 +128,11 @@ def make_solid_mesh(
     around = _grown(core) & ~core
     u = np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0)
     section = cross_section(u)
-    u = between_pixels(u, smooth, section)
+    u = with_subpixel_outline(u, smooth, section)
     round_height = np.sqrt(u)
-    known, last = _rolled(known, round_height, inside, np.where(core, near_outline(smooth), 0))
+    known, last = _rolled_off(
+        known, round_height, inside, np.where(core, outline_weights(smooth), 0)
+    )
     rows, columns = sheet.pixels.T
     heights = known[rows, columns]
     heights[sheet.inner :] = last[rows, columns][sheet.inner :]
@@ -140,7 +142,7 @@ def make_solid_mesh(
         return SolidMesh(
             sheet.places, heights, sheet.pixels, sheet.faces, front, visible, sheet.places
         )
-    closed = _of_core(sheet, thin)
+    closed = _core_faces(sheet, thin)
     if back is Back.FLAT:
         return _used(_walled(sheet, closed, heights, front, mask))
     edge = _grown(around) & core
@@ -153,19 +155,19 @@ def make_solid_mesh(
         return mesh
     hidden = ~mesh.front & core[mesh.pixels[:, 0], mesh.pixels[:, 1]]
     outline = (np.arange(len(hidden)) < len(front))[hidden]
-    mesh.texture[hidden] = folded_places(
+    mesh.texture[hidden] = folded_positions(
         u, section, mesh.places[hidden], mesh.pixels[hidden], outline
     )
     return mesh
 
 
-def _rolled(
+def _rolled_off(
     known: np.ndarray, round_height: np.ndarray, inside: np.ndarray, near: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The heights (H, W), rolled off to the outline, and the depth of the rim.
+    """The heights (H, W), limited toward the outline, and the depth of the rim.
 
-    Without that the outermost pixels stand out by their distances to the outline, which their steps
-    change from pixel to pixel.
+    Without the limit, the outermost pixels would be teeth, because their distances to the outline
+    vary from pixel to pixel.
     """
     last = np.where(inside, known - ROUND * round_height, 0.0)
     (last,) = smoothed_within((last,), surrounded(inside), _SMOOTH)
@@ -174,9 +176,9 @@ def _rolled(
 
 
 def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Continue heights from the mask to the pixels inside, ring by ring.
+    """Extend heights from the mask to the pixels inside, ring by ring.
 
-    Each pixel of a ring is the mean of its neighbours within.
+    Each pixel of a ring is the mean of its known neighbours.
 
     Parameters
     ----------
@@ -219,11 +221,11 @@ def _grown(plane: np.ndarray) -> np.ndarray:
     return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
 
 
-def _of_core(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
+def _core_faces(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
     """Which triangles (F,) of the sheet have a back: those between pixels of the core.
 
-    One whose corners are all in common with the single sheet has none, either: the two would be
-    the same triangle.
+    A triangle whose corners all belong to the single sheet, too, has none, because its back would
+    be the same triangle.
     """
     alone = thin[sheet.pixels[:, 0], sheet.pixels[:, 1]][sheet.faces].any(1)
     if not alone.any():
@@ -236,7 +238,7 @@ def _of_core(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
 def _joined(
     sheet: Outlined, closed: np.ndarray, heights: np.ndarray, behind: np.ndarray, front: np.ndarray
 ) -> SolidMesh:
-    """The sheet and, with the points of the core's outline in common, the back."""
+    """The sheet and the back, which share the points of the core's outline."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
     own = np.arange(n) < inner
@@ -266,7 +268,7 @@ def _used(mesh: SolidMesh) -> SolidMesh:
 def _walled(
     sheet: Outlined, closed: np.ndarray, heights: np.ndarray, front: np.ndarray, mask: np.ndarray
 ) -> SolidMesh:
-    """The sheet, a plane behind it, and two triangles of wall at each edge of the outline."""
+    """The sheet, a plane behind it, and a wall of two triangles at each edge of the outline."""
     n = len(heights)
     size = (np.ptp(np.argwhere(mask), axis=0) + 1).max()
     shut = sheet.faces[closed]

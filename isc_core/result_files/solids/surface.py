@@ -1,10 +1,10 @@
 """A solid mesh with the normals of its visible side.
 
-The recovered normals of the visible side are in its vertices, and what lies between these in a
+The recovered normals of the visible side are stored at its vertices, and their detail in a
 tangent-space normal map. Rim and back have the normals of their faces.
 
-Equation: before a pinhole camera a vertex lies on the ray of its place, so that the front hides the
-back.
+Equation: with a pinhole camera a vertex lies on the ray of its pixel, so that the front occludes
+the back.
 """
 
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class Solid:
     ----------
     mesh : SolidMesh
     smooth : (N, 3) ndarray
-        Unit normals of its first N vertices, those of the visible side.
+        Unit normals of the first N vertices, those of the visible side.
     detail : (H, W, 3) ndarray
         Unit vectors of the normal map in tangent space.
     """
@@ -42,12 +42,12 @@ class Solid:
         Parameters
         ----------
         vertices : (V, 3) ndarray
-            Their places.
+            Their positions.
 
         Returns
         -------
         (V, 3) ndarray
-            Unit vectors; those of rim and back are means of the faces', by area.
+            Unit vectors; those of rim and back are area-weighted means over faces.
         """
         normals = vertex_normals(vertices, self.mesh.faces)
         normals[: len(self.smooth)] = self.smooth
@@ -88,7 +88,7 @@ def make_solid(
         Unit vectors toward the viewer.
     back : Back
     triangles : int
-        The most of the visible side; 0 for two at each pixel.
+        Largest number on the visible side; 0 for two at each pixel.
 
     Returns
     -------
@@ -106,8 +106,8 @@ def make_solid(
     return Solid(mesh, smooth, detail)
 
 
-def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) -> np.ndarray:
-    """Return the heights that `make_solid` takes.
+def view_heights(height: np.ndarray, mask: np.ndarray, camera: Camera | None) -> np.ndarray:
+    """Return heights in the form that `make_solid` expects.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) ->
     Returns
     -------
     (H, W) ndarray
-        As given; before a camera minus the depth, whose mean is the focal length.
+        Unchanged without a camera; else minus the depth, whose mean is the focal length.
     """
     if camera is None:
         return height
@@ -128,8 +128,8 @@ def heights_seen(height: np.ndarray, mask: np.ndarray, camera: Camera | None) ->
     return np.asarray(depth * (-camera.focal_length / depth[mask].mean()))
 
 
-def placed(mesh: SolidMesh, camera: Camera | None) -> np.ndarray:
-    """Return the vertices of a mesh made of `heights_seen`.
+def vertex_positions(mesh: SolidMesh, camera: Camera | None) -> np.ndarray:
+    """Return the vertices of a mesh that was made from `view_heights`.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def before_camera(places: np.ndarray, depth: np.ndarray, camera: Camera) -> np.n
 
 
 def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """(H, W, 3): the unit normals, also of pixels of the mesh just beyond the mask."""
+    """(H, W, 3): the unit normals, extended to pixels of the mesh just beyond the mask."""
     inside = mask.copy()
     inside[pixels[:, 0], pixels[:, 1]] = True
     found = continued(np.where(mask[..., None], normal, 0), mask, inside)
@@ -179,7 +179,7 @@ def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray)
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return unit normals of vertices, the mean of their faces' by area.
+    """Return unit normals of vertices, the area-weighted means of their faces' normals.
 
     Parameters
     ----------

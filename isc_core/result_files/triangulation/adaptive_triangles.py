@@ -1,20 +1,21 @@
-"""A height map as few triangles: large ones where it is flat, pixels along the silhouette.
+"""Adaptive triangulation of a height map: large triangles where it is flat, pixels at the
+silhouette.
 
-Problem: a mesh with a vertex at each pixel has two triangles a pixel. Most of them lie in smooth
-places, where larger ones would do; the silhouette must not change by a pixel.
+Problem: a mesh with a vertex at each pixel has two triangles per pixel. Most of them are in smooth
+regions, where larger ones suffice; the silhouette must stay exact.
 
-Method: a restricted quadtree, also known as right-triangulated irregular network. A right
-isosceles triangle is bisected at the middle v of its hypotenuse ab. There it misses the height by
+Method: a restricted quadtree, also known as right-triangulated irregular network. A right isosceles
+triangle is bisected at the midpoint v of its hypotenuse ab, where its error is
 
     e(v) = |z(v) - (z(a) + z(b)) / 2| cos(v),
 
 cos(v) being the angle between normal and view: about the distance between the surfaces. The
-triangle on the other side of ab is bisected with it, which may need further bisections first. With
+triangle on the other side of ab is bisected, too, which may require further bisections. With
 
     E(v) = max(e(v), E of every vertex whose bisection needs v),
 
-computed from the finest level to the coarsest, {v : E(v) > t} has all that its members need: no
-cracks for any t. A vertex at the silhouette has E = infinity. Every other vertex adds two
+computed from the finest level to the coarsest, {v : E(v) > t} includes all required vertices: there
+are no cracks for any t. A vertex at the silhouette has E = infinity. Every other vertex adds two
 triangles, so t is an order statistic of E, and the budget is met exactly.
 
 Cost: linear in the pixels.
@@ -23,9 +24,9 @@ Citation: P. Lindstrom et al., "Real-time, continuous level of detail rendering 
 SIGGRAPH 1996, doi:10.1145/237170.237217; W. Evans, D. Kirkpatrick, G. Townsend, "Right-triangulated
 irregular networks", Algorithmica 30 (2001), doi:10.1007/s00453-001-0006-x.
 
-Limits: e(v) is the distance at one point of the two triangles, and E no bound of the others. Before
-a camera, heights are compared along the pixels' rays. Straight silhouettes have a vertex at each
-pixel, too.
+Limits: e(v) is the error at one point of the two triangles, and E does not bound the others. With a
+perspective camera, heights are compared along the pixels' rays. Straight silhouettes have a vertex
+at each pixel, too.
 """
 
 from collections.abc import Iterator
@@ -38,7 +39,7 @@ from .renumbering import renumbered
 _ROOT = 64  # cells along a side of the largest squares; a power of two
 _HALF = _ROOT // 2
 _LEAST_COSINE = 0.05
-_MOST_PIXELS = 1 << 17  # about so many at once
+_MOST_PIXELS = 1 << 17  # approximate number processed at a time
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ class Triangulation:
     Attributes
     ----------
     vertices : (V, 2) int64 ndarray
-        Row and column of each vertex in use.
+        Row and column of each used vertex.
     faces : (F, 3) int64 ndarray
         Vertices of each triangle, counter-clockwise with rows downward; the right angle is at the
         last one.
@@ -67,7 +68,7 @@ class Patch:
     faces : (T, 3) int64 ndarray
         Vertices of each triangle.
     pixels : (T, P, 2) int64 ndarray
-        Row and column of the pixels in each triangle, those on its sides included.
+        Row and column of the pixels in each triangle, including those on its sides.
     weights : (P, 3) float64 ndarray
         Barycentric coordinates of the pixels.
     """
@@ -91,7 +92,7 @@ def adaptive_triangles(
     cosine : (H, W) ndarray
         Of the angle between normal and view.
     budget : int
-        0 for no more triangles than the silhouette needs.
+        0 for only the triangles that the silhouette needs.
 
     Returns
     -------
@@ -144,7 +145,7 @@ def _lattice(sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         -1,
     ).reshape(-1, 2)
     (a, b), (c, d) = sides
-    area = a * d - b * c  # whole numbers: a point on a side belongs to the triangle exactly
+    area = a * d - b * c  # integers: points on a side are classified exactly
     second, third = points[:, 0] * d - points[:, 1] * c, points[:, 1] * a - points[:, 0] * b
     weights = np.stack([area - second - third, second, third], -1) * np.sign(area)
     inside = (weights >= 0).all(axis=1)
@@ -165,12 +166,12 @@ def _errors(height: np.ndarray, cells: np.ndarray, cosine: np.ndarray) -> np.nda
     used, here = around > 0, lattice.corner(height.shape)
     z[here] = height
     weight[here] = np.where(used[here], np.maximum(cosine, _LEAST_COSINE), 0)
-    for row, column in ((0, 1), (1, 0)):  # each unit of the silhouette ends at such a vertex
+    for row, column in ((0, 1), (1, 0)):  # each unit edge of the silhouette ends at such a vertex
         finest = lattice.every(2, row, column)
         total[finest][used[finest] & (around[finest] < 4)] = np.inf
     half = 1
     while half < _ROOT:
-        for row, column in ((0, half), (half, 0)):  # the middles of the squares' sides
+        for row, column in ((0, half), (half, 0)):  # the midpoints of the squares' sides
             ends = lattice.pair(2 * half, row, column, (row, column))
             values = _missed(z, weight, lattice.every(2 * half, row, column), *ends)
             _raise(total, values, lattice, (2 * half, row, column), half // 2, _DIAGONALS)
@@ -198,14 +199,14 @@ class _Lattice:
         return slice(top, top + shape[0]), slice(left, left + shape[1])
 
     def every(self, step: int, row: int, column: int, down: int = 0, right: int = 0) -> Slices:
-        """The vertices (row + i step, column + j step) of the grid, all moved."""
+        """The vertices (row + i step, column + j step) of the grid, shifted by (down, right)."""
         return (
             _spaced(_HALF + row + down, step, self.rows // step + (row == 0)),
             _spaced(_HALF + column + right, step, self.columns // step + (column == 0)),
         )
 
     def pair(self, step: int, row: int, column: int, move: tuple[int, int]) -> list[Slices]:
-        """The vertices moved back and forth."""
+        """The vertices shifted backward and forward."""
         return [self.every(step, row, column, sign * move[0], sign * move[1]) for sign in (-1, 1)]
 
 
@@ -224,7 +225,7 @@ def _missed(
 def _missed_in_squares(
     z: np.ndarray, weight: np.ndarray, lattice: _Lattice, half: int
 ) -> np.ndarray:
-    """e at the middles of squares: their diagonals alternate like the colours of a chessboard."""
+    """e at the centres of squares, whose diagonals alternate like the colours of a chessboard."""
     place = 2 * half, half, half
     one, other = (
         _missed(z, weight, lattice.every(*place), *lattice.pair(*place, diagonal))
@@ -251,8 +252,8 @@ def _raise(
 
 
 def _leaves(errors: np.ndarray, threshold: float, cells: np.ndarray) -> np.ndarray:
-    """The triangles (F, 3) to cover, as flat vertices: those at whose middles E is `threshold` or
-    less.
+    """The triangles (F, 3) of the mesh, as flat vertices: those at whose midpoints E is at most
+    `threshold`.
     """
     width = errors.shape[1]
     split = errors.reshape(-1) > threshold if np.isfinite(threshold) else np.isinf(errors.ravel())
@@ -265,7 +266,7 @@ def _leaves(errors: np.ndarray, threshold: float, cells: np.ndarray) -> np.ndarr
         a, b, c, middle = (part[bisected] for part in (a, b, c, middle))
         triangles = np.concatenate([np.stack([c, a, middle], -1), np.stack([b, c, middle], -1)])
     found = np.concatenate([*done, triangles])
-    # A cell that such a triangle touches stands for all of its cells.
+    # One cell inside a triangle decides for all of its cells.
     row, column = (part.sum(axis=1) // 3 for part in np.divmod(found, width))
     inside = (row < cells.shape[0]) & (column < cells.shape[1])
     inside[inside] = cells[row[inside], column[inside]]

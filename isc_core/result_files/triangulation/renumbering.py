@@ -1,14 +1,14 @@
-"""Numbers without gaps for the vertices that triangles use.
+"""Consecutive numbers for the vertices of triangles.
 
-`numpy.unique` sorts all corners; vertices are few and numbered from 0, so that a flag for each is
-enough.
+Faster than `numpy.unique`, which sorts all corners: vertices are numbered from 0, so that a flag
+for each is enough.
 """
 
 import numpy as np
 
 
 def renumbered(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Number the vertices in use from 0 on, in their order.
+    """Number the used vertices consecutively from 0, in their order.
 
     Parameters
     ----------
@@ -18,9 +18,9 @@ def renumbered(corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns
     -------
     used : (N,) int64 ndarray
-        The vertices in use, in ascending order.
+        The used vertices, in ascending order.
     renumbered : (...) int64 ndarray
-        The place of each corner's vertex in `used`.
+        The index of each corner's vertex in `used`.
     """
     in_use = np.zeros(int(corners.max(initial=-1)) + 1, bool)
     in_use[corners] = True

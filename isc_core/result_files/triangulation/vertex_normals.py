@@ -1,16 +1,15 @@
-"""Normals of a mesh's vertices, and the tangent-space normal map of what lies between them.
+"""Normals of a mesh's vertices, and the tangent-space normal map of the remaining detail.
 
-Problem: a mesh has fewer vertices than there are pixels. The normals that its triangles interpolate
-are smooth; a normal map holds the rest.
+Problem: a mesh has fewer vertices than there are pixels. The interpolated normals of its triangles
+are smooth; a normal map stores the detail.
 
-Equation: a vertex has the mean normal of the pixels of its triangles, weighted as these are
-interpolated. With this normal n interpolated to a pixel, t the unit direction on the surface in
-which the texture's column grows, and b = n x t, the map has the pixel's normal in the frame
-(t, b, n).
+Equation: a vertex has the mean normal of the pixels of its triangles, weighted by its barycentric
+coordinates. With this normal n interpolated to a pixel, t the unit tangent along increasing texture
+columns, and b = n x t, the map has the pixel's normal in the frame (t, b, n).
 
 Citation: J. Blinn, "Simulation of wrinkled surfaces", SIGGRAPH 1978, doi:10.1145/800248.507101.
 
-Limits: normals that turn away from the viewer are bent until their tangent is defined.
+Limits: normals that face away from the viewer are rotated until their tangent is defined.
 """
 
 import numpy as np
@@ -23,7 +22,7 @@ _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tange
 def interpolated_normals(
     grid: Triangulation, normal: np.ndarray, view: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normals of vertices, and the tangent-space map of what lies between them.
+    """Return the normals of vertices, and the tangent-space map of the detail.
 
     Parameters
     ----------
@@ -52,13 +51,13 @@ def interpolated_normals(
 def mean_normals(
     grid: Triangulation, stride: int, normal: np.ndarray, view: np.ndarray
 ) -> np.ndarray:
-    """Return the normals of vertices: means of the pixels of their triangles.
+    """Return the normals of vertices: weighted means over the pixels of their triangles.
 
     Parameters
     ----------
     grid : Triangulation
     stride : int
-        Pixels a step of the grid.
+        Pixels per step of the grid.
     normal : (H, W, 3) ndarray
         Unit vectors, camera frame.
     view : (3,) or (H, W, 3) ndarray
@@ -111,7 +110,7 @@ def detail_normals(
 
 
 def directions_at(view: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Return the directions of pixels, or the one of all.
+    """Return the view directions of pixels, or the common one.
 
     Parameters
     ----------
@@ -142,7 +141,7 @@ def flat_normals(shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _tangents(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """The unit direction (..., 3) on a surface in which the texture's column grows."""
+    """The unit tangent (..., 3) along increasing texture columns."""
     if view.ndim == 1:
         tangent = np.stack([normal[..., 2], np.zeros_like(normal[..., 0]), -normal[..., 0]], -1)
     else:  # on the surface, and in the plane of the pixel's row through the camera
@@ -151,9 +150,7 @@ def _tangents(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
 
 
 def _local(normal: np.ndarray, base: np.ndarray, view: np.ndarray) -> np.ndarray:
-    """Normals (..., 3) in the frame of tangent, bitangent (in which the texture's row falls) and
-    base.
-    """
+    """Normals (..., 3) in the frame of tangent, bitangent (along falling texture rows) and base."""
     tangent = _tangents(base, view)
     frame = tangent, np.cross(base, tangent), base
     return np.stack([np.einsum("...c,...c->...", normal, axis) for axis in frame], -1)
@@ -166,7 +163,7 @@ def facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
     ----------
     vectors : (..., 3) ndarray
     view : (3,) or (..., 3) ndarray
-        (0, 0, 1), or the direction of each.
+        (0, 0, 1), or the view direction of each.
 
     Returns
     -------

@@ -105,10 +105,10 @@ def test_colours_are_averaged_rather_than_places_in_the_texture() -> None:
     both = np.concatenate([faces, faces + 4])
     places = np.repeat([[0.0], [2.0]], 4, axis=0)
 
-    def painted(places: np.ndarray) -> np.ndarray:
+    def colors_of(places: np.ndarray) -> np.ndarray:
         return np.where(np.abs(places - 1) < 0.5, 1.0, 0.0)
 
     args = vertices, both, places, 0.0, SIDE, 1.0
     between = np.abs(turned_view(*args).values - 1) < 0.5
     assert between.any()
-    assert turned_view(*args, painted=painted).values.max() == 0
+    assert turned_view(*args, colors_of=colors_of).values.max() == 0
