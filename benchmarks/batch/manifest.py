@@ -19,7 +19,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
-from isc_core.batch.engine import Crew
+from isc_core.batch.engine import WorkerOptions
 from isc_core.batch.item import DONE, ImageJob, ImageOutcome, Outcomes
 from isc_core.batch.run_batch import Batch, run_batch
 from isc_core.errors import Cancelled
@@ -106,7 +106,7 @@ def start(manifest: Path, output: Path) -> None:
     process, observer = psutil.Process(), RunObserver()
     with contextlib.suppress(Cancelled):
         run_batch(
-            Batch([str(manifest)], output, crew=Crew(1, 1, "0")),
+            Batch([str(manifest)], output, worker_options=WorkerOptions(1, 1, "0")),
             Monitor(observer.progress, observer.enough),
             task=no_task,
         )

@@ -1,14 +1,14 @@
-"""Images that hang, or crash their worker.
+"""Detection of images that hang or crash their worker.
 
 Problem: a worker may die while it decomposes an image (out of memory, a fault in a library); the
 scheduler then gives the image to the next worker, which may die as well. A step may never return,
-so that no flag is checked. No surviving process knows which image it was, and why.
+so that no flag is checked. No surviving process knows which image was the cause, and why.
 
 Method: a task first writes a line into a file of its image, and removes the file when it ends in
-any regular way. A task that finds the file knows that workers were lost on this image, and how
-many. With a time limit a watchdog runs beside the task: Python's `faulthandler`, whose thread needs
-no interpreter lock. At the limit it writes a traceback into the same file and ends the process. The
-task that gets the image next reads it, and reports it instead of trying again.
+any regular way. If the file exists when a task begins, its lines are the number of workers lost on
+this image. With a time limit a watchdog runs alongside the task: Python's `faulthandler`, whose
+thread needs no interpreter lock. At the limit it writes a traceback into the same file and ends the
+process. The task that gets the image next reads it, and reports it instead of trying again.
 
 Limits: one image at a time in a process. The steps check the clock themselves first; the watchdog
 allows a little more.
@@ -24,7 +24,7 @@ from ..errors import InputError
 from ..progress import Monitor
 
 MAX_CRASHES = 3
-_MARK = "Timeout ("  # how faulthandler opens its report
+_MARK = "Timeout ("  # prefix of faulthandler's report
 
 
 @contextmanager
@@ -68,7 +68,7 @@ def attempt(path: Path, run: str, timeout: float) -> Iterator[Monitor]:
 
 
 def grace(timeout: float) -> float:
-    """Return the time that a worker gets beyond the limit: one interval of clock checks.
+    """Return the time that a worker is allowed beyond the limit: one interval of clock checks.
 
     Parameters
     ----------

@@ -3,13 +3,13 @@
 Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling"
 (2015), doi:10.25080/Majora-7b98e3ed-013.
 
-A window of jobs is at the scheduler at any time, a few for each worker, so that a stream of any
-length needs the same memory. Workers that die are replaced and their images tried again. `attempts`
-identifies the image that kills them; the scheduler's own count also blames the images queued on the
-same worker.
+Only a window of jobs is submitted to the scheduler at any time, a few for each worker, so that a
+stream of any length needs the same memory. Workers that die are replaced and their images retried.
+`attempts` identifies the image that kills them; the scheduler's own count also blames the images
+queued on the same worker.
 
 Limits: one image at a time in a worker process, so workers of a cluster should have one thread each
-(`dask worker --nthreads 1`). Local workers listen on 127.0.0.1 only, but any user of this machine
+(`dask worker --nthreads 1`). Local workers listen on 127.0.0.1 only, but any user of the machine
 can connect.
 """
 
@@ -45,13 +45,13 @@ Client = Any  # Dask is optional
 
 
 @dataclass(frozen=True)
-class Crew:
-    """The workers of a run.
+class WorkerOptions:
+    """Options of the workers of a run.
 
     Attributes
     ----------
     workers : int
-        Processes; 0 for as many as the cores allow.
+        Number of processes; 0 for one per core or group of `threads` cores.
     threads : int
         Threads of each image; 0 shares the cores among the workers.
     memory : str
@@ -59,7 +59,8 @@ class Crew:
     scheduler : str
         Address of a cluster; the other fields are then ignored.
     processes : bool
-        False uses threads of this process, for tests and for stores that only this process sees.
+        False uses threads of this process, for tests and for stores that only this process can
+        access.
     """
 
     workers: int = 0
@@ -68,15 +69,15 @@ class Crew:
     scheduler: str = ""
     processes: bool = True
 
-    def sized(self) -> "Crew":
-        """Return the crew with numbers in place of zeros."""
+    def sized(self) -> "WorkerOptions":
+        """Return the options with zeros replaced by numbers."""
         cores = (
             len(os.sched_getaffinity(0))
             if hasattr(os, "sched_getaffinity")
             else os.cpu_count() or 1
         )
         workers = self.workers or max(1, cores // max(self.threads, 1))
-        return Crew(
+        return WorkerOptions(
             workers,
             self.threads or max(1, cores // workers),
             self.memory,
@@ -96,12 +97,12 @@ def require_dask() -> None:
 
 
 @contextmanager
-def connected(crew: Crew) -> Iterator[Client]:
-    """Provide a client of the cluster at `crew.scheduler`, or of a local one.
+def connected(options: WorkerOptions) -> Iterator[Client]:
+    """Provide a client of the cluster at `options.scheduler`, or of a local one.
 
     Parameters
     ----------
-    crew : Crew
+    options : WorkerOptions
 
     Returns
     -------
@@ -116,36 +117,36 @@ def connected(crew: Crew) -> Iterator[Client]:
     from dask.distributed import Client as DaskClient
 
     with ExitStack() as stack:
-        if crew.scheduler:
+        if options.scheduler:
             try:
                 client = stack.enter_context(
-                    DaskClient(crew.scheduler, timeout=10, set_as_default=False)
+                    DaskClient(options.scheduler, timeout=10, set_as_default=False)
                 )
                 client.wait_for_workers(1, timeout=_CLUSTER_TIMEOUT)
             except TimeoutError as error:
                 raise InputError(
-                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_TIMEOUT:.0f} s: "
+                    f"--scheduler {options.scheduler}: no worker within {_CLUSTER_TIMEOUT:.0f} s: "
                     "start workers"
                 ) from error
             except (OSError, ValueError) as error:
                 raise InputError(
-                    f"--scheduler {crew.scheduler}: cannot be reached: {error}"
+                    f"--scheduler {options.scheduler}: cannot be reached: {error}"
                 ) from error
         else:
-            stack.enter_context(dask.config.set(_configuration(crew)))
-            cluster = stack.enter_context(_local_cluster(crew))
+            stack.enter_context(dask.config.set(_configuration(options)))
+            cluster = stack.enter_context(_local_cluster(options))
             client = stack.enter_context(DaskClient(cluster, set_as_default=False))
         yield client
 
 
-def _configuration(crew: Crew) -> dict[str, object]:
+def _configuration(options: WorkerOptions) -> dict[str, object]:
     """Dask configuration for local workers.
 
     A worker that exceeds its memory is terminated, never paused: paused workers would wait forever.
     Libraries get the image's threads. Dask's default environment makes the allocator return every
     64 kB at once, which costs small images a third of their time.
     """
-    memory, threads = "distributed.worker.memory", str(crew.threads)
+    memory, threads = "distributed.worker.memory", str(options.threads)
     names = (
         "OMP_NUM_THREADS",
         "OPENBLAS_NUM_THREADS",
@@ -168,8 +169,8 @@ def _configuration(crew: Crew) -> dict[str, object]:
     }
 
 
-def _local_cluster(crew: Crew, starts: int = _MAX_STARTS) -> Any:
-    """Start local workers, again up to `starts` times if one is lost before all are ready. Raises
+def _local_cluster(options: WorkerOptions, starts: int = _MAX_STARTS) -> Any:
+    """Start local workers, with up to `starts` attempts if one is lost before all are ready. Raises
     `InputError`.
     """
     from dask.distributed import LocalCluster
@@ -178,18 +179,18 @@ def _local_cluster(crew: Crew, starts: int = _MAX_STARTS) -> Any:
         with _without_interrupts(), warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Port ")  # another port is used, and announced
             return LocalCluster(
-                n_workers=crew.workers,
+                n_workers=options.workers,
                 threads_per_worker=1,
-                processes=crew.processes,
-                memory_limit=crew.memory,
+                processes=options.processes,
+                memory_limit=options.memory,
                 dashboard_address="127.0.0.1:8787",
                 silence_logs=logging.CRITICAL,
             )
     except ValueError as error:
-        raise InputError(f"--memory {crew.memory}: {error}") from error
+        raise InputError(f"--memory {options.memory}: {error}") from error
     except RuntimeError as error:
         if starts > 1:
-            return _local_cluster(crew, starts - 1)
+            return _local_cluster(options, starts - 1)
         raise InputError(
             f"the workers could not be started ({error}): run the same command again"
         ) from error
@@ -220,7 +221,7 @@ def dashboard(client: Client) -> tuple[str, ...]:
     Returns
     -------
     tuple of str
-        Empty where none is served: its pages need Bokeh.
+        Empty without a dashboard, whose pages need Bokeh.
     """
     link = client.dashboard_link if find_spec("bokeh") else None
     return (f"Dask's dashboard: {link}",) if link else ()
@@ -241,7 +242,7 @@ def run_jobs(
     tick : callable
         Called several times a second; an exception from it ends the work.
     task : callable
-        What a worker does with a job.
+        Processes a job in a worker.
 
     Returns
     -------
@@ -280,7 +281,7 @@ def run_jobs(
 
 
 class _WorkerMonitor:
-    """Monitors the workers: the number of jobs to submit ahead, and whether any worker is left."""
+    """Monitors the workers: the number of jobs to submit ahead, and whether any worker is alive."""
 
     def __init__(self, client: Client) -> None:
         self._client = client

@@ -1,8 +1,8 @@
 """Local copies of inputs: a path is used as it is, a URL is copied to a temporary file by fsspec.
 
-Limits: a file larger than `Limits.max_bytes` is refused; an object of a store as soon as the copy
-is longer. Credentials and options of a store are set as its fsspec implementation expects them, in
-the environment of the workers.
+Limits: a file larger than `Limits.max_bytes` is rejected; an object of a store as soon as its copy
+exceeds the limit. Credentials and options of a store are read by its fsspec implementation from the
+environment of the workers.
 """
 
 import hashlib
@@ -63,7 +63,7 @@ def file_system(url: str) -> tuple[Any, str]:
     Raises
     ------
     InputError
-        If there is none.
+        If there is no such file system.
     """
     fsspec = fsspec_module()
     try:
@@ -82,7 +82,7 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
         A path or URL.
     limits : Limits
     folder : Path
-        Copies are made below it.
+        Folder of the copies.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
 
 
 def require_object(system: Any, path: str, remedy: str) -> None:
-    """Check that a path of a file system is an object, not a pipe or a device of this machine.
+    """Check that a path of a file system is an object, not a pipe or a device of the machine.
 
     Parameters
     ----------

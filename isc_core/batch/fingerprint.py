@@ -1,8 +1,8 @@
-"""Fingerprints: whether a result already exists.
+"""Fingerprints of inputs and settings, by which existing results are recognised.
 
-A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
-on: the content of photo and mask, the settings, the transfer curve, the priors, the version. The
-number of threads, the location of the files and the date do not count.
+A result's `decomposition.json` has, in `input.fingerprint`, a hash of all that it depends on: the
+content of photo and mask, the settings, the transfer curve, the priors, the version. The number of
+threads, the location of the files and the date are not included.
 """
 
 import hashlib
@@ -47,7 +47,7 @@ def fingerprint(job: ImageJob, photo_sha256: str, mask_sha256: str) -> str:
 
 
 def is_finished(folder: Path, expected: str, arrays: bool) -> bool:
-    """Return whether `folder` holds the complete result of a fingerprint.
+    """Return whether `folder` has the complete result of a fingerprint.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def is_finished(folder: Path, expected: str, arrays: bool) -> bool:
 
 
 def recorded_input(folder: Path) -> dict[str, object]:
-    """Return what a result records of its input.
+    """Return the record of a result's input.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def recorded_input(folder: Path) -> dict[str, object]:
     Returns
     -------
     dict
-        Empty where there is no result.
+        Empty without a result.
     """
     try:
         description = read_json(folder / "decomposition.json")

@@ -11,7 +11,7 @@ from ..photo import TRANSFERS
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
-# Options that a line of a manifest may change; the others apply to the whole run.
+# Options that may be set per line of a manifest; the others apply to the whole run.
 _TYPES: dict[str, type] = {
     "model": str,
     "separator": str,
@@ -34,7 +34,7 @@ Options = tuple[tuple[str, str | int | bool], ...]
 
 @dataclass(frozen=True)
 class ImageRecipe:
-    """How an image is decomposed.
+    """Settings of the decomposition of an image.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class ImageRecipe:
     transfer : str
         One of `photo.TRANSFERS`.
     each : bool
-        Whether each of several separate objects has a result of its own.
+        Whether each of several separate objects gets a separate result.
     """
 
     settings: Settings = field(default_factory=Settings)
@@ -83,13 +83,13 @@ class BatchItem:
     Attributes
     ----------
     image, mask : str
-        Paths or URLs; an empty mask is found in the photo.
+        Paths or URLs; with an empty one, the mask is found in the photo.
     name : str
         Requested name of the result; "" uses the image's.
     options : Options
         Differences from the run's settings.
     label : str
-        The image as the inputs name it, the same on every machine.
+        The image as named in the inputs, independent of the machine.
     """
 
     image: str
@@ -101,7 +101,7 @@ class BatchItem:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """What all tasks of a run share.
+    """Parameters shared by all tasks of a run.
 
     Attributes
     ----------
@@ -113,13 +113,13 @@ class RunPlan:
         Of ISC.
     limits : Limits
     timeout : float
-        Seconds an image; 0 for no limit.
+        Seconds per image; 0 for no limit.
     arrays : bool
         Whether to write `arrays.npz`.
     priors : str
         Absolute path of a prior file; "" for the package's.
     priors_sha256 : str
-        Its hash.
+        SHA-256 of that file.
     """
 
     output: Path
@@ -141,13 +141,13 @@ class ImageJob:
     number : int
         Position in the inputs.
     name : str
-        Of its folder in the output.
+        Name of its folder in the output.
     image, mask : str
         Absolute paths or URLs.
     recipe : ImageRecipe
     plan : RunPlan
     object_number : int
-        Number of the object, from 1 on, where it is one of several; 0 for the whole photo.
+        Number of the object, from 1, if it is one of several; 0 for the whole photo.
     """
 
     number: int
@@ -164,12 +164,12 @@ class ImageJob:
         return self.plan.output / self.name
 
     def of_object(self, number: int) -> "ImageJob":
-        """Return the part of the job that is one object of the photo.
+        """Return the job of one object of the photo.
 
         Parameters
         ----------
         number : int
-            From 1 on.
+            From 1.
 
         Returns
         -------

@@ -1,7 +1,7 @@
 """The outcomes of a run: an append-only file, read in input order at the end.
 
-Every line is written at once, so that a killed run keeps what it knew. Of each image 8 bytes are
-kept in memory: the offset of its line.
+Every line is written immediately, so that the outcomes of a killed run are kept. Only 8 bytes per
+image are kept in memory: the offset of its line.
 """
 
 import json
@@ -59,7 +59,7 @@ class JournalEntry:
         Parameters
         ----------
         row : dict of str to object
-            As `row` returns it.
+            From `row`.
 
         Returns
         -------
@@ -81,7 +81,7 @@ class Journal:
 
     def __init__(self, folder: RunFolder, count: int) -> None:
         self.counts: Counter[str] = Counter()
-        self.total = count  # of results, as far as is known
+        self.total = count  # of results known so far
         self._offsets = array("q", [-1]) * count
         self._files = ExitStack()
         self._all = self._files.enter_context(folder.journal.open("w+b"))
@@ -114,7 +114,7 @@ class Journal:
         self._all.seek(0, 2)
 
     def _entries_of(self, number: int) -> Iterator[JournalEntry]:
-        """Those of an image, which begin here."""
+        """The entries of an image, from the present position of the file."""
         while line := self._all.readline():
             entry = JournalEntry.of(json.loads(line))
             if entry.number != number:

@@ -6,9 +6,9 @@
     {"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}}
     {"image": "s3://photos/jug.png", "transfer": "linear"}
 
-Only `image` is required. Options are columns or keys of their own, or stand together under
-`options`. Relative paths are relative to the manifest's folder. A mistake in any line is found in
-the first pass, before work begins; a missing file is a failure of that image alone.
+Only `image` is required. Options are separate columns or keys, or are grouped under `options`.
+Relative paths are relative to the manifest's folder. An invalid line is detected in the first pass,
+before work begins; a missing file is a failure of only that image.
 """
 
 import csv

@@ -1,16 +1,16 @@
 """Names of results, from arbitrary file names.
 
-Problem: a result is a folder in the output, named after its image. Images of different folders
-share names, and a name in a manifest may hold "..", separators, control characters or a device's
-name. Names must be safe on every file system, unique even without case, and independent of the
-order of the inputs, so that a resumed run finds the results of the run before.
+Problem: a result is a folder in the output, named after its image. Images of different folders may
+have the same name, and a name in a manifest may contain "..", separators, control characters or a
+device's name. Names must be safe on every file system, unique ignoring case, and independent of the
+order of the inputs, so that a resumed run finds the results of the previous one.
 
-Method: where several images want a name, a hash of image, mask and options is appended for each of
-them. This takes two passes over the inputs: the first keeps 16 bytes an image, hashes of names and
-of images, sorts them by NumPy and finds duplicates.
+Method: if several images have the same name, a hash of image, mask and options is appended to each.
+This takes two passes over the inputs: the first keeps 16 bytes per image, hashes of names and of
+images, sorts them with NumPy and finds duplicates.
 
-Limits: hashes have 64 bits; of a million images two different ones share one with a probability of
-3e-8, and the later one is left out.
+Limits: hashes have 64 bits; among a million images two different ones collide with a probability of
+3e-8, and the later one is skipped.
 """
 
 import hashlib
@@ -43,7 +43,7 @@ OWN_FILES = (
 def safe_name(text: str) -> str:
     """Return `text` as the name of a folder.
 
-    Letters, digits, ".", "-" and "_" stay, runs of all else become "_".
+    Letters, digits, ".", "-" and "_" are kept, runs of other characters become "_".
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def check_given(name: str, where: str) -> str:
 
 
 def wanted_name(item: BatchItem) -> str:
-    """Return the name of an item's result if no other item wants it.
+    """Return the name of an item's result if no other item has the same name.
 
     Parameters
     ----------

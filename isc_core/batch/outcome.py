@@ -1,8 +1,8 @@
-"""One attempt at a result: its time, its peak of memory, and its outcome.
+"""One attempt at a result: its time, its peak memory, and its outcome.
 
 A problem of the image is an outcome; a bug of the program raises.
 
-Limits: the peak belongs to the process, and only Linux tells it.
+Limits: the peak is that of the process, and only Linux reports it.
 """
 
 import contextlib
@@ -25,7 +25,7 @@ Work = Callable[[ImageJob, Monitor], str]
 
 
 def outcome_of(job: ImageJob, work: Work) -> ImageOutcome:
-    """Do the work of a job, and tell what came of it.
+    """Do the work of a job, and return its outcome.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def outcome_of(job: ImageJob, work: Work) -> ImageOutcome:
     start = time.perf_counter()
     _reset_peak()
     status, reason = _status_of(job, work)
-    # Meshes have reference cycles: without this they stay for a hundred images, 3 MB each.
+    # Meshes have reference cycles: without this they are kept for a hundred images, 3 MB each.
     gc.collect(1)
     return ImageOutcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
 
@@ -69,7 +69,7 @@ def _status_of(job: ImageJob, work: Work) -> tuple[str, str]:
 
 
 def _cancelled_with_run(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
-    """Cancel also when the run has ended: on a cluster, nothing else stops its workers."""
+    """Cancel also when the run has ended, because nothing else stops the workers of a cluster."""
     checked, expected = time.monotonic(), True
 
     def cancelled() -> bool:

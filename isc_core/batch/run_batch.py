@@ -13,7 +13,7 @@ from ..errors import Cancelled, InputError
 from ..io.limits import DEFAULT_LIMITS, Limits
 from ..progress import Monitor
 from ..sirfs.priors.prior_file import load_prior_set
-from .engine import Crew, connected, dashboard, require_dask, run_jobs
+from .engine import WorkerOptions, connected, dashboard, require_dask, run_jobs
 from .fetch import is_url, sha256
 from .item import SKIPPED, BatchItem, ImageJob, ImageOutcome, ImageRecipe, Outcomes, RunPlan
 from .journal import Journal, JournalEntry
@@ -23,7 +23,7 @@ from .sources import Inputs
 from .summary import write_summary
 from .work import process
 
-_RECENT = 200  # images whose rate gives the estimate of the remaining time
+_RECENT = 200  # number of images from whose rate the remaining time is estimated
 
 
 @dataclass(frozen=True)
@@ -37,12 +37,12 @@ class Batch:
     output : Path
         The folder to write.
     masks : str or None
-        A folder of masks; None looks beside the photos.
+        A folder of masks; None for masks next to the photos.
     recipe : ImageRecipe
-    crew : Crew
+    worker_options : WorkerOptions
     limits : Limits
     timeout : float
-        Seconds an image; 0 for no limit.
+        Seconds per image; 0 for no limit.
     arrays : bool
         Whether to write `arrays.npz`.
     priors : Path or None
@@ -53,7 +53,7 @@ class Batch:
     output: Path
     masks: str | None = None
     recipe: ImageRecipe = field(default_factory=ImageRecipe)
-    crew: Crew = field(default_factory=Crew)
+    worker_options: WorkerOptions = field(default_factory=WorkerOptions)
     limits: Limits = DEFAULT_LIMITS
     timeout: float = 0.0
     arrays: bool = False
@@ -68,7 +68,7 @@ def run_batch(
 ) -> Counter[str]:
     """Decompose every image that has no result yet.
 
-    Complete results stay, however the run ends.
+    Complete results are kept, however the run ends.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def run_batch(
     announce : callable
         Receives one line for the user at the start.
     task : callable
-        What a worker does with a job.
+        Processes a job in a worker.
 
     Returns
     -------
@@ -87,14 +87,16 @@ def run_batch(
     Raises
     ------
     InputError
-        If something is wrong with the run as a whole, before work begins.
+        If the run as a whole is invalid, before work begins.
     Cancelled
         If the user cancels.
     """
     monitor = monitor or Monitor()
     require_dask()
-    crew = batch.crew.sized()
-    recipe = replace(batch.recipe, settings=replace(batch.recipe.settings, threads=crew.threads))
+    worker_options = batch.worker_options.sized()
+    recipe = replace(
+        batch.recipe, settings=replace(batch.recipe.settings, threads=worker_options.threads)
+    )
     recipe.settings.check()
     plan = _plan(batch)
     folder = RunFolder(plan.output)
@@ -109,7 +111,7 @@ def run_batch(
         with Journal(folder, names.count) as journal:
             try:
                 monitor.report("starting workers", 0.0)
-                with connected(crew) as client:
+                with connected(worker_options) as client:
                     announce("; ".join([_counted(names.count), *dashboard(client)]))
                     progress = _Progress(journal, monitor)
                     for job, outcomes in run_jobs(

@@ -1,4 +1,4 @@
-"""The output folder of a batch: its lock, its files, and remains of killed runs.
+"""The output folder of a batch: its lock, its files, and cleanup after killed runs.
 
     OUT/NAME/                one result each, complete or absent
     OUT/NAME/1, 2, ...       one result for each object of a photo
@@ -7,8 +7,8 @@
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    written at the end
     OUT/.isc-batch/          lock, owner, run identifier, journal, attempts, fetched files
 
-The lock (`filelock`) is the kernel's: it ends with its process in any case, so that no stale file
-locks anybody out. `owner` beside it names the process that holds it.
+The lock (`filelock`) is held by the kernel and is always released when the process ends, so that
+there are no stale locks. The file `owner` names the process that holds it.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ def thumbnail_place(name: str) -> str:
     Returns
     -------
     str
-        With "/". Objects have a folder apart: a photo's name may end with ".jpg", too.
+        With "/". Objects have a separate folder, because a photo's name may end with ".jpg", too.
     """
     return "/".join((THUMBNAILS, *((_EACH,) if "/" in name else ()), f"{name}.jpg"))
 
@@ -73,7 +73,7 @@ class RunFolder:
         return self.output / thumbnail_place(name)
 
     def attempt(self, name: str) -> Path:
-        """Return the file that is there while a worker is at a result, see `attempts`.
+        """Return the file that exists while a worker processes a result, see `attempts`.
 
         Parameters
         ----------
@@ -139,7 +139,7 @@ class RunFolder:
                 self.owner.unlink(missing_ok=True)
 
     def runs(self, run: str) -> bool:
-        """Return whether this run holds the folder now, as seen from this machine.
+        """Return whether this run holds the folder's lock now, as seen from this machine.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class RunFolder:
         """Remove temporary siblings of results, and fetched copies.
 
         No other run writes here while the lock is held. Workers of a killed run may still process
-        their last image; what they write is locked.
+        their last image; files that they write are locked.
         """
         for folder in (self.output, self.thumbnails, self.pages, *self._folders_of_objects()):
             remove_unfinished_in(folder)
@@ -206,7 +206,7 @@ class RunFolder:
                 Path(entry.path).unlink(missing_ok=True)
 
     def _folders_of_objects(self) -> Iterator[Path]:
-        """Those that `begin_objects` makes; found by the thumbnails, since results are many."""
+        """Folders made by `begin_objects`; found by their thumbnails, as results are many."""
         with contextlib.suppress(FileNotFoundError):
             for entry in os.scandir(self.thumbnails / _EACH):
                 yield Path(entry.path)

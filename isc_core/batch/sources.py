@@ -1,8 +1,8 @@
 """The inputs of a batch: photos, folders, patterns and manifests, local or in an object store.
 
-A file `cup_mask.*` beside `cup.jpg` is its mask; in a folder of masks it is `cup.*` or
-`cup_mask.*`. Folders are not searched recursively, but a pattern with ** is. Files come in the
-order of their names.
+A file `cup_mask.*` next to `cup.jpg` is its mask; in a folder of masks it is `cup.*` or
+`cup_mask.*`. Folders are not searched recursively, but patterns with ** are. Files are sorted by
+name.
 """
 
 import glob
@@ -25,8 +25,8 @@ class Inputs:
     """The items of all inputs; can be iterated any number of times.
 
     Folders and patterns are listed once, manifests are streamed each time. `masks` is a folder of
-    masks; None looks beside the photos. Raises `InputError` for an input that does not exist or
-    holds no photo.
+    masks; None for masks next to the photos. Raises `InputError` for an input that does not exist
+    or has no photo.
     """
 
     def __init__(self, inputs: Sequence[str], masks: str | None, recipe: ImageRecipe) -> None:
@@ -108,7 +108,7 @@ def _listed_remote(url: str) -> list[str]:
 
 
 def _files(folder: str) -> list[str]:
-    """Names in a folder that are no folders, sorted; empty if the folder does not exist."""
+    """Names of the files in a folder, sorted; empty if the folder does not exist."""
     if is_url(folder):
         system, path = file_system(folder)
         try:
@@ -129,7 +129,7 @@ def _files(folder: str) -> list[str]:
 
 
 def _is_folder(entry: os.DirEntry[str]) -> bool:
-    """Whether an entry is a folder; a broken link is none, and fails as an image."""
+    """Whether an entry is a folder; a broken link is not, and later fails as an image."""
     try:
         return entry.is_dir()
     except OSError:  # a loop of links

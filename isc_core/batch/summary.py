@@ -1,9 +1,9 @@
 """The summary of a run: HTML pages, and tables for programs, in input order.
 
 `summary.html` and `summary-pages/N.html`: a thumbnail of every result, linked to the result, and
-the reasons of failures. `summary.csv`, `summary.jsonl`: the same as tables. File names may be
-anything: pages escape them, and CSV cells that a spreadsheet would take for a formula get an
-apostrophe in front; JSON lines keep them as they are.
+the reasons of failures. `summary.csv`, `summary.jsonl`: the same as tables. File names may contain
+any characters: pages escape them, and CSV cells that a spreadsheet would interpret as a formula are
+prefixed with an apostrophe; JSON lines keep them unchanged.
 """
 
 import csv
@@ -60,7 +60,7 @@ def _cell(value: object) -> object:
 
 def _write_pages(folder: RunFolder, journal: Journal, entries: Iterator[JournalEntry]) -> None:
     count = max(1, -(-sum(journal.counts.values()) // PAGE))
-    # Imported here: an optional dependency of the extra `batch`, which Dask needs too.
+    # Imported here: an optional dependency of the extra `batch`, which Dask needs, too.
     import jinja2
 
     loader = jinja2.PackageLoader(__package__, "templates")

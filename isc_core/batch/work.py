@@ -1,8 +1,9 @@
-"""The job of one image, as a worker runs it.
+"""The job of one image in a worker.
 
-A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
-belong to the process. The objects of a photo are decomposed one after the other, each an attempt of
-its own, so that one that fails, hangs or kills its worker does not take the others along.
+A worker processes one image at a time, whatever its number of threads, because the watchdog and the
+peak memory are those of the process. The objects of a photo are decomposed one after the other,
+each as a separate attempt, so that one that fails, hangs or kills its worker does not affect the
+others.
 """
 
 import shutil
@@ -28,7 +29,7 @@ from .item import DONE, FAILED, SKIPPED, ImageJob, Outcomes
 from .outcome import Work, outcome_of
 from .run_folder import RunFolder
 
-_THINGS = "things"  # in `input` of decomposition.json: how many the photo has
+_OBJECT_COUNT = "things"  # key in `input` of decomposition.json: the number of objects in the photo
 _process_lock = threading.Lock()
 
 
@@ -53,12 +54,12 @@ def process(job: ImageJob, work: Work | None = None) -> Outcomes:
     ----------
     job : ImageJob
     work : callable, optional
-        What to do instead. Returns the status.
+        Replaces the decomposition, for tests. Returns the status.
 
     Returns
     -------
     Outcomes
-        Those of a photo whose objects cannot be told are its own.
+        The outcome of the photo itself if its objects cannot be separated.
     """
     with _process_lock:
         if job.recipe.each and work is None:
@@ -113,7 +114,7 @@ def _process_each(job: ImageJob) -> Outcomes:
 def _find(
     job: ImageJob, monitor: Monitor, stack: ExitStack, objects: list[tuple[_Files, Photo | None]]
 ) -> str:
-    """Add the objects of a photo; they are not looked for where all results exist."""
+    """Add the objects of a photo; they are not searched for if all results exist."""
     if recorded_input(job.folder):
         raise InputError(
             f"{job.folder} is the result of the whole photo: move it away, or leave out --each"
@@ -130,8 +131,8 @@ def _find(
 
 
 def _finished_objects(job: ImageJob, files: _Files) -> int:
-    """How many objects the photo has; 0 where the result of one is missing."""
-    count = recorded_input(job.of_object(1).folder).get(_THINGS)
+    """The number of objects in the photo; 0 if a result is missing."""
+    count = recorded_input(job.of_object(1).folder).get(_OBJECT_COUNT)
     if not isinstance(count, int):
         return 0
     parts = [job.of_object(number) for number in range(1, count + 1)]
@@ -148,15 +149,15 @@ def _decompose_object(
         _draw_thumbnail(job, redraw=False)
         return SKIPPED
     with _locations_named(job, files):
-        _decompose(job, photo, files, {"thing": job.object_number, _THINGS: objects}, monitor)
+        _decompose(job, photo, files, {"thing": job.object_number, _OBJECT_COUNT: objects}, monitor)
     return DONE
 
 
 def _remove_further(job: ImageJob, count: int) -> None:
-    """Remove results of more objects, which an earlier run found."""
+    """Remove results of additional objects that an earlier run found."""
     number = count + 1
-    while recorded_input(folder := job.of_object(number).folder).get(_THINGS):
-        require_writable_result(folder)  # nothing but a result
+    while recorded_input(folder := job.of_object(number).folder).get(_OBJECT_COUNT):
+        require_writable_result(folder)  # only a result is removed
         shutil.rmtree(folder)
         RunFolder(job.plan.output).thumbnail(job.of_object(number).name).unlink(missing_ok=True)
         number += 1
@@ -174,7 +175,7 @@ def _fetched(job: ImageJob) -> Iterator[_Files]:
 
 @contextmanager
 def _locations_named(job: ImageJob, files: _Files) -> Iterator[None]:
-    """Errors name the location of an input, not its temporary copy."""
+    """Let errors name the location of an input, not its temporary copy."""
     try:
         yield
     except InputError as error:
@@ -228,7 +229,7 @@ def _priors(path: str, expected: str) -> PriorSet:
 
 
 def _draw_thumbnail(job: ImageJob, *, redraw: bool) -> None:
-    """Draw the thumbnail, in a folder of its own."""
+    """Draw the thumbnail, in a separate folder."""
     target = RunFolder(job.plan.output).thumbnail(job.name)
     if redraw or not target.is_file():
         thumbnail(job.folder / "preview.png", target)

@@ -11,9 +11,9 @@ long names of its options:
     [edit.gloss]
     look = "metallic"
 
-What the command line gives wins. A file that nobody named must not make `isc` connect anywhere:
-`scheduler` needs `--config`. Paths are relative to the file. Values are checked as on the
-command line; `--no-config` ignores the file.
+Options on the command line take precedence. A file that was not given explicitly must not make
+`isc` connect to other machines: `scheduler` requires `--config`. Paths are relative to the file.
+Values are checked as on the command line; `--no-config` ignores the file.
 """
 
 import argparse
@@ -39,7 +39,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     parser : argparse.ArgumentParser
         That of `isc`; changed in place.
     arguments : sequence of str
-        What will be parsed.
+        The arguments to parse.
 
     Returns
     -------
@@ -49,8 +49,8 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     Raises
     ------
     InputError
-        If the file cannot be read, or has a table, an option or a value that does not exist or
-        that only a named file may have.
+        If the file cannot be read, or has an unknown table, option or value, or one that is
+        accepted only with `--config`.
     """
     path, named = _find(arguments)
     if path is None:
@@ -130,7 +130,7 @@ def _advice(name: str, known: list[str]) -> str:
 
 
 def _value(action: argparse.Action, value: object, path: Path, where: str) -> object:
-    """The value as the option stores it."""
+    """The value in the type of the option."""
     name = f"{path}: {action.option_strings[-1].removeprefix('--')} of [{where}]"
     if action.nargs == 0:
         if not isinstance(value, bool):

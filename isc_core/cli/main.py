@@ -1,10 +1,10 @@
-"""The command `isc`: runs a sub-command and maps its end to an exit code and at most one line.
+"""The command `isc`: runs a sub-command and maps its outcome to an exit code and a message.
 
 0: success. 1: finished, but a measurement violates a bound, or some of several photos or objects
 failed; stderr names them. 2: invalid input, or not enough memory or disk space; one line on stderr
-names the remedy. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the
-second stops it immediately). Nothing half-written remains in any case. With `--progress json` the
-output is for a program instead of a person, see `interface.json_progress`.
+states the remedy. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the
+second stops it immediately). Incomplete files never remain. With `--progress json` the output is
+for programs instead of users, see `interface.json_progress`.
 """
 
 import argparse
@@ -31,12 +31,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        By default those of the process.
+        Those of the process by default.
 
     Returns
     -------
     int
-        The exit code; a user's mistake never raises.
+        The exit code; invalid input never raises.
     """
     argv = list(sys.argv[1:] if arguments is None else arguments)
     # Checked before parsing, so that errors in other options are reported as JSON, too.
@@ -45,8 +45,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if json_progress:
         reporter = JsonReporter(sys.stdout, cancel_at_eof="--cancel-at-eof" in argv)
     try:
-        # A program that runs in the background passes on that Ctrl-C is ignored, but its line
-        # `cancel` relies on it.
+        # A background process may inherit that Ctrl-C is ignored, but the line `cancel` relies on
+        # it.
         with Interrupts(even_if_ignored=json_progress) as interrupts:
             with reporter:
                 output, lines = _run(argv, reporter, interrupts)
@@ -73,7 +73,7 @@ def _run(
     arguments: list[str], reporter: _Reporter, interrupts: Interrupts
 ) -> tuple[str, list[str]]:
     """The path of the result, and the lines to print."""
-    # The parser imports what the command needs: inside `main`, where Ctrl-C works meanwhile.
+    # The parser imports the command's modules; inside `main`, Ctrl-C works during the imports.
     from .commands import build_parser
     from .config import apply_config
 
@@ -84,7 +84,7 @@ def _run(
     except SystemExit:  # --help and --version
         return "", []
     interrupts.check()
-    if not gc.isenabled():  # as `__main__` has left it
+    if not gc.isenabled():  # disabled by `__main__`
         gc.freeze()
         gc.enable()
     verbosity = _verbosity(options)

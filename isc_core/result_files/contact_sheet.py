@@ -444,7 +444,7 @@ def _write_keys(
     place: tuple[float, float],
     keys: Sequence[tuple[str, tuple[int, int, int]]],
 ) -> float:
-    """Draw a legend of coloured squares and texts, right-aligned at `place`; return its left end."""
+    """Draw a legend of coloured squares and texts, right-aligned at `place`; return its left."""
     right, baseline = place
     font = _font(14)
     for text, color in reversed(keys):

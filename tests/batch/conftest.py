@@ -8,14 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from isc_core.batch.engine import Crew
+from isc_core.batch.engine import WorkerOptions
 from isc_core.batch.item import DONE, FAILED, ImageRecipe
 from isc_core.batch.run_batch import Batch, run_batch
 from isc_core.decomposition.settings import Settings
 from tests.core.command_line import ball_codes, write_image
 
 QUICK = ImageRecipe(Settings(model="retinex", engine="numpy"))
-HERE = Crew(
+HERE = WorkerOptions(
     workers=1, threads=1, memory="0", processes=False
 )  # threads of this process: a second less, and its memory:// is theirs
 
@@ -51,7 +51,7 @@ def made(first_run: Path, tmp_path: Path) -> Path:
 def batch(*inputs: object, output: Path, **changes: object) -> Batch:
     """A quick batch in this process."""
     return replace(
-        Batch([str(text) for text in inputs], output, recipe=QUICK, crew=HERE), **changes
+        Batch([str(text) for text in inputs], output, recipe=QUICK, worker_options=HERE), **changes
     )
 
 

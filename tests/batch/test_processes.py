@@ -14,7 +14,7 @@ import psutil  # type: ignore[import-untyped]
 import pytest
 
 from isc_core.batch.attempts import MAX_CRASHES
-from isc_core.batch.engine import Crew
+from isc_core.batch.engine import WorkerOptions
 from isc_core.batch.item import DONE, FAILED
 from isc_core.batch.run_batch import run_batch
 from isc_core.cli.main import main
@@ -31,7 +31,7 @@ def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
         (tmp_path / f"{name}.png").touch()
     plan = replace(
         batch(tmp_path / "*.png", output=tmp_path / "out", timeout=4.0),
-        crew=Crew(workers=2, threads=1, memory="0"),
+        worker_options=WorkerOptions(workers=2, threads=1, memory="0"),
     )
     assert run_batch(plan, task=obedient) == Counter({DONE: 3, FAILED: 2})
     reasons = {

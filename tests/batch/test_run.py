@@ -16,7 +16,7 @@ from markupsafe import escape
 
 from isc_core.batch import engine
 from isc_core.batch import run_batch as run_module
-from isc_core.batch.engine import Crew
+from isc_core.batch.engine import WorkerOptions
 from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageJob, ImageRecipe
 from isc_core.batch.journal import Journal, JournalEntry
 from isc_core.batch.run_batch import run_batch
@@ -98,8 +98,10 @@ def test_what_is_finished_is_skipped_and_what_changed_is_made_again(
 @pytest.mark.slow
 def test_a_mask_settings_and_priors_count_and_threads_do_not(made: Path, photos: Path) -> None:
     (photos / "bad.png").unlink()
-    crew = Crew(workers=2, threads=2, memory="0", processes=False)
-    assert run_batch(batch(photos, output=made, crew=crew)) == Counter({SKIPPED: 3})
+    worker_options = WorkerOptions(workers=2, threads=2, memory="0", processes=False)
+    assert run_batch(batch(photos, output=made, worker_options=worker_options)) == Counter(
+        {SKIPPED: 3}
+    )
     codes = ball_codes(12.0)
     write_image(photos / "one_mask.png", (codes.max(axis=2) > 0).astype("uint8") * 255)
     assert run_batch(batch(photos, output=made)) == Counter({SKIPPED: 2, DONE: 1})
@@ -328,6 +330,6 @@ def test_a_stream_is_worked_off_in_a_window(
     monkeypatch.setattr(run_module, "ImageJob", CountedJob)
     monkeypatch.setattr(run_module, "Journal", Counted)
     assert run_batch(
-        batch(tmp_path / "list.csv", output=tmp_path / "out", crew=HERE), task=obedient
+        batch(tmp_path / "list.csv", output=tmp_path / "out", worker_options=HERE), task=obedient
     ) == Counter({DONE: 60})
     assert max(ahead) <= 4

@@ -24,7 +24,7 @@ def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentPar
     Parameters
     ----------
     arguments : sequence of str, optional
-        What will be parsed: only the command that it names is imported. By default all are.
+        The arguments to parse: only their command is imported. By default all are.
 
     Returns
     -------
@@ -50,12 +50,12 @@ def build_parser(arguments: Sequence[str] | None = None) -> argparse.ArgumentPar
 
 
 def _declare(parser: argparse.ArgumentParser, entry: CommandEntry) -> None:
-    """Add the options of a command; if it cannot be imported, a `run` that says why."""
+    """Add the options of a command; if it cannot be imported, a `run` that reports the reason."""
     try:
         module = importlib.import_module(entry.module)
     except ImportError as error:
         if (error.name or "").startswith(f"{entry.module.partition('.')[0]}."):
-            raise  # the package is there and lacks a module: a defect of its own
+            raise  # the package is installed but lacks a module: a defect
         _declare_unavailable(parser, entry, error)
     else:
         module.declare(parser)
@@ -74,7 +74,7 @@ def _declare_unavailable(
         del options, monitor
         raise InputError(reason)
 
-    # No argument begins with this prefix, so that the parser accepts all of them.
+    # No argument begins with this prefix, so that the parser accepts any.
     parser.prefix_chars = "\0"
     parser.add_argument("anything", nargs="*")
     parser.set_defaults(run=fail, quiet=True, verbose=False, config=None, no_config=True)

@@ -4,7 +4,7 @@ import argparse
 import sys
 from dataclasses import fields
 
-from ...batch.engine import Crew
+from ...batch.engine import WorkerOptions
 from ...batch.item import DONE, FAILED, SKIPPED, ImageRecipe
 from ...batch.run_batch import Batch, run_batch
 from ...decomposition.settings import Settings
@@ -84,27 +84,27 @@ def declare(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_workers(parser: argparse.ArgumentParser) -> None:
-    defaults = Crew()
-    crew = parser.add_argument_group("workers")
-    crew.add_argument(
+    defaults = WorkerOptions()
+    workers = parser.add_argument_group("workers")
+    workers.add_argument(
         "--workers",
         type=count,
         default=defaults.workers,
         metavar="N",
         help="images processed at once (default 0: one per core)",
     )
-    crew.add_argument(
+    workers.add_argument(
         "--memory", default=defaults.memory, metavar="SIZE",
         help="memory limit of each worker, such as 4GB; a worker that exceeds it is stopped "
         "(default: equal shares)",
     )  # fmt: skip
-    crew.add_argument(
+    workers.add_argument(
         "--scheduler",
         default=defaults.scheduler,
         metavar="ADDRESS",
         help="run on this Dask cluster instead of this machine",
     )
-    add_engine(crew, "threads per image (0: the cores are shared among the workers)")
+    add_engine(workers, "threads per image (0: the cores are shared among the workers)")
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -129,7 +129,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     recipe = ImageRecipe(settings, options.transfer, options.each)
     batch = Batch(
         options.inputs, options.output, options.masks, recipe,
-        Crew(options.workers, options.threads, options.memory, options.scheduler),
+        WorkerOptions(options.workers, options.threads, options.memory, options.scheduler),
         limits_of(options), options.timeout, options.arrays, options.priors,
     )  # fmt: skip
 

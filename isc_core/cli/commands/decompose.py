@@ -1,4 +1,4 @@
-"""`isc decompose`: photos in, the folder of each one's decomposition out."""
+"""`isc decompose`: decomposes photos into a folder each."""
 
 import argparse
 from collections.abc import Iterator
@@ -274,7 +274,7 @@ def _decompose_photo(
 
 
 def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomposition, str]:
-    """The result with its gloss refined where that explains more, and a line that says so."""
+    """The result, with refined gloss if that explains the photo better, and a line about it."""
     from ...refinement import GlossOptions, refine_gloss
     from ...refinement.gloss_note import gloss_line
 
@@ -315,7 +315,9 @@ def _decompose_each(
 
 
 def _require_no_other_objects(output: Path, count: int) -> None:
-    """Refuse a folder of more objects: programs that read it would take them for this photo's."""
+    """Raise `InputError` for a folder with more objects, which readers would attribute to this
+    photo.
+    """
     for result in object_folders(output):
         if int(result.name) > count:
             raise InputError(
@@ -340,7 +342,7 @@ def _decompose_object(
 def _decompose_several(
     options: argparse.Namespace, settings: Settings, prior_set: PriorSet | None, monitor: Monitor
 ) -> list[str]:
-    """Decompose each photo into a folder of its own; one that fails does not stop the others."""
+    """Decompose each photo into a separate folder; one that fails does not stop the others."""
     for option in ("mask", "shape", "depth"):
         if getattr(options, option) is not None:
             raise InputError(
@@ -390,8 +392,8 @@ def _known_inputs(options: argparse.Namespace, photo: Photo) -> KnownInputs:
 
 
 def _detail_notes(settings: Settings, length: int, longest: int) -> tuple[str, ...]:
-    """What to say where finer relief was asked for than maps with an object `length` pixels long
-    can hold; it is `longest` in the photo.
+    """Notes if finer relief was requested than the resolution of the maps, in which the object is
+    `length` pixels long; it is `longest` in the photo.
     """
     if settings.detail <= max(length, Settings.detail):
         return ()

@@ -137,7 +137,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     monitor.report("building the mesh", 0.2)
     cover = object_cover(d, read_cover(options.result / MASK))
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
-    # Textures are those of the plane of the photo, whose mesh has a vertex at its pixels.
+    # Texture sets are for the plane of the photo, whose mesh has its vertices at pixels.
     built = mesh_of(d, how, None if options.format is None else cover)
     if options.photo is not None and options.texture_size != MAPS_SIZE:
         built = replace(built, texture=_fine_texture(d, options))

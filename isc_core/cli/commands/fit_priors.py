@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         Lines to print.
     """
     ensure_cache_folder()
-    # These modules declare compiled functions, which need the cache folder and slow down start-up.
+    # These modules compile functions, which needs the cache folder and slows down start-up.
     from ...prior_fitting.fit import fit_priors
     from ...prior_fitting.statistics import collect_statistics
     from ...prior_fitting.training_objects import read_training_objects

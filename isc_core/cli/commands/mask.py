@@ -98,7 +98,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
-    """Write one mask, and return what to print."""
+    """Write one mask, and return the line to print."""
     limits, finder = limits_of(options), MaskSearch(given)
     photo = read_photo(file, None, options.transfer, limits=limits, finder=finder)
     line = _write(photo, options.output)
@@ -117,7 +117,7 @@ def _each(file: Path, options: argparse.Namespace) -> list[str]:
 
 
 def _write(photo: Photo, path: Path) -> str:
-    """Write the mask of a photo; return what to print."""
+    """Write the mask of a photo; return the line to print."""
     write_mask(path, photo.mask if photo.found is None else photo.found.cover)
     pixels, source = int(photo.mask.sum()), photo.original
     if source.confidence is None:

@@ -1,13 +1,12 @@
 """The list of the commands of `isc`.
 
-A command is known by its entry here; its module is imported when the command is chosen, so that
-`isc --help` and every other command start without it. The module has `declare(parser)`, which adds
-the options, and sets `run(options, monitor)`, which returns the lines to print and raises
-`InputError` and `Cancelled`.
+The module of a command is imported only when the command is chosen, so that `isc --help` and every
+other command start without it. The module has `declare(parser)`, which adds the options, and sets
+`run(options, monitor)`, which returns the lines to print and raises `InputError` and `Cancelled`.
 
 Packages that build on the core add commands: an entry point of the group `isc.commands` names a
-`CommandEntry` in a module that is cheap to import. A command whose module cannot be imported says
-what to install; the others work all the same.
+`CommandEntry` in a module that is cheap to import. A command whose module cannot be imported
+reports what to install; the others are not affected.
 """
 
 from collections.abc import Iterator
@@ -23,13 +22,13 @@ class CommandEntry:
     Attributes
     ----------
     name : str
-        As typed.
+        Name on the command line.
     summary : str
         One line of `isc --help`.
     module : str
         Full name of the module.
     extra : str
-        The extra of the package that installs what the command needs.
+        The extra of the package with the command's dependencies.
     """
 
     name: str
@@ -64,7 +63,7 @@ def all_commands() -> Iterator[CommandEntry]:
     CommandEntry
     """
     yield from CORE
-    # A tenth of a second: only where a command is not the core's.
+    # Takes a tenth of a second: only for commands that are not of the core.
     from importlib.metadata import entry_points
 
     for entry in entry_points(group=_GROUP):

@@ -1,4 +1,4 @@
-"""Options that say what is a highlight: --highlight, --not-highlight."""
+"""Options that mark highlights: --highlight, --not-highlight."""
 
 import argparse
 from dataclasses import replace
@@ -38,7 +38,7 @@ def marks_of(options: argparse.Namespace) -> HighlightMarks:
     Returns
     -------
     HighlightMarks
-        At the middles of the pixels.
+        At the centres of the pixels.
     """
     highlights, paint = (
         tuple((x + 0.5, y + 0.5) for x, y in places)
@@ -63,12 +63,12 @@ def with_marks(photo: Photo, options: argparse.Namespace) -> Photo:
 
 
 def mark_notes(photo: Photo, result: Decomposition) -> list[str]:
-    """Return notes on highlights that were marked, and are none to colour and form.
+    """Return notes on marked highlights at which no specular light was found.
 
     Parameters
     ----------
     photo : Photo
-        With its marks, at its own size.
+        With its marks, at full size.
     result : Decomposition
 
     Returns

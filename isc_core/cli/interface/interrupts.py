@@ -1,9 +1,9 @@
-"""Ctrl-C and SIGTERM as cancellation.
+"""Cancellation by Ctrl-C and SIGTERM.
 
-The first Ctrl-C sets a flag that the work looks at between its steps; a second one raises
-`KeyboardInterrupt`. A flag cannot get lost: libraries that catch every exception of an import
-(trimesh does) would swallow an interrupt that is an exception. Whatever else a cancelled run ends
-with, it ends as cancelled.
+The first Ctrl-C sets a flag that is checked between steps of the work; a second one raises
+`KeyboardInterrupt`. A flag cannot get lost, whereas libraries that catch all exceptions of an
+import (trimesh does) would swallow an exception. A cancelled run always ends as cancelled, whatever
+else happens.
 """
 
 import signal
@@ -19,12 +19,12 @@ from ...progress import Monitor, ProgressEvent
 class Interrupts:
     """Context in which Ctrl-C cancels the work, and SIGTERM ends the process with 143.
 
-    Both let the work clean up. Nothing changes outside the main thread.
+    Both let the work clean up. Without effect outside the main thread.
 
     Parameters
     ----------
     even_if_ignored : bool
-        Handle Ctrl-C where the process inherited that it is ignored, as under `nohup`.
+        Handle Ctrl-C even if the process inherited that it is ignored, as under `nohup`.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class Interrupts:
             raise Cancelled
 
     def finish(self) -> None:
-        """Declare the work done: Ctrl-C is ignored from here on.
+        """Mark the work as finished: Ctrl-C is ignored from now on.
 
         Raises
         ------

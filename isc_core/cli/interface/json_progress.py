@@ -5,18 +5,18 @@
     {"event": "failed", "message": "one line for people", "code": 2}
     {"event": "cancelled"}
 
-Any number of progress events comes first; their fraction, of the whole job, never decreases; of
+Any number of progress events comes first; their fraction, of the whole job, never decreases; for
 several photos or objects they have a `part`, [2, 3] for the second of three. One of the other three
-comes last.
+events comes last.
 
-The calling program holds the other end of standard input: the line `cancel` acts as Ctrl-C. With
-`--cancel-at-eof` so does the end of the stream, which comes when that program has ended; without
-it, a command whose standard input is empty (cron, CI) runs on. The work is asked to stop; after a
-second it is interrupted wherever it is; both let it clean up. Ten seconds later the process ends in
-any case. Notes for people, and the traceback of a bug, go to standard error.
+The calling program writes to standard input: the line `cancel` acts as Ctrl-C. With
+`--cancel-at-eof` so does the end of the stream, which occurs when that program ends; without it, a
+command with an empty standard input (cron, CI) continues. The work is first cancelled at its next
+step; after a second it is interrupted; both let it clean up. Ten seconds later the process ends in
+any case. Notes for users, and the traceback of a bug, are written to standard error.
 
-Limits: a process without standard input is not watched. Ignore lines of standard output that are
-not JSON.
+Limits: a process without standard input cannot be cancelled. Readers should ignore lines of
+standard output that are not JSON.
 """
 
 import _thread
@@ -49,7 +49,7 @@ class JsonReporter:
     stream : text file
         Usually standard output.
     cancel_at_eof : bool
-        The end of standard input cancels, too.
+        Whether the end of standard input cancels, too.
     """
 
     def __init__(self, stream: TextIO, *, cancel_at_eof: bool = False) -> None:
@@ -110,7 +110,7 @@ class JsonReporter:
         code : int
             Exit code.
         done : sequence of str, optional
-            Lines of what is done; not reported, they stand in the results, too.
+            Lines about completed parts; not reported, since they are in the results, too.
         """
         del done
         self._write("failed", message="; ".join(lines), code=code)
@@ -137,7 +137,7 @@ class JsonReporter:
         try:
             self._stream.write(json.dumps({"event": event, **content}) + "\n")
             self._stream.flush()
-        except OSError:  # the reader is gone: the end of standard input then cancels the work
+        except OSError:  # the reader has ended: the end of standard input then cancels the work
             discard_output()
 
     def __enter__(self) -> "JsonReporter":
@@ -154,7 +154,7 @@ class JsonReporter:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        with self._lock:  # no interrupts from here on, so that the last event is written
+        with self._lock:  # no more interrupts, so that the last event is written
             self._ended.set()
 
     def _watch(self, descriptor: int) -> None:

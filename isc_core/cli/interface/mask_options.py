@@ -1,4 +1,4 @@
-"""Options that say where the object is: --box, --point, --not, --each."""
+"""Options that select the object: --box, --point, --not, --each."""
 
 import argparse
 
@@ -38,7 +38,7 @@ def add_each(group: Group | argparse.ArgumentParser, what: str) -> None:
     group : argparse._ArgumentGroup
         Changed in place.
     what : str
-        Where the results go.
+        Names of the outputs, for the help.
     """
     group.add_argument(
         "--each", action="store_true", help=f"process each of several separate objects: {what}"
@@ -59,7 +59,7 @@ def hints_of(options: argparse.Namespace) -> Hints:
     Raises
     ------
     InputError
-        If there is a mask, or --each, beside them.
+        If there is also a mask, or --each.
     """
     hints = Hints(tuple(options.points), tuple(options.others), options.box)
     if hints and getattr(options, "mask", None) is not None:
@@ -102,7 +102,7 @@ def how_found(photo: Photo) -> str:
     Returns
     -------
     str
-        "" for a mask that was given, or that has no confidence.
+        "" for a given mask, or one without a confidence.
     """
     source = photo.original
     if source.confidence is None:

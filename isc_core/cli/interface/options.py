@@ -58,7 +58,7 @@ def add_mask(group: Group) -> None:
 
 
 def add_pixels(group: argparse.ArgumentParser | Group, option: str, name: str, of: str) -> None:
-    """Add an option that declares pixels.
+    """Add an option that takes a pixel and can be repeated.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def add_pixels(group: argparse.ArgumentParser | Group, option: str, name: str, o
     option : str
         Such as --point.
     name : str
-        Of the list of (x, y) in the parsed options.
+        Name of the list of (x, y) in the parsed options.
     of : str
-        What the pixels belong to, for the help.
+        What the pixels mark, for the help.
     """
     group.add_argument(
         option,
@@ -92,7 +92,7 @@ def add_output(
     group : argparse._ArgumentGroup
         Changed in place.
     what : str
-        Its help.
+        Help text of the option.
     """
     group.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help=what)
 

@@ -30,7 +30,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
         groups: Iterable[Any],
         prefix: str | None = None,
     ) -> None:
-        """Show what is required; the options are below. argparse calls it.
+        """Show only required arguments; called by argparse. Options are listed below.
 
         Parameters
         ----------
@@ -83,7 +83,7 @@ def describe(
     examples: str = "",
     more: str = "",
 ) -> None:
-    """Set what a command does and how its help explains it.
+    """Set the function and the help text of a command.
 
     Parameters
     ----------
@@ -184,12 +184,12 @@ def table(title: str, rows: dict[str, str]) -> str:
     ----------
     title : str
     rows : dict
-        Name to what it is.
+        Description by name.
 
     Returns
     -------
     str
-        Lines, without an end.
+        Lines, without a final line end.
     """
     width = 2 + max(map(len, rows))
     indent = " " * (2 + width)

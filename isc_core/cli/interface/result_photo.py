@@ -19,7 +19,7 @@ def photo_of_result(
     transfer: str | None,
     limits: Limits,
 ) -> Photo:
-    """Read the photo of a result with the mask and the curve that the result was made with.
+    """Read the photo of a result with the mask and the transfer curve of the result.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def photo_of_result(
         Of the result.
     photo : Path
     mask : Path or None
-        Needed where the result was made with a separate mask.
+        Required if the result was made with a separate mask.
     transfer : str or None
         Replaces the curve of the result.
     limits : Limits
@@ -36,7 +36,7 @@ def photo_of_result(
     Returns
     -------
     Photo
-        Whether it is the same file is for the caller to check.
+        The caller checks that the file is the same.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Several photos, or several objects of one: a failure stops no other."""
+"""Several photos, or several objects in one: failures do not stop the others."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -11,7 +11,7 @@ Work = Callable[[Monitor], list[str]]
 
 
 def problem_of(error: InputError | MemoryError | OSError) -> str:
-    """Return what a user is told of an error that the input or the machine causes.
+    """Return the message for an error caused by the input or the machine.
 
     Parameters
     ----------
@@ -31,16 +31,16 @@ def problem_of(error: InputError | MemoryError | OSError) -> str:
 
 
 def do_all(kind: str, works: Mapping[str, Work], monitor: Monitor) -> list[str]:
-    """Do works one after the other, whether others fail or not.
+    """Do several jobs one after the other, regardless of failures.
 
     Parameters
     ----------
     kind : str
-        What the works are for, in the plural.
+        The kind of job, in the plural.
     works : mapping of str to callable
-        By the names that their stages and failures begin with; each returns lines to print.
+        By name, which becomes the prefix of stages and failures; each returns lines to print.
     monitor : Monitor
-        Each work has an equal part of it.
+        Each job has an equal part of it.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def do_all(kind: str, works: Mapping[str, Work], monitor: Monitor) -> list[str]:
         part = monitor.part(index / len(works), (index + 1) / len(works))
         try:
             lines += work(_named(part, name, (index + 1, len(works))))
-        except BrokenPipeError:  # nobody reads what is reported
+        except BrokenPipeError:  # the reader of the reports has ended
             raise
         except (InputError, MemoryError, OSError) as error:
             problem = problem_of(error)
@@ -69,7 +69,7 @@ def do_all(kind: str, works: Mapping[str, Work], monitor: Monitor) -> list[str]:
 
 
 def _named(monitor: Monitor, name: str, part: tuple[int, int]) -> Monitor:
-    """A monitor whose stages begin with a name."""
+    """A monitor that adds a name as the prefix of stages."""
 
     def report(event: ProgressEvent) -> None:
         monitor.progress(replace(event, stage=f"{name}: {event.stage}", part=part))

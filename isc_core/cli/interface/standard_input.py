@@ -1,7 +1,7 @@
-"""A photo from standard input: `-` in place of its name.
+"""A photo from standard input, which has the name `-`.
 
-Readers take files, because images are recognised, checked and decoded from the start several
-times. The stream is copied to a temporary file first.
+Readers need files, because images are detected, checked and decoded in several passes. The stream
+is copied to a temporary file first.
 """
 
 import argparse
@@ -32,12 +32,12 @@ def photo_file(path: Path, options: argparse.Namespace) -> Iterator[Path]:
     Yields
     ------
     Path
-        The file; that of standard input exists inside the context only.
+        The file; that of standard input exists only inside the context.
 
     Raises
     ------
     InputError
-        If standard input is a terminal, serves --progress json, or exceeds the limits.
+        If standard input is a terminal, is used by --progress json, or exceeds the limits.
     """
     if path != STDIN:
         yield path

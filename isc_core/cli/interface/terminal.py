@@ -1,7 +1,7 @@
 """Terminal output: the progress bar, results and errors.
 
-Colours are used on terminals only, and not where the environment has `NO_COLOR` (no-color.org) or
-`TERM=dumb`; `FORCE_COLOR` uses them anywhere.
+Colours are used only on terminals, and not if the environment has `NO_COLOR` (no-color.org) or
+`TERM=dumb`; `FORCE_COLOR` enables them anywhere.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ _WIPE = "\r\x1b[K"  # to the start of the line, and erase it
 
 
 class Verbosity(Enum):
-    """How much is printed besides the result.
+    """The amount of output besides the result.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Style(Enum):
 
 
 def styled(text: str, style: Style, stream: TextIO) -> str:
-    """Return a text as `stream` should show it.
+    """Return a text in the style that `stream` supports.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def styled(text: str, style: Style, stream: TextIO) -> str:
     Returns
     -------
     str
-        With escape sequences where the stream is a terminal that takes colours.
+        With escape sequences if the stream is a terminal with colours.
     """
     environment = os.environ
     if environment.get("NO_COLOR"):
@@ -107,9 +107,9 @@ def printable(text: str, stream: TextIO) -> str:
 
 
 def print_note(line: str, stream: TextIO) -> None:
-    """Print a line while the work goes on.
+    """Print a line during the work.
 
-    On a terminal it takes the place of the progress bar, which the next event draws again below.
+    On a terminal it replaces the progress bar, which the next event redraws below.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def print_note(line: str, stream: TextIO) -> None:
 
 
 class TerminalReporter:
-    """Reports to a user: results on standard output, everything else on standard error."""
+    """Reports to a user: results on standard output, all else on standard error."""
 
     @contextmanager
     def progress(self, verbosity: Verbosity) -> Iterator[Callable[[ProgressEvent], None]]:
@@ -188,7 +188,7 @@ class TerminalReporter:
         code : int
             Exit code; not printed.
         done : sequence of str, optional
-            Lines of what is done.
+            Lines about completed parts.
         """
         self.done("", done)
         for line in lines:
@@ -202,7 +202,7 @@ class TerminalReporter:
 class ProgressBar:
     """Show progress on `stream`: one line, redrawn, on a terminal; else a line for each new stage.
 
-    Use as a context manager: the line is wiped at the end, however the work ends.
+    Use as a context manager: the line is erased at the end, however the work ends.
 
     Parameters
     ----------

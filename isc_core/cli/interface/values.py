@@ -1,4 +1,4 @@
-"""Values on the command line: the types of options, with errors in one line."""
+"""Types of command-line options, with one-line errors."""
 
 import argparse
 import math
@@ -6,11 +6,11 @@ import re
 import sys
 from collections.abc import Callable
 
-MAPS_SIZE = -1  # as `texture_size` returns it
+MAPS_SIZE = -1  # value of `texture_size` for "maps"
 
 
 def current_name(setting: str) -> Callable[[str], str]:
-    """Make the type of an option whose values were renamed.
+    """Return the type of an option whose values were renamed.
 
     Parameters
     ----------
@@ -20,7 +20,7 @@ def current_name(setting: str) -> Callable[[str], str]:
     Returns
     -------
     callable
-        Replaces a value of an earlier version, and names the new one on stderr.
+        Replaces a value of an earlier version, and prints the new one on stderr.
     """
 
     def read(text: str) -> str:
@@ -52,7 +52,7 @@ def texture_size(text: str) -> int:
     Raises
     ------
     argparse.ArgumentTypeError
-        If it is none.
+        If it is not one.
     """
     names = {"photo": 0, "maps": MAPS_SIZE}
     if text in names:
@@ -298,7 +298,7 @@ def pixel(text: str) -> tuple[int, int]:
     Raises
     ------
     argparse.ArgumentTypeError
-        If it is none.
+        If it is not one.
     """
     try:
         x, y = (int(part) for part in text.split(","))

@@ -1,4 +1,4 @@
-"""Showing a picture in the viewer of the system, for --open."""
+"""Showing a picture in the system's viewer, for --open."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ def show(picture: Path) -> Iterator[str]:
     Yields
     ------
     str
-        A note, where the system has no viewer.
+        A note, if the system has no viewer.
     """
     if sys.platform == "win32":
         os.startfile(picture)

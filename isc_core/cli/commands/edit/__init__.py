@@ -1,4 +1,4 @@
-"""`isc edit`: another light, gloss or colour for a decomposed photo; one file per action."""
+"""`isc edit`: changes light, gloss or colour of a decomposed photo; one file per action."""
 
 import argparse
 from dataclasses import replace
@@ -129,7 +129,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def _check_result(d: Decomposition, folder: Path) -> None:
-    """Raise `InputError` for a result that violates the identities, before an edit divides by
+    """Raise `InputError` for a result that violates the identities, which may cause divisions by
     zero.
     """
     broken = list(d.identity_errors().broken())

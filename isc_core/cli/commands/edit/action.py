@@ -1,4 +1,4 @@
-"""What every action of `isc edit` declares, and what it returns."""
+"""The interface of the actions of `isc edit`."""
 
 import argparse
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from ....scene.decomposition import Decomposition
 
 @dataclass(frozen=True)
 class ActionResult:
-    """What an action returns.
+    """The result of an action.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class ActionResult:
     panels : tuple of Panel
         Panels for the contact sheet.
     clusters : Clusters or None
-        The clusters of reflectance, where the action found them.
+        The clusters of reflectance, if the action computed them.
     lines : tuple of str
         Lines to print.
     layers : bool

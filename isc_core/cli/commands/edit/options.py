@@ -88,14 +88,14 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
 
 
 def add_colour(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add --colour, and its former spelling --color, which is not shown.
+    """Add --colour, and its former spelling --color, which is hidden.
 
     Parameters
     ----------
     parser : argparse.ArgumentParser
         Changed in place.
     what : str
-        Its help.
+        Help text of the option.
     """
     parser.add_argument("--colour", dest="color", type=color, metavar="RRGGBB", help=what)
     parser.add_argument("--color", type=_former_color, help=argparse.SUPPRESS)

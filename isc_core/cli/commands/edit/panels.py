@@ -52,7 +52,7 @@ def recovered_light_panel(d: Decomposition) -> Panel:
 
 
 def directional_sphere(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
-    """Render a sphere in the directional part of a light alone; an ambient term hides its origin.
+    """Render a sphere under only the directional part of a light, without the ambient term.
 
     Parameters
     ----------
