@@ -1,11 +1,11 @@
-# make demo   renders one glossy object, decomposes it, says where the pictures are
+# make demo   renders one glossy object, decomposes it, prints the paths of the pictures
 # make test   linter, type checker and tests, within minutes
-# make test-all   the same and the slow tests (test-slow: these alone)
+# make test-all   the same and the slow tests (test-slow: only these)
 # make docs   the documentation site, in build/site (open build/site/index.html)
-# make extension   Blender's add-on: one zip a platform and Python in dist/; TARGET=here builds only this machine's
+# make extension   Blender's add-on: one zip per platform and Python version in dist/; TARGET=here builds only for this machine
 # make wheel   the wheel, with kernels for all machines, and the sdist, in dist/
-# make kernels   the kernels for this machine, which an editable installation then uses; tests do it by themselves
-# The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
+# make kernels   the kernels for this machine, which an editable installation then uses; tests do so automatically
+# The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... selects an interpreter.
 
 BIN := .venv/bin
 INPUTS := pyproject.toml constraints.txt tools/setup.sh
@@ -22,10 +22,10 @@ demo: .venv/.ready-demo
 	@echo "What came out:    demo/result/preview.png (look at this first)"
 	@echo "The textured mesh: demo/result/mesh.glb"
 
-# Tests start hundreds of processes: bytecode is kept, also where the environment says not to.
+# Tests start hundreds of processes: bytecode is cached, even if the environment disables it.
 test test-slow test-all: export PYTHONDONTWRITEBYTECODE =
 
-# One process a core. A worker takes the next file, so that a file's fixtures are made once.
+# One process per core. Workers process whole files, so that the fixtures of a file are made once.
 PYTEST = $(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 test: lint kernels
@@ -45,7 +45,7 @@ docs: .venv/.ready-docs
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --clean --quiet
 	@echo "The documentation: build/site/index.html"
 
-# Compiles nothing if the kernels are as they were.
+# Compiles nothing if the kernels are unchanged.
 kernels: build/.kernels-ready
 
 build/.kernels-ready: .venv/.ready-dev $(shell find isc_core -name '*.py') $(wildcard blender_addon/packaging/kernels/*.*)
@@ -63,7 +63,7 @@ TARGET := all
 extension: .venv/.ready-dev
 	@$(BIN)/python -m blender_addon.packaging $(TARGET) -o dist --wheels build/wheels
 
-# A development set-up is also good for the demo; the demo alone does without the big Blender module.
+# A development environment also works for the demo; the demo alone does not need the large Blender module.
 .venv/.ready-demo: $(INPUTS)
 	@sh tools/setup.sh synth
 	@touch $@

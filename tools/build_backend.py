@@ -1,15 +1,15 @@
-"""Build backend (PEP 517): setuptools, with names in the wheel that collide with no others.
+"""Build backend (PEP 517): setuptools, with collision-free package names in the wheel.
 
-Problem: `synth` and `benchmarks` are good names for folders of a repository. In the common folder
-of all installed packages, another distribution may use them too. setuptools can install a folder
-under another name, but does not change the imports.
+Problem: `synth` and `benchmarks` are good names for folders of a repository, but as top-level
+packages in site-packages they may collide with another distribution. setuptools can install a
+folder under another name, but does not change the imports.
 
 A wheel is therefore built from a copy of the tree in which folders, absolute imports and entry
 points have the names of `PACKAGES`. Editable installations and sdists keep the names of the
 repository.
 
 Limits: modules of a renamed package are imported by `from PACKAGE import ...`, at the start of a
-line or an indented line; other imports end the build. A name inside a string is found after `-m`
+line or an indented line; other imports abort the build. A name inside a string is found after `-m`
 only.
 """
 
@@ -51,7 +51,7 @@ PACKAGES = {
     "benchmarks": "isc_benchmarks",
     "blender_addon": "isc_blender_addon",
 }
-# What only a repository can use. Of the benchmarks, `isc thesis` needs the others.
+# Only usable in a repository. The other benchmarks are needed by `isc thesis`.
 LEFT_OUT = (
     "benchmarks/batch",
     "benchmarks/blender",
@@ -134,7 +134,7 @@ def _staged() -> Iterator[None]:
 
 
 def stage(source: Path, target: Path) -> None:
-    """Copy what a wheel is built from, with the names of the wheel.
+    """Copy the sources of a wheel, with the names of the wheel.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def stage(source: Path, target: Path) -> None:
 
 
 def shipped_files(source: Path) -> Iterator[Path]:
-    """Iterate over the files of the packages, without those that stay out of the wheel.
+    """Iterate over the files of the packages that belong in the wheel.
 
     Parameters
     ----------
@@ -185,12 +185,12 @@ def shipped_files(source: Path) -> Iterator[Path]:
 def renamed_project(text: str) -> str:
     """Return pyproject.toml with the names of the wheel in its entry points.
 
-    Entry points of packages that the wheel leaves out are left out with them.
+    Entry points of excluded packages are removed.
 
     Parameters
     ----------
     text : str
-        The file as it is in the repository.
+        Content of the file in the repository.
 
     Returns
     -------

@@ -2,7 +2,7 @@
 
 One API page for each package folder of `isc_core`, written as mkdocstrings directives, and one page
 with the help text of every command, so that both references follow the code. Notebooks appear with
-the outputs that they store. CHANGELOG.md, CONTRIBUTING.md and SECURITY.md stay at the root of the
+their stored outputs. CHANGELOG.md, CONTRIBUTING.md and SECURITY.md stay at the root of the
 repository and appear as pages; links to these files and to notebooks work in both places.
 """
 
@@ -69,7 +69,7 @@ def _inside(climb: str) -> str:
 
 
 def _folders() -> list[Path]:
-    """The folders of `isc_core` that hold modules, the top first."""
+    """The folders of `isc_core` that contain modules, the top-level one first."""
     folders = {path.parent for path in CORE.rglob("*.py") if "__pycache__" not in path.parts}
     return sorted(folders, key=lambda folder: folder.relative_to(ROOT).parts)
 
@@ -148,7 +148,7 @@ def _notebook_page(notebook: Path, name: Path) -> dict[str, str | bytes]:
 
 
 def _help(*command: str) -> str:
-    """What `isc COMMAND --help` prints."""
+    """The output of `isc COMMAND --help`."""
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         main([*command, "--help"])

@@ -1,9 +1,9 @@
-"""Run a notebook of the documentation and store what its cells print and show.
+"""Run a notebook of the documentation and store the outputs of its cells.
 
     .venv/bin/python tools/run_notebook.py docs/quickstart/first_decomposition.ipynb
 
-The stored file depends on the cells and their output alone: it has no times, no versions and no
-names of a machine. Jupyter's own "Save" writes some of these.
+The stored file depends only on the cells and their output: it has no times, versions or machine
+names, some of which Jupyter's own "Save" writes.
 """
 
 import argparse
@@ -45,7 +45,7 @@ def executed(path: Path, folder: Path) -> nbformat.NotebookNode:
         If a cell fails.
     """
     notebook = nbformat.read(path, as_version=4)
-    # Without folders to look in, the kernel is that of this interpreter.
+    # Without folders to search, the kernel is that of this interpreter.
     specs = KernelSpecManager(kernel_dirs=[])
     kernel = AsyncKernelManager(kernel_name="python3", kernel_spec_manager=specs)
     client = NotebookClient(
@@ -60,12 +60,12 @@ def executed(path: Path, folder: Path) -> nbformat.NotebookNode:
     notebook.metadata = nbformat.from_dict(METADATA)
     for cell in notebook.cells:
         for output in cell.get("outputs", []):
-            output.get("data", {}).pop("image/jpeg", None)  # Pillow offers every picture twice
+            output.get("data", {}).pop("image/jpeg", None)  # Pillow provides every picture twice
     return notebook
 
 
 def main() -> None:
-    """Run the notebook that the command line names, and write it back."""
+    """Run the notebook given on the command line, and overwrite it."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("notebook", type=Path)
     path = parser.parse_args().notebook

@@ -1,12 +1,11 @@
 """Albedo textures of several families, drawn from a random generator, or a user's own image.
 
-Each family is a module. Textures are linear Rec.709, row 0 at v = 0, and continue without a seam
-from u = 1 to u = 0. Their lengths are measured in heights of the texture; once around u is `ASPECT`
-of them, about what it is on most objects.
+Each family is a module. Textures are linear Rec.709, row 0 at v = 0, and periodic in u. Lengths are
+measured in heights of the texture; the period of u is `ASPECT`, about the ratio on most objects.
 
-Limits: textures follow u and v, so patterns narrow toward the poles of a swept shape, as a label
-wrapped around it. No albedo is below `DARKEST` or above `BRIGHTEST` in any channel, as real ones
-(soot .03, fresh white paint .9).
+Limits: textures follow u and v, so patterns become narrower toward the poles of a swept shape. All
+channels are between `DARKEST` and `BRIGHTEST`, as for real materials (soot .03, fresh white paint
+.9).
 """
 
 from collections.abc import Callable

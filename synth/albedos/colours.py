@@ -123,7 +123,7 @@ def ink(rng: np.random.Generator) -> np.ndarray:
 
 
 def palette(rng: np.random.Generator, count: int) -> np.ndarray:
-    """Draw colours with well-spread hues, some with a white or dark one among them.
+    """Draw colours with well-spread hues, sometimes including a white or dark one.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ f^(-slope / 2 - 1 / 2), whose power decreases as f^(-slope) along a line.
 Citation: R. F. Voss, "Random fractal forgeries", in Fundamental algorithms for computer graphics
 (1985), 805-835, doi:10.1007/978-3-642-84574-1_34.
 
-Limits: computed by Fourier transforms, so the fields are periodic along v too, where textures end.
+Limits: computed by Fourier transforms, so the fields are periodic along v, too, where textures end.
 """
 
 from collections.abc import Callable
@@ -93,7 +93,7 @@ def over(below: np.ndarray, colour: np.ndarray | float, cover: np.ndarray) -> np
     below : (h, w, 3) ndarray
         The texture.
     colour : (3,) or (h, w, 3) ndarray or float
-        What covers it.
+        Colour of the top layer.
     cover : (h, w) ndarray
         Coverage, clipped to [0, 1].
 

@@ -46,7 +46,7 @@ def _stripes(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
 
 
 def _cells(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """Indices (size, size) of Voronoi cells around random places, each with one of the colours."""
+    """Indices (size, size) of Voronoi cells of random points, each with one of the colours."""
     u, v = grid(size)
     bend = rng.uniform(0, 0.02)
     u, v = u + bend * smooth_noise(rng, size, 5) / ASPECT, v + bend * smooth_noise(rng, size, 5)

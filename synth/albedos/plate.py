@@ -1,8 +1,8 @@
 """A printing plate: lines, shapes and words printed with one ink, without any font file (A. V.
 Hershey's stroke letters).
 
-Lengths are in heights of the texture: x from 0 to `ASPECT` once around, y from 0 at the top to 1.
-What leaves at the right enters at the left.
+Lengths are in heights of the texture: x from 0 to `ASPECT` once around, y from 0 at the top to 1. x
+is periodic.
 
 Citation: A. V. Hershey, "Calligraphy for computers", U.S. Naval Weapons Laboratory report 2101
 (1967), which has no DOI.
@@ -52,7 +52,7 @@ _CODAS = ["", "", "l", "n", "r", "s", "t", "nd", "rk"]
 
 
 class Plate:
-    """The print of one ink on a texture of `size` texels a side."""
+    """The print of one ink on a texture of `size` x `size` texels."""
 
     def __init__(self, size: int) -> None:
         self._size, self._scale = size, size * _FINER
@@ -60,7 +60,7 @@ class Plate:
         self._canvas = np.zeros((self._scale, 2 * self._turn), np.uint8)
 
     def cover(self) -> np.ndarray:
-        """Return the inked share of each texel, (size, size) in [0, 1]."""
+        """Return the ink coverage of each texel, (size, size) in [0, 1]."""
         once = np.maximum(self._canvas[:, : self._turn], self._canvas[:, self._turn :])
         return (
             cv2.resize(once, (self._size, self._size), interpolation=cv2.INTER_AREA).astype(float)
@@ -210,7 +210,7 @@ class Plate:
 
 
 def word(rng: np.random.Generator) -> str:
-    """Make up a word of one to three syllables.
+    """Generate a random word of one to three syllables.
 
     Parameters
     ----------
@@ -247,7 +247,7 @@ def write_lines(
     rng : numpy.random.Generator
         Random numbers.
     left, top, width : float
-        Place and width of the lines.
+        Position and width of the lines.
     count : int
         Number of lines.
     height : float

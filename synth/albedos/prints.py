@@ -119,7 +119,7 @@ def _page_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
 
 
 def _band(rng: np.random.Generator, size: int) -> np.ndarray:
-    """A package in two colours with large letters going around it and rules above and below."""
+    """A package in two colours with large letters around it, between two rules."""
     low, high = rng.uniform(0.22, 0.32), rng.uniform(0.6, 0.75)
     face, letters, ground = int(rng.choice(FACES[1:4])), Plate(size), Plate(size)
     ground.box(0, low, ASPECT, high - low)

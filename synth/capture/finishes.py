@@ -1,11 +1,11 @@
-"""Random finishes: materials from eggshell paint to a glaze.
+"""Random finishes: materials from eggshell paint to glaze.
 
 Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that of the nearest
 lobe (`isc_core.shading.brdf.roughness`): .028 to .44. Strength of blinn_phong: log-uniform over
 `STRENGTHS`, about the specular share of the light; dielectrics have .02 to .08 at normal incidence
 and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5
-(coated twice), ior 1.3 to 1.8. A varying gloss is one of: worn (diffuse where it was touched),
-smudged (broader within smudges), striped (diffuse bands).
+(coated twice), ior 1.3 to 1.8. A varying gloss is one of: worn (diffuse where it is worn), smudged
+(broader within smudges), striped (diffuse bands).
 
 Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005,
 117-126, doi:10.2312/EGWR/EGSR05/117-126 (measured materials fitted with such lobes).
@@ -117,8 +117,8 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _varied(material: Material, exponent: float, rng: np.random.Generator) -> Material:
-    """The material with textures: its own gloss where the pattern is 0, a broader and weaker one
-    where it is 1.
+    """The material with textures: the original gloss where the pattern is 0, a broader and weaker
+    one where it is 1.
     """
     pattern = (_worn, _smudged, _striped)[rng.integers(3)](rng)
     broader, weaker = rng.uniform(3, 12), rng.uniform(0.1, 0.6)

@@ -1,8 +1,8 @@
-"""The recipe of a scene: a few names and numbers, and how they become that scene.
+"""The recipe of a scene: the names and numbers from which it is built.
 
 Objects, materials and lights are members of families: "lathe03" is the fourth lathe object, the
 same in every scene, with any material and light. Each member therefore has its own random numbers,
-seeded by its name; what belongs to a single scene (framing, exposure, samples, noise) is drawn from
+seeded by its name; properties of a single scene (framing, exposure, samples, noise) are drawn from
 streams of the scene's seed.
 
 Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number));
@@ -12,8 +12,7 @@ extent being the wider side of the object's silhouette.
 Citation: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms
 for random number generation", Harvey Mudd College HMC-CS-2014-0905 (2014) (NumPy's generator).
 
-Limits: members stay the same only as long as the code that draws them: `scene.json` records the
-version.
+Limits: members depend on the version of the code that draws them, which `scene.json` records.
 """
 
 from dataclasses import dataclass, field, replace
@@ -87,7 +86,7 @@ class FamilyMember:
 
 @dataclass(frozen=True)
 class Sources:
-    """A user's files, None without.
+    """A user's files, or None.
 
     Attributes
     ----------
@@ -131,7 +130,7 @@ class Sources:
 
 @dataclass(frozen=True)
 class PictureSettings:
-    """How scenes are photographed.
+    """Settings of the camera, renderer and sensor.
 
     Attributes
     ----------
@@ -177,13 +176,13 @@ class Recipe:
     seed : int
         >= 0.
     shape, material, light : FamilyMember
-        What is in the scene.
+        Content of the scene.
     model : str
         The material's reflectance model, of `MODELS`.
     albedo : str
         Family of its albedo, of `ALBEDOS`, "image" or "mesh".
     picture : PictureSettings
-        How it is photographed.
+        Camera, renderer and sensor.
     sources : Sources
         The user's files.
     """

@@ -1,5 +1,5 @@
-"""A camera's sensor and coding: noise, clipping, quantisation. Their effect is the residual of the
-ground truth.
+"""A camera's sensor and encoding: noise, clipping, quantisation. Their effect is the residual of
+the ground truth.
 
 Equation, for light x, 1 being full scale, each channel and pixel independently:
 

@@ -1,4 +1,4 @@
-"""One scene with the ground truth of everything that a decomposition estimates.
+"""A rendered scene with the ground truth of all quantities that a decomposition estimates.
 
 Equation, at each pixel inside the mask: image = diffuse + specular + residual, diffuse =
 reflectance * shading. Position, normal and reflectance come from one ray through the pixel's centre
@@ -142,7 +142,7 @@ def render_truth(
     lit = light_surface(
         surface, scene.material, scene.lights, tracer, options or RenderOptions(), monitor
     )
-    # In a penumbra the estimate from few samples may be negative; light is not.
+    # In a penumbra the estimate from few samples may be negative, which light cannot be.
     found = np.maximum(lit.shading, 0)
     illumination, misfit = fit_light(surface.normal, found)
     picture = surface.image
@@ -188,7 +188,7 @@ def exposed(
     share : float, optional
         The quantile, of the values inside the mask.
     layer : str, optional
-        Which layer.
+        Name of the layer.
 
     Returns
     -------

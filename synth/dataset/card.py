@@ -1,4 +1,4 @@
-"""The data set's card, `README.md`: what a reader needs without the program that made it."""
+"""The data set's card, `README.md`: a description for readers without this program."""
 
 import shlex
 from collections.abc import Mapping

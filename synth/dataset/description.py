@@ -1,7 +1,7 @@
-"""The content of `scene.json`: how a scene was made, units and frames, and the numbers that are not
+"""The content of `scene.json`: the recipe of a scene, units and frames, and all values that are not
 maps.
 
-It contains no time and no path, so that the same seed gives the same bytes.
+It contains no times or paths, so that equal seeds give equal bytes.
 """
 
 from dataclasses import asdict, fields
@@ -74,7 +74,7 @@ def describe(
     truth : GroundTruth
         Its maps.
     checksums : dict of str to str
-        SHA-256 of the files beside it.
+        SHA-256 of the other files in its folder.
 
     Returns
     -------
@@ -240,5 +240,5 @@ def _light(light: Light) -> dict[str, Any]:
 
 
 def _sensor(sensor: Sensor) -> dict[str, Any]:
-    """All but the exposure, which the picture has."""
+    """All except the exposure, which is in the picture's settings."""
     return {name: value for name, value in asdict(sensor).items() if name != "exposure_level"}

@@ -2,8 +2,8 @@
 interrupted run can continue.
 
 `manifest.json` is written before the first missing scene and describes the whole run; a folder with
-another run is refused. An existing scene is kept if it is the planned one and none of its files was
-modified.
+another run is rejected. An existing scene is kept if it is the planned one and none of its files
+was modified.
 
 Limits: a kept scene may come from another version of the program; its `scene.json` records it.
 """
@@ -33,7 +33,7 @@ from .splits import SPLITS, make_pools
 
 SCHEMA_VERSION = 1
 KIND = "isc synth data set"
-_LOOKING = 0.02  # of the progress, for checking existing scenes
+_LOOKING = 0.02  # share of the progress for checking existing scenes
 # Scenes after which compiled kernels are released; Dr.Jit reloads those it needs from its files.
 KERNELS_KEPT = 50
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
@@ -190,7 +190,7 @@ def is_finished(folder: Path, scene: PlannedScene) -> bool:
 
 
 def describe_run(run: DatasetSettings) -> dict[str, Any]:
-    """Return what defines the scenes of a run except for their number.
+    """Return all settings that define the scenes of a run, except for their number.
 
     Two runs are the same if this is equal.
 

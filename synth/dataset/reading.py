@@ -254,7 +254,7 @@ def read_object(path: Path) -> dict[str, Any]:
 
 
 def require_intact(folder: Path, content: dict[str, Any]) -> None:
-    """Check that every file beside `scene.json` is the one that was written with it.
+    """Check that the files of a scene are those that were written with its `scene.json`.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@
 compare by name. `material.exr`: `strength.Y` and `gloss.Y` of the material. `variance.exr`: of the
 Monte Carlo estimates of diffuse, specular and shading. `environment.exr`: all lights as seen from
 the origin. `photo.png`: the photo, the mask as alpha. `preview.png`: a contact sheet. `scene.json`:
-everything else, with the checksums of the files beside it (see `description`).
+all other values, with the checksums of the other files (see `description`).
 """
 
 import hashlib
@@ -49,7 +49,7 @@ def write_scene(folder: Path, split: str, recipe: Recipe, scene: Scene, truth: G
     split : str
         The scene's split.
     recipe : Recipe
-        How it was made.
+        Its recipe.
     scene : Scene
         Lights, material and camera.
     truth : GroundTruth

@@ -12,7 +12,7 @@ MOST_SCENES = 100_000  # seeds have five digits in folder names
 
 @dataclass(frozen=True)
 class DatasetSettings:
-    """What a data set consists of.
+    """Settings of a data set.
 
     Attributes
     ----------
@@ -21,7 +21,7 @@ class DatasetSettings:
     choices : Choices
         Families that scenes are drawn from.
     picture : PictureSettings
-        How scenes are photographed.
+        Camera, renderer and sensor.
     sources : Sources
         The user's files.
 

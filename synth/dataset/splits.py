@@ -1,12 +1,12 @@
-"""The available objects, materials and lights, which of them are held out, and which of them a
-scene's seed combines.
+"""The pools of objects, materials and lights, their held-out members, and their combination by a
+scene's seed.
 
 Equation: of each family every fifth member (number mod 5 = 4) is held out; of materials every fifth
 round through the albedos, number = round * albedos + albedo. A scene of "train" has only members
 that are not held out; of "test_objects", "test_materials", "test_lights" one held-out member in
-that aspect alone; of "test" three. The split follows from the scene's seed, so that a longer run
-begins with the shorter one; the rule is the same for all runs, so that no run trains on what
-another one holds out.
+that aspect alone; of "test" three. The split depends on the scene's seed, so that a longer run
+begins with the shorter one; the rule is the same for all runs, so that no run has training scenes
+with members that another run holds out.
 
 Citation: S. Kaufman et al., "Leakage in data mining: formulation, detection, and avoidance", ACM
 Transactions on Knowledge Discovery from Data 6(4) (2012), doi:10.1145/2382577.2382579.
@@ -104,7 +104,7 @@ class Choices:
 
 @dataclass(frozen=True)
 class _Member:
-    """A family member, what else is fixed with it, and whether it is held out."""
+    """A family member with its fixed properties, and whether it is held out."""
 
     part: FamilyMember
     held_out: bool
@@ -152,7 +152,7 @@ class Pools:
         seed : int
             The seed.
         picture : PictureSettings
-            How it is photographed.
+            Camera, renderer and sensor.
         sources : Sources
             The user's files.
 
@@ -197,7 +197,7 @@ def make_pools(choices: Choices, sources: Sources) -> Pools:
     Raises
     ------
     InputError
-        If a requested split has nothing held out, or a file is missing.
+        If a requested split has no held-out members, or a file is missing.
     """
     shapes = tuple(
         _Member(part, held)

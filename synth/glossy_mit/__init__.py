@@ -2,7 +2,7 @@
 a rendered specular layer.
 
 Problem: highlights of the photographed set are weak, and its natural images have none; methods that
-remove highlights first need a set that has them, with the ground truth of every layer.
+separate highlights need a set with strong ones, and ground truth of every layer.
 
 Equation: diffuse = reflectance * exp(SH(normal)), with the set's own three; specular = strength *
 gloss(normal, environment), a rendered Blinn-Phong lobe under a non-negative environment fitted to
@@ -14,6 +14,6 @@ doi:10.1109/ICCV.2009.5459428, and J. T. Barron, J. Malik (2015), doi:10.1109/TP
 (the set); J. F. Blinn (1977), doi:10.1145/563858.563893 (the lobe).
 
 Limits: no shadows and no interreflections (shadows in the physical variant only); the environment
-behind the object is unconstrained. The output derives from research data and stays under that
-data's terms.
+behind the object is unconstrained. The output derives from research data and remains under the
+terms of that data.
 """

@@ -1,4 +1,4 @@
-"""The cards of a glossy set, `README.md`: what a reader needs without the program that made it."""
+"""The cards of a glossy set, `README.md`: descriptions for readers without this program."""
 
 import shlex
 

@@ -1,7 +1,7 @@
 """The files of one object under one light at one level, in the layout of the MIT-Berkeley set.
 
-`laboratory/OBJECT` contains what is read of a photographed object, `natural/OBJECT` the same images
-as the natural folder has them, so that both readers work. 16-bit files contain linear values of
+`laboratory/OBJECT` has the files of a photographed object, `natural/OBJECT` the same images in the
+layout of the natural folder, so that both readers work. 16-bit files contain linear values of
 1/65535; original = diffuse + specular exactly, in codes.
 
 Equation: one gain for all levels of an object under a light, so that they differ in the specular
@@ -129,7 +129,7 @@ class Exposed:
         return self.strength(level) * self.gain * self.layers.gloss
 
     def specular_codes(self, level: float) -> np.ndarray:
-        """Return the codes of the specular layer, as far as the clipped original contains them.
+        """Return the codes of the specular layer, clipped like the original.
 
         Parameters
         ----------
@@ -292,7 +292,7 @@ def is_written(root: Path, name: str) -> bool:
 
 @dataclass(frozen=True)
 class ObjectRecord:
-    """What `object.json` contains, except for the checksums.
+    """The content of `object.json`, except for the checksums.
 
     Attributes
     ----------
@@ -328,7 +328,7 @@ class ObjectRecord:
 
 
 def object_record(picture: Exposed, level: float, codes: np.ndarray) -> ObjectRecord:
-    """Measure what `object.json` records.
+    """Measure the values that `object.json` records.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Making the glossy sets object by object, each folder written completely or not at all, so that an
-interrupted run can continue.
+"""Generation of the glossy sets object by object; each folder is written completely or not at all,
+so that an interrupted run can continue.
 
-`run.json` is written first and identifies the folder; a folder with anything else, or a run with
-other settings, is refused. Objects, and the physical variant, may be added to a run.
+`run.json` is written first and identifies the folder; a folder with other files, or a run with
+other settings, is rejected. Objects, and the physical variant, may be added to a run.
 """
 
 import json
@@ -105,7 +105,7 @@ def make_glossy(
 def _make_object(
     root: Path, out: Path, name: str, settings: GlossySettings, monitor: Monitor
 ) -> bool:
-    """Make the missing files of an object; whether there were any."""
+    """Make the missing files of an object; return whether there were any."""
     missing = [
         prefix
         for prefix in _prefixes(settings)

@@ -1,8 +1,8 @@
 """The specular layer without shadows under an environment or a panel, at points seen by an
 orthographic camera along -z.
 
-Problem: a Monte Carlo render leaves noise of a few per cent in the specular layer, and methods that
-remove highlights take noise for texture. Without shadows nothing has to be traced: the integral
+Problem: a Monte Carlo render leaves noise of a few per cent in the specular layer, which methods
+that remove highlights mistake for texture. Without shadows no rays have to be traced: the integral
 over the light is a sum over the pixels of the environment.
 
 Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j halfway between

@@ -32,7 +32,7 @@ from .source import Source
 
 _PANEL_DISTANCE = 4.0
 _PANEL_ANGLES = (10.0, 20.0)  # range of its angular size, degrees
-_TILTS = (8.0, 27.0)  # of normals that mirror it, degrees from the viewer
+_TILTS = (8.0, 27.0)  # of normals that reflect it to the viewer, degrees from the view direction
 _FEW = 0.02  # of the pixels
 _PANEL_SHARE = 0.75  # of the mean shading under the set's own light
 _ENVIRONMENT_ROWS = 32
@@ -216,13 +216,13 @@ def _lit(
 
 
 def _fitted(source: Source, part: _Part, residual: float, panel: PanelLight | None) -> Layers:
-    """Layers whose shading has no coefficients of its own."""
+    """Layers with coefficients fitted to their shading."""
     coefficients, misfit = fit_light(source.normal, part.shading)
     return Layers(part.shading, part.gloss, coefficients, misfit, residual, part.noise, panel)
 
 
 def _panel(surface: Surface, name: str, seed: int) -> PanelLight:
-    """A white panel that the object mirrors toward the viewer, preferably on its upper side; drawn
+    """A white panel that the object reflects toward the viewer, preferably on its upper side; drawn
     by seed and name.
     """
     rng = np.random.default_rng([seed, crc32(name.encode())])

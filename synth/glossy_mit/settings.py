@@ -7,7 +7,7 @@ from isc_core.datasets.mit_berkeley import ILLUMINATIONS
 from isc_core.errors import InputError
 
 SCHEMA_VERSION = 1
-# Each light of the set alone, and with one panel beside it.
+# Each light of the set alone, and with an additional panel.
 LIGHTS = tuple(name + panel for name in ILLUMINATIONS for panel in ("", "-area"))
 _HIGHEST_EXPONENT = 2000.0
 
@@ -27,7 +27,7 @@ class GlossySettings:
     exponent : float
         Of the normalised Blinn-Phong lobe, 1 to 2000.
     physical : bool
-        Make the variant with shadows too.
+        Whether to make the variant with shadows, too.
 
     Raises
     ------
@@ -57,7 +57,7 @@ class GlossySettings:
             raise InputError(f"the exponent must be from 1 to {_HIGHEST_EXPONENT:g}")
 
     def to_json(self) -> dict[str, Any]:
-        """Return what two runs in one folder must share: everything but `physical`."""
+        """Return the settings that two runs in one folder must share: all except `physical`."""
         shared = {key: value for key, value in asdict(self).items() if key != "physical"}
         return {"schema_version": SCHEMA_VERSION, **shared, "levels": list(self.levels)}
 

@@ -1,4 +1,4 @@
-"""One object of the MIT-Berkeley set in the generator's form: known pixels as a list, and their
+"""One object of the MIT-Berkeley set in the generator's format: known pixels as a list, and their
 frame.
 
 Limits: a pixel is used where the mask is set, the reflectance is above 0 and all heights around it

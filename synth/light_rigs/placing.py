@@ -1,7 +1,7 @@
-"""What generated lights share: places around the object, near-white colours, and the weak ambient
-light that fills shadows.
+"""Shared parts of generated lights: positions around the object, near-white colours, and the weak
+ambient light that fills shadows.
 
-Equation: a place is given by its tilt from the viewing axis and its turn from straight up,
+Equation: a direction is given by its tilt from the viewing axis and its turn from straight up,
 clockwise as seen by the viewer: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
 
 Limits: only lights on the viewer's side, with a tilt below 90 degrees, reach the visible side.

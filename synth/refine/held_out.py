@@ -1,17 +1,16 @@
-"""Whether a new light explains pixels that its fit has not seen better than the start's.
+"""Test whether a new light explains held-out pixels better than the start's.
 
 Problem: a flexible light can lower the objective on the pixels that it was fitted to.
 
-Equation: of blocks of `BLOCK` x `BLOCK` pixels inside the mask, one of `EVERY` is held out, see
-`isc_core.refinement.held_out`; their light is the start's shading. A light explains a block by the
-smoothness of the reflectance that it leaves there, q_b (`sirfs.reflectance`). With the
-differences x_b = q_b(start) - q_b(new) of n blocks, it is better if mean(x) > `_SURE` sd(x) /
-sqrt(n).
+Equation: of blocks of `BLOCK` x `BLOCK` pixels inside the mask, one in `EVERY` is held out, see
+`isc_core.refinement.held_out`; blocks are balanced by the start's shading. The score of a block
+under a light is the smoothness of its reflectance, q_b (`sirfs.reflectance`). With the differences
+x_b = q_b(start) - q_b(new) of n blocks, it is better if mean(x) > `_SURE` sd(x) / sqrt(n).
 
 Citation: Student 1908, doi:10.1093/biomet/6.1.1.
 
-Limits: those of `isc_core.refinement.held_out`. A smoother reflectance is a more probable one,
-not always a truer one.
+Limits: those of `isc_core.refinement.held_out`. A smoother reflectance is more probable, but not
+always more accurate.
 """
 
 import numpy as np

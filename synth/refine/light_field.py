@@ -16,7 +16,7 @@ from isc_core.shading.environment_map import directions
 from isc_core.shading.lights import sphere_directions
 
 _BUMPS, _CONCENTRATION = 40, 6.0
-_SPREAD, _TINT = 1.0, 0.1  # deviations of log radiance, and of the colour of all light
+_SPREAD, _TINT = 1.0, 0.1  # standard deviations of log radiance, and of the overall colour
 
 
 @dataclass(frozen=True)

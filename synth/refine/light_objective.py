@@ -1,11 +1,11 @@
-"""The objective of the light: probable reflectance, and a light near the start.
+"""The objective of the light: the prior of reflectance, and a penalty of changes of the light.
 
 Equation: f(x) = g(log D - log T E(x)) + r / 2 |x|^2, g the smoothness, parsimony and absolute terms
 of SIRFS. df/dE = -T' (dg/dA / S).
 
 Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the diffuse image is taken as exact.
+Limits: the diffuse image is assumed to be exact.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""`refine`: a result with a light whose shadows its own shape casts, or as it was.
+"""`refine`: fits a light with the cast shadows of the recovered shape, if that improves the result.
 
 Equation: see the package. With the new shading S = T E, the light of the result is the best fit L
 of log shading without shadows, visibility = S / exp(SH(normal; L)), and reflectance = diffuse / S,
@@ -39,7 +39,7 @@ class RefineOptions:
     strictness : float
         Weight r of the change of the light, > 0.
     steps : int
-        At most so many steps of the optimiser, > 0.
+        Largest number of steps of the optimiser, > 0.
     seed : int
         Of the choice of the held-out blocks.
 
@@ -95,8 +95,8 @@ def refine(
     Returns
     -------
     Refinement
-        `kept` is False, and the result the start but for a note in its settings, where the
-        objective did not fall or held-out pixels are not explained better.
+        `kept` is False, and the result is the start with a note in its settings, if the objective
+        did not decrease or held-out pixels are not explained better.
 
     Raises
     ------

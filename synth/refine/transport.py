@@ -1,4 +1,4 @@
-"""How much each pixel of an environment adds to the shading of each point of a result.
+"""Light transport from the pixels of an environment to the points of a result, with shadows.
 
 Equation: T_pj = V_pj max(0, n_p . w_j) omega_j / pi; see the package. Rays start a pixel above the
 surface.
@@ -22,7 +22,7 @@ from isc_core.shading.perspective import lifted_points, object_axis
 from ..scene.meshes import Mesh
 from ..scene.tracing import Tracer
 
-_AT_ONCE = 16  # directions
+_AT_ONCE = 16  # directions traced at a time
 _LIFT = 1.0  # pixels
 
 
@@ -48,7 +48,7 @@ def light_transport(d: Decomposition, rows: int, monitor: Monitor | None = None)
     Parameters
     ----------
     d : Decomposition
-        Its height is the surface, its normals shade.
+        Its height defines the surface, its normals the shading.
     rows : int
         Of the environment.
     monitor : Monitor, optional
@@ -60,7 +60,7 @@ def light_transport(d: Decomposition, rows: int, monitor: Monitor | None = None)
     Raises
     ------
     InputError
-        If Mitsuba is missing, or the mask has no 2 x 2 pixels that a surface could be made of.
+        If Mitsuba is missing, or the mask has no block of 2 x 2 pixels for a surface.
     Cancelled
         If the user cancels.
     """

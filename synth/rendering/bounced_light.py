@@ -1,10 +1,10 @@
 """Interreflections: light that parts of the object reflect onto each other before it reaches the
 camera.
 
-Equation: the radiance that arrives along a sampled direction which hits the object is what leaves
-from there: its direct light by one sample of each kind, and, while bounces remain, what arrives
-there along one more direction, sampled by the cosine or by the specular lobe with equal
-probability. The weights are those of `direct_light`.
+Equation: the radiance that arrives along a sampled direction which hits the object is the radiance
+reflected there: direct light by one sample of each kind, and, while bounces remain, the radiance
+along one more direction, sampled by the cosine or by the specular lobe with equal probability. The
+weights are those of `direct_light`.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 
@@ -27,7 +27,7 @@ from .reflection import Points, Reflection, cosine_density, cosine_directions
 
 @dataclass(frozen=True)
 class World:
-    """What light interacts with.
+    """The object and the lights.
 
     Attributes
     ----------

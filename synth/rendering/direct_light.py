@@ -291,7 +291,7 @@ def add_exactly(
     Parameters
     ----------
     total : Sums
-        Gets the light.
+        Receives the light.
     points : Points
         The points.
     reflection : Reflection

@@ -1,7 +1,7 @@
 """Random directions toward extended lights, and their density.
 
-Problem: the light that a point receives is an integral over the solid angle of a light; samples
-belong there.
+Problem: the light that a point receives is an integral over the solid angle of a light, so samples
+should lie there.
 
 Equation: on a panel, points are sampled uniformly by area, so that directions have the density
 r^2 / (area cos_panel) per steradian. Pixels of an environment are sampled by their light, radiance
@@ -25,7 +25,7 @@ from ..scene.lights import EnvironmentLight, Light, PanelLight
 
 @dataclass(frozen=True)
 class Seen:
-    """What M rays hit of one light.
+    """Intersections of M rays with one light.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Sampler(Protocol):
         ...
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """Return what rays hit of the light.
+        """Return the intersections of rays with the light.
 
         Parameters
         ----------
@@ -129,7 +129,7 @@ class PanelSampler:
         return toward / np.sqrt(np.einsum("...i,...i->...", toward, toward))[..., None]
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """Return what rays hit of the panel; see `Sampler`.
+        """Return the intersections of rays with the panel; see `Sampler`.
 
         Parameters
         ----------
@@ -192,7 +192,7 @@ class EnvironmentSampler:
         return np.stack([level * np.sin(turn), up, -level * np.cos(turn)], -1)
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """Return what rays hit of the environment; see `Sampler`.
+        """Return the intersections of rays with the environment; see `Sampler`.
 
         Parameters
         ----------

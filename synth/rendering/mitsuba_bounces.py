@@ -33,7 +33,7 @@ _AT_ONCE = 1 << 18  # light paths
 
 @dataclass(frozen=True)
 class World:
-    """What light interacts with.
+    """The object and the lights.
 
     Attributes
     ----------

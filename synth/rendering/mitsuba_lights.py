@@ -32,7 +32,7 @@ class WideLight(Protocol):
     """A light that fills a solid angle."""
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return what arrives along a direction.
+        """Return the light that arrives along a direction.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Environment:
         dr.make_opaque(self.rows)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return what arrives along a direction; see `WideLight`.
+        """Return the light that arrives along a direction; see `WideLight`.
 
         Parameters
         ----------
@@ -184,7 +184,7 @@ class Panel:
         dr.make_opaque(self.centre, self.right, self.up, self.normal, self.radiance, self.area)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return what arrives along a direction; see `WideLight`.
+        """Return the light that arrives along a direction; see `WideLight`.
 
         Parameters
         ----------
@@ -262,7 +262,7 @@ class Beam:
         dr.make_opaque(self.place, self.strength)
 
     def arriving(self, position: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return what arrives at a point.
+        """Return the light that arrives at a point.
 
         Parameters
         ----------

@@ -1,6 +1,7 @@
-"""One scene as plain numbers: object, material, lights and camera, and what the camera's rays hit.
+"""A scene as plain numbers: object, material, lights and camera, and the surface that the camera
+sees.
 
-`camera`, `meshes`, `materials` and `lights` describe it, `scene` holds them together, `tracing` and
+`camera`, `meshes`, `materials` and `lights` describe it, `scene` combines them, `tracing` and
 `surface` find the visible points with Mitsuba (`variant`).
 """
 

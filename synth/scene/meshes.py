@@ -156,7 +156,7 @@ def joined(first: Mesh, second: Mesh) -> Mesh:
     Returns
     -------
     Mesh
-        Where they overlap, both surfaces stay.
+        Where they overlap, both surfaces are kept.
     """
     vertices, normals, uv = (
         np.concatenate([getattr(mesh, part) for mesh in (first, second)])

@@ -4,7 +4,7 @@ Position and normal come from the single ray through each pixel's centre, so tha
 averaged over an edge and the ground truth is exact. Reflectance is averaged over the pixel's
 footprint, as in a camera, so that prints are antialiased.
 
-Limits: visibility is decided at the centre alone: silhouettes are not antialiased.
+Limits: visibility is determined only at the centre: silhouettes are not antialiased.
 """
 
 from dataclasses import dataclass

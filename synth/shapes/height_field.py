@@ -1,4 +1,4 @@
-"""A height map as a mesh that the camera sees pixel by pixel as it was measured or drawn.
+"""A height map as a mesh whose rendering reproduces the map pixel by pixel.
 
 Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H
 / 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels per unit: the mapping of

@@ -1,4 +1,5 @@
-"""Forms turned on a lathe or a potter's wheel: vases, bottles, bowls, cups, apples, pawns, eggs.
+"""Surfaces of revolution, as made on a lathe or potter's wheel: vases, bottles, bowls, cups,
+apples, pawns, eggs.
 
 Equation: the outline (r(s), y(s)), s its length, is a monotone cubic through a few points, smoothed
 by a Gaussian over s and revolved about the y axis: (r sin a, y, r cos a). Beyond a pole the outline

@@ -92,7 +92,7 @@ class MeshFile:
 
 @dataclass(frozen=True)
 class _Part:
-    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as in `Mesh` or None,
+    """One part of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as in `Mesh` or None,
     `texture` (h, w, 3) or None, `colours` (N, 3) or None; linear.
     """
 
@@ -104,7 +104,7 @@ class _Part:
 
 
 class _Beside:
-    """Access to the files that a mesh file refers to: only those in its own folder and below.
+    """Access to the files referenced by a mesh file: only those in its own folder and below.
 
     Records the references that could not be resolved.
     """
@@ -293,7 +293,7 @@ def _check_references(path: Path, beside: _Beside) -> None:
 
 
 def _part(scene: Any, node: str, kind: str) -> _Part | None:
-    """One piece at its place in the scene; None without faces."""
+    """One part at its position in the scene; None without faces."""
     transform, name = scene.graph[node]
     piece = scene.geometry[name]
     faces = np.asarray(getattr(piece, "faces", np.empty((0, 3))), dtype=np.int64)
@@ -301,7 +301,7 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
         return None
     with np.errstate(
         invalid="ignore", over="ignore"
-    ):  # non-finite vertices are refused later, with a message
+    ):  # non-finite vertices are rejected later, with a message
         vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
     if np.linalg.det(transform[:3, :3]) < 0:
         faces = faces[:, ::-1]

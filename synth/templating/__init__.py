@@ -1,4 +1,4 @@
-"""Text files from Jinja2 templates. The templates lie in a folder `templates` beside their code."""
+"""Text files from Jinja2 templates, which are in a folder `templates` next to their code."""
 
 from functools import cache
 from pathlib import Path
@@ -17,7 +17,7 @@ def render(module: str, template: str, **values: object) -> str:
     Parameters
     ----------
     module : str
-        `__file__` of the caller; the template is in the folder `templates` beside it.
+        `__file__` of the caller; the template is in the folder `templates` next to it.
     template : str
         File name. Values are escaped in templates that end in `.html.j2`.
     **values : object

@@ -1,4 +1,4 @@
-"""A validation, from a data set's folder to its outcome: run, summarise, check and judge."""
+"""A validation, from a data set's folder to its outcome: run, summarise and check."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,11 +29,11 @@ def validate(
     root : Path
         Folder of a data set that `isc synth` wrote.
     options : ValidationOptions
-        What to run.
+        Stages and settings.
     bounds : sequence of Bound
-        Regression bounds to judge by.
+        Regression bounds.
     renders : int
-        How many scenes to render again as a check.
+        Number of scenes to render again as a check.
     command : str
         The command that repeats the run, for the report.
     monitor : Monitor

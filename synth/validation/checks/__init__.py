@@ -1,1 +1,1 @@
-"""Whether the data set itself is correct: statistical tests of its renders."""
+"""Checks of the data set itself: statistical tests of its renders."""

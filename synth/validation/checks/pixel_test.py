@@ -52,7 +52,7 @@ class PixelTestOptions:
     level : float
         Probability that a correct image is rejected, in (0, 1).
     tolerance : float
-        Differences up to this are no error, in the image's unit, >= 0. Where the variance is 0, the
+        Differences up to this are ignored, in the image's unit, >= 0. Where the variance is 0, the
         tolerance alone decides.
     samples : float
         Samples behind each estimated variance, >= 2; infinite for a known one.
@@ -89,7 +89,7 @@ class PixelTestResult:
     threshold : float
         Threshold of `worst`.
     beyond, tested : int
-        How many values exceed it, and how many there are.
+        Number of values that exceed it, and of all values.
     where : tuple of int
         Row, column (and channel) of the worst value.
     bias, spread : float
@@ -223,7 +223,7 @@ def keep_evidence(
     Raises
     ------
     InputError
-        If the folder holds other files or cannot be written.
+        If the folder has other files or cannot be written.
     """
     if result.accepted:
         return None

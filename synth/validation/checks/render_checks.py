@@ -40,7 +40,7 @@ class RenderCheck:
     Attributes
     ----------
     scene, what : str
-        The scene, and what is checked.
+        The scene, and the check.
     error, limit : float
         The largest error, and its limit.
     maps : mapping of str to (H, W) ndarray
@@ -75,7 +75,7 @@ def check_dataset(
     folders : sequence of Path
         The scenes.
     renders : int
-        How many to render again, drawn by `seed`.
+        Number of scenes to render again, drawn by `seed`.
     seed : int
         Seed of the draw.
     monitor : Monitor
@@ -86,7 +86,7 @@ def check_dataset(
     checks : tuple of RenderCheck
         The checks.
     notes : tuple of str
-        What could not be checked.
+        Checks that were not possible.
 
     Raises
     ------
@@ -206,7 +206,7 @@ def check_shading(folder: Path, level: float) -> RenderCheck:
 
 
 def read_recipe(folder: Path) -> Recipe:
-    """Read how a scene was made from its `scene.json`, except for the sensor.
+    """Read the recipe of a scene, except for the sensor, from its `scene.json`.
 
     Parameters
     ----------

@@ -1,11 +1,11 @@
 """Regression bounds: the worst value of a figure that a run may have.
 
-A bound is violated only if the whole interval of the figure lies beyond it, so that the draw of the
-scenes alone rejects nothing. Slices of fewer than `FEWEST` scenes are not judged. Bounds taken from
-a run lie beyond its interval by the metric's margin.
+A bound is violated only if the whole interval of the figure lies beyond it, so that no run is
+rejected because of the choice of scenes alone. Slices of fewer than `FEWEST` scenes are not
+compared. Bounds taken from a run lie beyond its interval by the metric's margin.
 
-Limits: bounds hold for the kind of scenes that they were taken from; another data set needs its
-own.
+Limits: bounds apply to the kind of scenes from which they were derived; other data sets need other
+bounds.
 """
 
 import json
@@ -143,7 +143,7 @@ def bounds_from(figures: Sequence[Figure]) -> tuple[Bound, ...]:
     Returns
     -------
     tuple of Bound
-        For slices that exist in every data set and are large enough to judge.
+        For slices that exist in every data set and are large enough.
     """
     return tuple(
         Bound(
@@ -171,7 +171,7 @@ def judge(bounds: Sequence[Bound], figures: Sequence[Figure]) -> tuple[Verdict, 
     Returns
     -------
     tuple of Verdict
-        One per bound that could be judged.
+        One per bound that could be compared.
     """
     known = {
         (f.stage, f.metric.name, f.group.kind, f.group.value): f

@@ -39,7 +39,7 @@ class Figure:
 def metrics_of(
     stages: Sequence[AnyStage], scenes: Sequence[SceneResult]
 ) -> tuple[tuple[str, Metric], ...]:
-    """Return stage and metric of everything that was measured, the chain last.
+    """Return stage and metric of all measurements, the chain last.
 
     Parameters
     ----------

@@ -35,14 +35,14 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class ValidationOptions:
-    """What a validation runs.
+    """Options of a validation.
 
     Attributes
     ----------
     split : str or None
         The split to run, None for all.
     scenes : int
-        How many scenes, drawn by `seed`; 0 for all.
+        Number of scenes, drawn by `seed`; 0 for all.
     stages : tuple of Stage
         The stages; empty for all.
     settings : StageOptions
@@ -50,7 +50,7 @@ class ValidationOptions:
     seed : int
         Seed of all random draws.
     threads : int
-        How many scenes run at once, 0 for one per core.
+        Number of scenes in parallel, 0 for one per core.
     """
 
     split: str | None = None
@@ -93,7 +93,7 @@ class SceneResult:
     chain : ChainScores or None
         None unless both of its stages were run.
     refused : str
-        Why the scene could not be run, empty if it could.
+        Reason why the scene could not be run; empty if it could.
     """
 
     facts: SceneFacts
@@ -159,7 +159,7 @@ def run_scenes(
     folders : sequence of Path
         The scenes.
     options : ValidationOptions
-        What to run.
+        Stages and settings.
     monitor : Monitor
         Progress and cancellation.
 
@@ -209,7 +209,7 @@ def measure_scene(
     Returns
     -------
     SceneResult
-        The scores, or why the scene could not be run.
+        The scores, or the reason why the scene could not be run.
 
     Raises
     ------
@@ -252,7 +252,7 @@ def side_by_side(
     items : sequence
         The items.
     threads : int
-        How many at once, 0 for one per core.
+        Number in parallel, 0 for one per core.
     what : str
         Name of the work in progress reports.
     monitor : Monitor
@@ -266,7 +266,7 @@ def side_by_side(
     Raises
     ------
     Exception
-        What a task raised.
+        Any exception of a task.
     Cancelled
         If the user cancels.
     """
@@ -293,7 +293,7 @@ def side_by_side(
 
 
 def _time_left(seconds: float, done: int, total: int) -> str:
-    """How many scenes are done and, after the first, the estimated remaining time."""
+    """Number of finished scenes and, after the first, the estimated remaining time."""
     if not done:
         return f"{total} scenes"
     left = seconds / done * (total - done)

@@ -16,7 +16,7 @@ average over orders).
 
 No stage can reduce the error that remains with all truths: rendered shading is not exp(SH(normal))
 (cast shadows, hard lights), and normals are finite differences of heights on the pixel grid. The
-second part vanishes with exact normals, which is measured too. Errors that a truth defines (height
+second part vanishes with exact normals, which is measured, too. Errors that a truth defines (height
 and normal by the shape, light by the light) are shared among the other truths only.
 
 Limits: shares are of errors of typical scenes (geometric mean); truths are substituted at the
@@ -92,7 +92,7 @@ class ChainScores:
 
 @dataclass(frozen=True)
 class Share:
-    """What one ground truth contributes.
+    """The contribution of one ground truth.
 
     Attributes
     ----------

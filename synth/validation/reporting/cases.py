@@ -1,5 +1,5 @@
-"""The best, median and worst scene of each stage, run once more for their pictures and maps, so
-that the measurement does not have to keep all of them.
+"""The best, median and worst scene of each stage, run again for their pictures and maps, so that
+these need not be kept for all scenes.
 """
 
 from collections.abc import Sequence
@@ -167,7 +167,7 @@ def write_evidence(
     Parameters
     ----------
     folder : Path
-        Gets `truth.exr` and `STAGE.exr`; for the chain, one file per stage of it.
+        Receives `truth.exr` and `STAGE.exr`; for the chain, one file per stage.
     scene : SceneResult
         The scene.
     stage : str

@@ -1,4 +1,4 @@
-"""The findings of a validation as sentences: the verdict, and what limits each stage most."""
+"""The findings of a validation as sentences: the verdict, and the largest error sources."""
 
 from collections.abc import Sequence
 

@@ -37,7 +37,7 @@ def require_writable_report(folder: Path) -> None:
     Raises
     ------
     InputError
-        If it cannot, for example because the folder holds other files.
+        If it cannot, for example because the folder has other files.
     """
     require_writable(folder, report_files(folder))
 

@@ -1,4 +1,4 @@
-"""Numbers as the report shows them: three significant digits, with their interval."""
+"""Formatting of numbers in the report: three significant digits, with their interval."""
 
 from ..measurement.bootstrap import Interval
 

@@ -25,7 +25,7 @@ class TextTable:
     rows : tuple of tuple of str
         The cells.
     text_columns : int
-        How many columns hold text, from the left; the others hold numbers.
+        Number of text columns, from the left; the others are numeric.
     """
 
     heading: tuple[str, ...]

@@ -1,1 +1,1 @@
-"""The stages of a decomposition, each with a way to run it, to score it and to show its result."""
+"""The stages of a decomposition, each with functions to run it, score it and show its result."""

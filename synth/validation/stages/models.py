@@ -1,5 +1,5 @@
-"""The stage "models": every model on a glossy photo, beside plain SIRFS on the same photo and SIRFS
-on the true diffuse layer.
+"""The stage "models": all models on a glossy photo, compared with plain SIRFS on the same photo and
+SIRFS on the true diffuse layer.
 
 Each model runs as in `isc decompose` (`isc_core.decomposition.solve`), and is scored like the stage
 "sirfs". Errors are relative to plain SIRFS on the same scene, so that a mean over scenes is a
@@ -103,8 +103,8 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
         )
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
-    # What is predicted from the photo also serves the run on its diffuse layer.
-    # Without fine relief, so that models that share a shape share its normals.
+    # Predictions from the photo are also used for its diffuse layer. Without fine relief, so that
+    # models that share a shape share its normals.
     usual = Settings(
         "sirfs", options.separator, options.illumination, detail=0, threads=options.threads
     )

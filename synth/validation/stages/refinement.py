@@ -1,11 +1,11 @@
 """The stage "refine": a result before and after the refinement of its gloss.
 
-The photo is decomposed as by `isc decompose`, with all highlights that colour and form find, and
-its gloss is refined. Errors are those of the refined result over those of the start, so that a mean
-over scenes is a paired comparison; a start that stays counts as 1. They are undefined where no
-highlight was separated.
+The photo is decomposed as by `isc decompose`, with all highlights that are found by colour and
+shape, and its gloss is refined. Errors are those of the refined result over those of the start, so
+that a mean over scenes is a paired comparison; the ratio is 1 if the start is kept. They are
+undefined where no highlight was separated.
 
-Limits: those of `isc_core.refinement`. The stage is run by name only.
+Limits: those of `isc_core.refinement`. The stage is run only on request.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class RefinementScores:
     photo : float or None
         Mean square error of the diffuse layer with the lobe's image, against the photo.
     gloss : float or None
-        Of the lobe's image, against the true specular layer; undefined on matt objects.
+        Of the lobe's image, against the true specular layer; undefined on diffuse objects.
     normal : float or None
         Mean angle between normals where highlights were separated.
     reflectance : float or None

@@ -50,7 +50,7 @@ _BRIGHTEST = 50.0  # log shading: beyond it exp overflows float32
 
 
 def run_sirfs(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Estimate:
-    """Solve for what is not given.
+    """Solve for the quantities that are not given.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""What all stages of a validation share: inputs, options, metrics and the stage itself.
+"""Types shared by all stages of a validation: inputs, options, metrics and the stage itself.
 
-A stage is one step from photo to scene. It gets the results of the stages before it, or their
-ground truth where it is measured in isolation. To add one: a module with its `run`, `score`,
-`show` and `maps`, and an entry in `registry.all_stages`.
+A stage is one step from photo to scene. Its inputs are the results of the preceding stages, or
+their ground truth if it is measured in isolation. A new stage needs a module with its `run`,
+`score`, `show` and `maps`, and an entry in `registry.all_stages`.
 """
 
 from collections.abc import Callable, Mapping
@@ -23,7 +23,7 @@ from ...capture.truth import GroundTruth
 # Which ground truth can replace an estimate of the chain.
 Truth = Literal["diffuse", "shape", "light"]
 
-# Darker than half a 16-bit code counts as black: neither colour nor shape is defined there.
+# Values below half a 16-bit code are treated as black: neither colour nor shape is defined there.
 BLACK = 0.5 / 65535
 
 
@@ -66,7 +66,7 @@ class StageOptions:
 
 @dataclass(frozen=True)
 class StageInputs:
-    """What a stage gets.
+    """The inputs of a stage.
 
     Attributes
     ----------
@@ -112,7 +112,7 @@ class Metric:
         Distance of an updated bound from the measured interval: relative for geometric means,
         otherwise in the metric's unit.
     given_by : tuple of str
-        Ground truths that define the result, so that the metric says nothing under them.
+        Ground truths that define the result, so that the metric is meaningless under them.
     """
 
     name: str
@@ -143,7 +143,7 @@ class Stage(Generic[Answer, Scored]):
     Attributes
     ----------
     name, title : str
-        As options and report name it.
+        Names in options and report.
     needs : tuple of str
         Ground truths that the stage gets when it is measured in isolation.
     metrics : tuple of Metric
@@ -200,14 +200,14 @@ AnyStage = Stage[Any, Any]
 def stage_inputs(
     truth: GroundTruth, truths: tuple[Truth, ...], diffuse: np.ndarray | None = None
 ) -> StageInputs:
-    """Return what a stage gets of a scene under the given ground truths.
+    """Return the inputs of a stage for a scene under the given ground truths.
 
     Parameters
     ----------
     truth : GroundTruth
         The scene.
     truths : tuple of str
-        Which ground truths replace estimates.
+        The ground truths that replace estimates.
     diffuse : (H, W, 3) ndarray, optional
         Estimated diffuse layer, used unless "diffuse" is among `truths`.
 
