@@ -102,7 +102,7 @@ def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_arrows_between_packages_point_one_way(package: str) -> None:
+def test_dependencies_between_packages_have_one_direction(package: str) -> None:
     wrong = [
         f"{where(path, node)} imports {name}"
         for path in sources(package)
@@ -203,7 +203,7 @@ ROOMS = (
 )
 
 
-def test_the_core_follows_the_way_of_a_photo() -> None:
+def test_imports_of_the_core_follow_the_pipeline() -> None:
     folders = {path.parent.name for path in (ROOT / "isc_core").glob("*/__init__.py")}
     assert folders == set(ROOMS)
     wrong = [
@@ -301,7 +301,7 @@ def test_functions_are_short() -> None:
     assert np.percentile(list(lengths.values()), 90) <= USUAL_FUNCTION
 
 
-def test_every_module_says_what_it_is() -> None:
+def test_every_module_has_a_docstring() -> None:
     silent = [
         str(path.relative_to(ROOT))
         for path in sources(*PACKAGES)
@@ -310,7 +310,7 @@ def test_every_module_says_what_it_is() -> None:
     assert not silent, "\n".join(silent)
 
 
-def test_every_public_function_says_what_it_does() -> None:
+def test_every_public_function_has_a_docstring() -> None:
     silent = [
         f"{where(path, node)} {node.name}"
         for path in sources(*PACKAGES)

@@ -116,7 +116,7 @@ def test_whole_photos_and_objects_do_not_replace_each_other(
     assert "leave out --each" in str(rows(whole / "failures.jsonl")[0]["reason"])
 
 
-def test_a_manifest_says_which_photos_have_several(shelf: Path, tmp_path: Path) -> None:
+def test_a_manifest_sets_each_per_photo(shelf: Path, tmp_path: Path) -> None:
     lines = [{"image": "shelf.png", "each": True}, {"image": "shelf.png", "name": "both"}]
     (shelf / "list.jsonl").write_text("\n".join(map(json.dumps, lines)))
     out = tmp_path / "out"

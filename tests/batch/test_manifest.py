@@ -16,7 +16,7 @@ def items(path: Path, text: str | bytes) -> list[BatchItem]:
     return list(Manifest(str(path), ImageRecipe()))
 
 
-def test_both_kinds_say_the_same(tmp_path: Path) -> None:
+def test_both_formats_give_the_same_items(tmp_path: Path) -> None:
     table = items(
         tmp_path / "a.csv",
         "image,mask,name,max-size,full_size,options\ncup.png,m/cup.png,tasse,128,yes,\n"
@@ -73,7 +73,7 @@ def test_names_of_files_may_be_any_bytes(tmp_path: Path) -> None:
         ("a.jsonl", '{"image": "x", "seed": ' + "9" * 5000 + "}\n", "is not JSON"),
     ],
 )
-def test_a_mistake_is_one_line_that_tells_where(
+def test_a_mistake_is_one_line_with_its_position(
     tmp_path: Path, name: str, text: str, complaint: str
 ) -> None:
     with pytest.raises(InputError) as caught:

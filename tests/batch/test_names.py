@@ -86,7 +86,7 @@ def test_a_manifest_cannot_give_names_that_lead_elsewhere(name: str) -> None:
         check_given(name, "here")
 
 
-def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
+def test_equal_names_are_made_unique_in_any_order() -> None:
     items = [BatchItem(f"{folder}/front.png") for folder in "abcdefgh"] + [
         BatchItem("a/Front.jpg"),
         BatchItem("a/back.png"),
@@ -107,12 +107,12 @@ def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
     assert {item: again.name(item) for item in shuffled} == given_names
 
 
-def test_a_name_that_nobody_else_wants_is_the_files() -> None:
+def test_a_unique_name_is_that_of_the_file() -> None:
     item = BatchItem("photos/cup.png")
     assert Names([item, BatchItem("photos/jug.png")]).name(item) == "cup"
 
 
-def test_a_file_cannot_take_the_name_that_a_hash_gives() -> None:
+def test_a_file_cannot_collide_with_a_hashed_name() -> None:
     pair = [BatchItem("a/cup.png"), BatchItem("b/cup.png")]
     taken = str(Names(pair).name(pair[0]))
     three = [*pair, BatchItem(f"c/{taken}.png")]

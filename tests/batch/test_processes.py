@@ -24,7 +24,7 @@ from tests.core.command_line import isc_command, run_isc, through_terminal
 
 
 @pytest.mark.slow
-def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
+def test_images_that_hang_or_kill_their_worker_are_reported_and_the_rest_is_done(
     tmp_path: Path,
 ) -> None:
     for name in ("good1", "good2", "hang", "kill", "kill_once"):

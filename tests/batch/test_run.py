@@ -40,7 +40,7 @@ def files_of(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-def test_good_images_are_made_and_the_bad_one_is_told(
+def test_good_images_are_decomposed_and_the_bad_one_is_reported(
     made: Path, first_run: Path, tmp_path: Path
 ) -> None:
     assert {path.name for path in made.iterdir() if path.is_dir()} == {
@@ -128,7 +128,7 @@ def test_two_runs_into_one_folder(made: Path, photos: Path) -> None:
     assert run_batch(batch(photos, output=made))[SKIPPED] == 3
 
 
-def test_nobodys_files_are_replaced(photos: Path, tmp_path: Path) -> None:
+def test_foreign_files_are_never_replaced(photos: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     (output / "one").mkdir(parents=True)
     (output / "one" / "diary.txt").write_text("mine")
@@ -232,7 +232,7 @@ def test_more_pixels_than_allowed(photos: Path, tmp_path: Path) -> None:
     assert "--max-pixels" in str(rows(tmp_path / "out" / "failures.jsonl")[0]["reason"])
 
 
-def test_a_fault_of_the_program_is_told_and_stops_nothing(tmp_path: Path) -> None:
+def test_an_internal_error_is_reported_and_stops_nothing(tmp_path: Path) -> None:
     for name in ("fault", "full", "good"):
         (tmp_path / f"{name}.png").touch()
     counts = run_batch(batch(tmp_path / "*.png", output=tmp_path / "out"), task=obedient)
@@ -247,7 +247,7 @@ def test_a_fault_of_the_program_is_told_and_stops_nothing(tmp_path: Path) -> Non
     assert "memory" in reasons["full"]
 
 
-def test_a_step_that_looks_at_the_clock_is_stopped(tmp_path: Path) -> None:
+def test_a_step_that_checks_the_clock_is_stopped(tmp_path: Path) -> None:
     (tmp_path / "poll.png").touch()
     plan = batch(tmp_path / "poll.png", output=tmp_path / "out", timeout=0.2)
     assert run_batch(plan, task=obedient) == Counter({FAILED: 1})

@@ -61,7 +61,7 @@ def test_the_share_of_a_step_that_heights_have() -> None:
     np.testing.assert_allclose(step_shares([body]), 0.25)
 
 
-def test_the_regression_ranks_by_what_tells() -> None:
+def test_the_regression_ranks_by_the_informative_feature() -> None:
     rng = np.random.default_rng(0)
     values = rng.normal(size=(4000, 3))
     labels = values[:, 1] + 0.3 * rng.normal(size=4000) > 1

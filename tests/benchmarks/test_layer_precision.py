@@ -38,7 +38,7 @@ def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
 @pytest.mark.parametrize(
     ("name", "share"), [("80 %", 0.8), ("50 %", 0.5), ("mean", 1.0), ("mirrored light", 1.0)]
 )
-def test_as_much_light_is_taken_as_is_said(name: str, share: float) -> None:
+def test_the_stated_share_of_light_is_removed(name: str, share: float) -> None:
     plain, mask = answer()
     layer = np.where(mask[..., None], np.random.default_rng(0).random((*mask.shape, 3)), 0)
     approximate = APPROXIMATIONS[name](layer, mask, plain)

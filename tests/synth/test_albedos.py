@@ -118,7 +118,7 @@ def test_a_plate_prints_at_the_given_place_also_across_the_seam() -> None:
     assert cover[10].max() == 0
 
 
-def test_letters_are_as_high_and_wide_as_asked() -> None:
+def test_letters_have_the_requested_height_and_width() -> None:
     for face in FACES:
         plate = Plate(256)
         plate.centred("HEL", 0.8, 0.6, 0.2, face, 2.0)

@@ -310,7 +310,7 @@ def test_full_shadow_is_black_and_nothing_is_negative(waisted: Seen) -> None:
     assert not result.shading[waisted.surface.normal[:, 2] > 0.5].any()
 
 
-def test_the_object_stands_in_its_own_light(waisted: Seen) -> None:
+def test_the_object_shadows_itself(waisted: Seen) -> None:
     above = DirectionalLight(toward(0, 1, 0.05), np.ones(3))
     result = lit(waisted, materials()["lambert"], above)
     lambertian = np.maximum(waisted.surface.normal @ above.direction, 0) / np.pi

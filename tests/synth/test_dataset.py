@@ -228,7 +228,7 @@ def test_the_same_seed_gives_the_same_bytes(
     )
 
 
-def test_an_interrupted_run_goes_on(
+def test_an_interrupted_run_continues(
     root: Path, made: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folders = list_scenes(root)
@@ -338,7 +338,7 @@ def test_foreign_folders_are_refused_and_left_alone(tmp_path: Path) -> None:
     assert contents(tmp_path) == before
 
 
-def test_a_scene_folder_with_somebody_elses_file_is_kept(root: Path) -> None:
+def test_a_scene_folder_with_a_foreign_file_is_kept(root: Path) -> None:
     folder = list_scenes(root)[0]
     (folder / "notes.txt").write_text("mine")
     (folder / "maps.exr").write_bytes(b"")

@@ -253,7 +253,7 @@ def test_the_frame_and_the_crop_are_the_sets_own(made: Path, dataset: Path) -> N
 
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("level", [10, 25, 50])
-def test_layers_add_up_and_hold_the_share_asked_for(made: Path, level: float, light: str) -> None:
+def test_layers_add_up_and_have_the_requested_share(made: Path, level: float, light: str) -> None:
     found = pictures(made / root_name(level, light))
     original, diffuse, specular = (
         found[name].astype(int) for name in ("original", "diffuse", "specular")
@@ -342,7 +342,7 @@ def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_p
     assert a[f"level-25_natural-area/{png}"] != c[f"level-25_natural-area/{png}"]
 
 
-def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
+def test_an_interrupted_run_continues_and_a_finished_one_is_unchanged(
     small: Path, tmp_path: Path
 ) -> None:
     settings = GlossySettings(levels=(50.0,))
@@ -366,7 +366,7 @@ def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
     ).stat().st_mtime_ns == lately
 
 
-def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path: Path) -> None:
+def test_the_physical_variant_is_separate_and_has_shadows(small: Path, tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     settings = GlossySettings(levels=(25.0,), samples=16, physical=True)
     make_glossy(small, tmp_path / "out", GlossySettings(levels=(25.0,), samples=16))
@@ -398,7 +398,7 @@ def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path
 # --- bad input ------------------------------------------------------------------------------------
 
 
-def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -> None:
+def test_foreign_folders_are_not_changed(small: Path, tmp_path: Path) -> None:
     settings = GlossySettings(levels=(25.0,))
     foreign, file = tmp_path / "foreign", tmp_path / "file"
     foreign.mkdir()

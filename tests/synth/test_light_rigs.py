@@ -87,7 +87,7 @@ def test_every_draw_lights_what_the_viewer_sees(name: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", INVENTED)
-def test_invented_lights_are_nearly_white_yet_not_all_alike(name: str) -> None:
+def test_generated_lights_are_nearly_white_but_not_equal(name: str) -> None:
     shading = np.array([ball(lights).mean(0) for lights in draws(name)])
     tint = shading / shading.mean(1, keepdims=True)
     assert np.abs(tint - 1).max() < 0.1

@@ -64,7 +64,7 @@ def test_a_panel_seen_head_on_has_the_irradiance_of_a_rectangle() -> None:
     )
 
 
-def test_a_panel_faces_the_origin_with_the_size_asked_for_and_stays_upright() -> None:
+def test_a_panel_faces_the_origin_with_the_requested_size_and_stays_upright() -> None:
     panel = panel_toward_origin((2, 3, 4), (0.5, 1.5), WARM)
     np.testing.assert_allclose(panel.normal, -np.array([2, 3, 4]) / np.sqrt(29), atol=1e-12)
     np.testing.assert_allclose(
@@ -76,7 +76,7 @@ def test_a_panel_faces_the_origin_with_the_size_asked_for_and_stays_upright() ->
     assert panel_toward_origin((0, 5, 0), (1, 1), WARM).area == pytest.approx(1)
 
 
-def test_a_panel_that_looks_away_gives_no_light() -> None:
+def test_a_panel_that_faces_away_gives_no_light() -> None:
     panel = panel_toward_origin((0, 0, 3), (1, 1), WARM)
     turned = PanelLight(panel.centre, panel.up, panel.right, panel.radiance)
     assert lights_as_environment((turned,), 32).max() == 0

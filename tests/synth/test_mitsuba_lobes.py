@@ -380,7 +380,7 @@ def test_few_samples_still_have_a_variance(samples: int) -> None:
     assert (found.specular_variance > 0).mean() > 0.9
 
 
-def test_it_stops_when_asked_to() -> None:
+def test_it_stops_when_cancelled() -> None:
     kernels_or_skip()
     surface, tracer = seen(ball(), MATERIALS["ggx .5"][0])
     with pytest.raises(Cancelled):

@@ -56,7 +56,7 @@ def test_a_normal_law_in_place_of_students_rejects_right_images() -> None:
     assert all(rejected)
 
 
-def test_z_of_pixels_is_normal_whatever_the_number_of_samples() -> None:
+def test_z_of_pixels_is_normal_for_any_number_of_samples() -> None:
     difference, variance = noisy(np.random.default_rng(3), (200, 200), 5)
     z = verdict(difference, variance, samples=5).z
     np.testing.assert_allclose(

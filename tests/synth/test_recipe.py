@@ -133,7 +133,7 @@ def test_the_object_fills_the_picture(perspective: bool) -> None:
             assert abs(x.max() + x.min()) < 1e-9 and abs(y.max() + y.min()) < 1e-9
 
 
-def test_a_camera_sees_all_of_a_mesh_that_comes_near() -> None:
+def test_a_camera_frames_a_mesh_that_is_near_it() -> None:
     mesh = build(RECIPE).mesh
     near = camera_around(mesh, 64, 0.9, perspective=True)
     assert near.pixels_per_unit < camera_around(mesh, 64, 0.9).pixels_per_unit * 1.2

@@ -140,7 +140,7 @@ def test_a_refined_result_keeps_every_identity_and_its_files(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_start_stays_where_there_is_nothing_to_gain() -> None:
+def test_the_start_is_kept_if_it_is_optimal() -> None:
     start = dome(96)
     done = refine(start)
     assert not done.kept

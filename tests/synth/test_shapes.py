@@ -223,7 +223,7 @@ def test_every_kind_of_relief_is_there_and_moderate(style: str) -> None:
     assert 0.01 < height.std() < 0.3
 
 
-def test_smooth_fields_have_mean_0_variance_1_and_the_asked_wavelength() -> None:
+def test_smooth_fields_have_mean_0_variance_1_and_the_requested_wavelength() -> None:
     line = np.stack([np.linspace(0, 40, 4001), np.zeros(4001)], -1)
     fields = np.stack(
         [smooth_field(line, np.random.default_rng(seed), 0.5, spread=0) for seed in range(60)]

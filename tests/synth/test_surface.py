@@ -142,7 +142,7 @@ def test_reflectance_is_not_taken_from_the_background() -> None:
     np.testing.assert_allclose(surface.reflectance.albedo[~near], 0)
 
 
-def test_seeing_nothing_is_the_users_mistake() -> None:
+def test_an_object_out_of_view_is_an_input_error() -> None:
     mesh = ball(31, 0.1)
     away = Mesh(mesh.vertices + (50, 0, 0), mesh.normals, mesh.uv, mesh.faces)
     with pytest.raises(InputError, match="not in view"):

@@ -173,7 +173,9 @@ def test_a_folder_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
     assert "isc synth -o DIR" in refusal(capsys)
 
 
-def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_makes_scenes_and_can_be_continued(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     out = tmp_path / "set"
     loud = [argument for argument in QUICK if argument != "--quiet"]

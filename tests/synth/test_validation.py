@@ -155,7 +155,7 @@ def test_doing_nothing_has_a_ratio_of_one_and_all_highlights_as_error() -> None:
     assert scores.lmse_specular == pytest.approx(1)
 
 
-def test_confidence_that_knows_the_error_ranks_and_removes_it() -> None:
+def test_a_perfect_confidence_ranks_and_removes_the_error() -> None:
     truth = sphere()
     squared = np.square(truth.specular).mean(axis=2)
     knowing = Separation(truth.image, 0 * truth.image, truth.residual, -squared)
@@ -220,7 +220,7 @@ def test_what_is_given_is_kept(grey: bool) -> None:
     assert len(show_sirfs(truth, light_known)) == 9
 
 
-def test_a_plane_goes_on_outside_the_mask_as_a_plane() -> None:
+def test_a_plane_is_extended_outside_the_mask_as_a_plane() -> None:
     rows, columns = np.indices((21, 21))
     plane = 0.3 * rows - 0.7 * columns
     mask = (rows > 5) & (rows < 15) & (columns > 5) & (columns < 15)
@@ -258,7 +258,7 @@ def test_the_budget_is_the_mean_over_orders_and_adds_up() -> None:
     assert sum(share.share.value for share in found.shares) + found.rest.value == pytest.approx(1)
 
 
-def test_a_stage_that_causes_nothing_gets_nothing() -> None:
+def test_a_stage_without_error_has_no_share() -> None:
     scenes = [
         chain({frozenset(t): 0.2 if "diffuse" in t else 0.8 for t in COMBINATIONS})
         for _ in range(3)
@@ -284,7 +284,7 @@ def test_truths_that_hand_an_error_over_have_no_share_of_it() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("geometric", [False, True])
-def test_intervals_hold_the_mean_about_as_often_as_they_say(geometric: bool) -> None:
+def test_intervals_have_the_nominal_coverage(geometric: bool) -> None:
     rng = np.random.default_rng(11)
     held = 0
     for trial in range(300):

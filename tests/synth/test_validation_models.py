@@ -272,7 +272,7 @@ def test_means_and_shares_follow_from_the_scenes() -> None:
     )
 
 
-def test_no_share_of_a_gain_that_is_not_there_and_no_interval_of_one_that_is_not_sure() -> None:
+def test_there_is_no_share_of_a_missing_gain_and_no_interval_of_an_insignificant_one() -> None:
     diffuse = tuple(scene(f"m{k}", 1.0, 1.0, model="lambert") for k in range(2))
     mixed = (scene("a", 0.2, 0.5, model="ggx"), scene("b", 1.3, 1.2, model="ggx"))
     shares = {g.group.value: g.share for g in all_gains(diffuse + mixed, 0) if g.error == "average"}

@@ -29,7 +29,7 @@ def test_the_variant_fits_the_machine() -> None:
     assert load_mitsuba().variant() == expected
 
 
-def test_without_mitsuba_the_message_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_mitsuba_the_message_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     with pytest.raises(InputError, match="`pip install 'mitsuba>=.* 'drjit>="):
         load_mitsuba()
@@ -60,6 +60,6 @@ def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package
     assert "libllvm19" in done.stdout
 
 
-def test_a_fast_machine_has_nothing_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_there_is_no_advice_on_a_fast_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(variant, "has_llvm", lambda: True)
     assert slower_without() == ""

@@ -26,7 +26,7 @@ ROOM = np.linspace(0.2, 1.8, 32)[:, None, None] * np.ones((32, 64, 3))
 
 
 @pytest.mark.parametrize("kind", list(ReliefKind))
-def test_each_octave_of_a_relief_is_as_steep_as_asked(kind: ReliefKind) -> None:
+def test_each_octave_of_a_relief_has_the_requested_slope(kind: ReliefKind) -> None:
     wanted = (0.12, 0.05, 0.08)
     found = draw_relief(kind, wanted, np.random.default_rng(5), 128)
     spectrum = np.fft.fft2(found.height)

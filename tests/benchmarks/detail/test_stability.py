@@ -45,7 +45,7 @@ def test_last_digits_change_the_photo_and_little(monkeypatch: pytest.MonkeyPatch
     assert np.allclose(seen[0], seen[1], rtol=1e-6, atol=0)
 
 
-def test_the_ball_has_the_area_asked_for_and_both_halves_vary() -> None:
+def test_the_ball_has_the_requested_area_and_both_halves_vary() -> None:
     photo = stability.ball(0.02)
     assert photo.mask.sum() == pytest.approx(20000, rel=0.05)
     middle = photo.mask.shape[1] // 2

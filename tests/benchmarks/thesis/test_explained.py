@@ -153,7 +153,7 @@ def test_figures_are_made_with_their_titles_apart_and_in_the_picture(
             assert min(overlap) < 1
 
 
-def test_what_cannot_be_made_again_says_why() -> None:
+def test_what_cannot_be_reproduced_has_a_reason() -> None:
     for name in ("figure-1.1", "figure-3.1"):
         assert ITEMS[name].make is None
         assert len(ITEMS[name].reason) > 20
@@ -236,7 +236,7 @@ def test_closed_forms_look_as_their_shape_and_light_say() -> None:
     )
 
 
-def test_chance_is_told_from_difference() -> None:
+def test_chance_is_distinguished_from_a_difference() -> None:
     random = np.random.default_rng(2)
     alike = random.dirichlet(np.ones(BINS), (8, 2, len(FILTERS)))
     apart = alike.copy()
@@ -265,7 +265,7 @@ def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
             assert applications.degrees_between(light, direction) < 1, name
 
 
-def test_edits_do_what_was_asked_for_and_nothing_else(context: Context) -> None:
+def test_edits_change_only_what_was_requested(context: Context) -> None:
     answer = made("figure-4.50", context)
     diffuse, specular = (
         column(answer, f"of the {layer} layer (%)") for layer in ("diffuse", "specular")

@@ -142,7 +142,7 @@ def test_rows_are_computed_once_and_only_for_the_same_run(tmp_path: Path) -> Non
     assert len(calls) == 6, "a damaged file has to be computed anew"
 
 
-def test_rows_are_not_begun_once_somebody_cancelled(tmp_path: Path) -> None:
+def test_rows_are_not_begun_after_cancellation(tmp_path: Path) -> None:
     context = Context(tmp_path, monitor=Monitor(cancelled=lambda: True))
     with pytest.raises(Cancelled):
         context.rows("key", lambda: pytest.fail("it computed"))

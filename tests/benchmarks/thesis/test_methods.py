@@ -173,7 +173,7 @@ def test_runs_are_repeated_with_other_seeds_and_taken_up_again(
     assert separation_scores.score_separations(context, subject, way, 3) == first
 
 
-def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -> None:
+def test_a_photo_that_a_method_rejects_is_a_row_with_the_reason(context: Context) -> None:
     subject = context.subjects("specular")[0]
     grey = replace(
         subject, name="grey", image=np.repeat(subject.image.mean(2, keepdims=True), 3, 2)
@@ -209,7 +209,7 @@ def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(
     assert judge_reduction("ten per cent less", 0.1, found, "error").holds == holds
 
 
-def test_comparisons_pair_subjects_and_know_when_they_cannot_tell() -> None:
+def test_comparisons_are_paired_and_report_insignificance() -> None:
     found = paired_ratio({"a": 1.0, "b": 2.0, "c": 5.0}, {"a": 2.0, "b": 4.0, "d": 1.0}, 0)
     assert found is not None
     assert found == pytest.approx((0.5, 0.5, 0.5))  # the two subjects that both have, not c and d

@@ -105,13 +105,13 @@ def test_what_is_rendered_is_kept_and_the_same(rendered: Context) -> None:
 
 
 @pytest.mark.slow
-def test_stand_ins_for_photos_tell_no_truth(rendered: Context) -> None:
+def test_stand_ins_for_photos_have_no_ground_truth(rendered: Context) -> None:
     assert all(
         s.truth is None and s.diffuse is None and s.specular is None for s in rendered.photos()
     )
 
 
-def test_rendering_stops_when_asked(tmp_path: Path) -> None:
+def test_rendering_stops_when_cancelled(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
     with pytest.raises(Cancelled):
         Context(tmp_path, quick=True, monitor=Monitor(cancelled=lambda: True)).subjects("specular")

@@ -107,7 +107,7 @@ def test_figures_are_drawn(context: Context, number: str) -> None:
     assert len(answer.figures) == 1 and answer.tables[0].rows and answer.text
 
 
-def test_uniform_numbers_and_one_orbit_are_told_apart(context: Context) -> None:
+def test_uniform_numbers_and_one_orbit_are_distinguished(context: Context) -> None:
     one, many, pseudo = (
         [float(cell) for cell in row[1:]] for row in made(context, "figure", "3.8").tables[0].rows
     )

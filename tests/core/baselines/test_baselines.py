@@ -296,7 +296,7 @@ def odd_masks() -> list[np.ndarray]:
 @pytest.mark.parametrize("method", baselines.METHODS)
 @pytest.mark.parametrize("mask", odd_masks())
 @pytest.mark.parametrize("spread", [0.0, 3.0])
-def test_odd_masks_give_finite_answers(method: str, mask: np.ndarray, spread: float) -> None:
+def test_irregular_masks_give_finite_results(method: str, mask: np.ndarray, spread: float) -> None:
     log_image = np.where(
         mask[..., None], -9 + spread * np.random.default_rng(1).random((*mask.shape, 3)), np.nan
     )

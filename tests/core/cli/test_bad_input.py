@@ -201,7 +201,7 @@ def test_a_file_instead_of_a_folder(tmp_path: Path, capfd: pytest.CaptureFixture
     assert photo.read_bytes() == before
 
 
-def test_a_folder_of_somebody_else(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_foreign_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "letters").mkdir()
     letter = tmp_path / "letters" / "letter.txt"
     letter.write_text("mine")

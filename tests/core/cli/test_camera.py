@@ -61,7 +61,7 @@ def test_the_configuration_file_may_give_a_number(
     assert camera_of(tmp_path / "out")["source"] == "option"
 
 
-def test_a_cropped_photo_is_orthographic_and_says_so(
+def test_a_cropped_photo_is_orthographic_with_a_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     photo, mask = phone_photo(tmp_path, {IN_35MM: 26, PIXEL_X: 4000, PIXEL_Y: 2000})

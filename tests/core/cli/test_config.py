@@ -89,7 +89,7 @@ def test_a_file_that_is_not_text_is_one_error(capsys: pytest.CaptureFixture[str]
     assert "is not UTF-8" in capsys.readouterr().err
 
 
-def test_a_file_that_nobody_named_chooses_no_scheduler() -> None:
+def test_an_implicit_file_cannot_set_the_scheduler() -> None:
     text = '[batch]\nscheduler = "tcp://192.0.2.1:8786"\n'
     words = ("batch", "photos", "-o", "out")
     with pytest.raises(InputError, match="isc.toml: scheduler of .batch. is accepted only from"):

@@ -309,7 +309,7 @@ def test_quiet_is_heard_before_the_action_too(
     assert not output.out and not output.err
 
 
-def test_an_edit_that_changes_nothing_says_so(
+def test_an_edit_without_effect_is_noted(
     work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert (

@@ -42,7 +42,7 @@ def exported(*arguments: object) -> int:
     return main(["export", *map(str, arguments)])
 
 
-def test_textures_are_named_after_the_photo_or_as_asked(result: Path, tmp_path: Path) -> None:
+def test_textures_are_named_after_the_photo_or_by_option(result: Path, tmp_path: Path) -> None:
     assert exported(result, "--textures", "unreal", "-o", tmp_path / "a") == 0
     assert (tmp_path / "a" / "ball_orm.png").is_file()
     again = [result, "--textures", "generic", "--name", "my mug", "-o", tmp_path / "b"]
@@ -52,7 +52,7 @@ def test_textures_are_named_after_the_photo_or_as_asked(result: Path, tmp_path: 
     assert description["photo"] == "ball.png"
 
 
-def test_the_mesh_has_as_many_triangles_as_asked_for(result: Path, tmp_path: Path) -> None:
+def test_the_mesh_has_the_requested_number_of_triangles(result: Path, tmp_path: Path) -> None:
     faces = {}
     for most in (0, 2000):
         path = tmp_path / f"ball{most}.glb"

@@ -35,9 +35,7 @@ def test_a_mark_where_there_is_no_highlight_is_noted(
 
 
 @pytest.mark.parametrize(("further", "noted"), [(-0.5, False), (1.5, True)])
-def test_the_note_looks_as_far_as_the_mark_reaches(
-    tmp_path: Path, further: float, noted: bool
-) -> None:
+def test_the_note_uses_the_radius_of_marks(tmp_path: Path, further: float, noted: bool) -> None:
     """Whatever the frame around the object."""
     path, codes = tmp_path / "ball.png", np.zeros((60, 900, 3), np.uint16)
     codes[:52, :56] = ball_codes()

@@ -72,7 +72,7 @@ def stages(events: list[Event]) -> list[str]:
     return list(dict.fromkeys(event["stage"] for event in events if event["event"] == "progress"))
 
 
-def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
+def test_a_run_is_reported_from_start_to_end(tmp_path: Path) -> None:
     output = tmp_path / "out"
     code, events, errors = followed(
         started("decompose", ball_photo(tmp_path), "--model", "naive", "--arrays", "-o", output)
@@ -91,7 +91,7 @@ def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", [["nowhere.png"], ["nowhere.png", "--no-such-option"]])
-def test_a_refusal_is_told_as_the_last_event(tmp_path: Path, words: list[str]) -> None:
+def test_invalid_input_is_the_last_event(tmp_path: Path, words: list[str]) -> None:
     code, events, errors = followed(started("separate", *words, "-o", tmp_path / "out"))
     assert (code, errors) == (2, "")
     assert [event["event"] for event in events] == ["progress", "failed"] and events[-1][
@@ -102,7 +102,7 @@ def test_a_refusal_is_told_as_the_last_event(tmp_path: Path, words: list[str]) -
 
 
 @pytest.mark.slow
-def test_other_commands_speak_so_too(tmp_path: Path) -> None:
+def test_other_commands_report_json_too(tmp_path: Path) -> None:
     photo = ball_photo(tmp_path)
     save(ball((40, 50), 16.0, (20, 25)), tmp_path / "result")
     for words in (

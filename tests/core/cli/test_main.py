@@ -235,7 +235,7 @@ def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_known_shape_goes_on_beyond_its_rim(tmp_path: Path) -> None:
+def test_a_known_shape_is_extended_beyond_its_rim(tmp_path: Path) -> None:
     """Nothing outside the mask is read: on a slanted plane even the normals at the rim are the
     plane's.
     """
@@ -337,7 +337,7 @@ def test_a_height_map_that_cannot_be_chosen(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shape", ["plain", "coefficients", "decomposition"])
-def test_a_light_is_read_from_what_people_have(tmp_path: Path, shape: str) -> None:
+def test_a_light_is_read_from_common_files(tmp_path: Path, shape: str) -> None:
     plain = LIGHT.tolist()
     forms = {
         "plain": plain,
@@ -375,7 +375,7 @@ def test_separate_adds_up(tmp_path: Path) -> None:
     assert 0.8 * truth < found < 1.1 * truth
 
 
-def test_separate_uses_the_best_method_unless_told(tmp_path: Path) -> None:
+def test_separate_uses_the_best_method_by_default(tmp_path: Path) -> None:
     photo = disc_photo(tmp_path)
     for folder, words in (
         ("usual", ()),
@@ -407,9 +407,7 @@ def test_grey_photos_are_separated_into_themselves(tmp_path: Path) -> None:
     assert not layer(maps, "specular")[~original.clipped].any()
 
 
-def test_a_photo_that_is_left_alone_is_said_to_be(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_unchanged_photo_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
     assert "the photo has no colour" in capsys.readouterr().out
     assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
@@ -431,8 +429,8 @@ def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_prior_says_where_highlights_can_be(tmp_path: Path) -> None:
-    """Black: nowhere; middle grey: nothing is said; the left half black: on the right alone."""
+def test_a_prior_restricts_highlights(tmp_path: Path) -> None:
+    """Black: nowhere; middle grey: unknown; the left half black: only on the right."""
     photo = disc_photo(tmp_path)
     half = np.full((96, 120), 32768, np.uint16)
     priors = {
@@ -469,7 +467,7 @@ def test_a_prior_of_another_size_is_refused(
     assert not (tmp_path / "out").exists()
 
 
-def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(
+def test_separate_uses_the_whole_frame_without_a_mask(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     photo = write_image(tmp_path / "full.png", ball_codes() // 2 + 9000)

@@ -66,7 +66,7 @@ def test_a_large_photo_has_a_small_overlay() -> None:
     assert abs(picture.shape[1] - 171) <= 1
 
 
-def test_each_thing_gets_a_mask(tmp_path: Path) -> None:
+def test_each_object_gets_a_mask(tmp_path: Path) -> None:
     path, truth = photo(tmp_path, TWO)
     assert isc("mask", path, "--each", "-o", tmp_path / "mask.png") == 0
     assert sorted(one.name for one in tmp_path.glob("mask*")) == ["mask_1.png", "mask_2.png"]
@@ -86,7 +86,7 @@ def test_each_thing_gets_a_mask(tmp_path: Path) -> None:
         (("--point", "50;80"), "'50;80' is not two integers x,y"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line(
+def test_errors_are_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], expected: str
 ) -> None:
     path, _ = photo(tmp_path, ())
@@ -99,7 +99,7 @@ def test_what_cannot_be_done_is_said_in_one_line(
     assert not (tmp_path / "mask.png").exists()
 
 
-def test_nothing_is_decomposed_without_a_thing(
+def test_nothing_is_decomposed_without_an_object(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, _ = photo(tmp_path, ())
@@ -112,7 +112,7 @@ QUICK = ("--model", "sirfs", "--max-size", "24", "--separator", "none")
 
 
 @pytest.mark.slow
-def test_decompose_finds_the_mask_and_says_so(
+def test_decompose_finds_the_mask_and_prints_a_note(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, truth = photo(tmp_path, ONE)
@@ -130,7 +130,7 @@ def test_decompose_finds_the_mask_and_says_so(
 
 
 @pytest.mark.slow
-def test_each_thing_is_decomposed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_object_is_decomposed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path, truth = photo(tmp_path, TWO)
     write_image(tmp_path / "mask.png", np.where(truth, 255, 0).astype(np.uint8))
     words = ("decompose", path, "--mask", tmp_path / "mask.png", *QUICK)

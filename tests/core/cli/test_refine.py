@@ -11,7 +11,9 @@ from tests.core.command_line import ball_photo
 
 
 @pytest.mark.slow
-def test_refining_is_recorded_and_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_refining_is_recorded_and_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     photo = ball_photo(tmp_path)
     assert main(["decompose", str(photo), "--refine", "-o", str(tmp_path / "out")]) == 0
     found = load(tmp_path / "out")

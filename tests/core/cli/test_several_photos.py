@@ -66,7 +66,7 @@ def two_balls(folder: Path) -> Path:
     return write_image(folder / "shelf.png", both)
 
 
-def test_a_thing_that_fails_stops_no_other(
+def test_a_failing_object_does_not_stop_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     photo, out = two_balls(tmp_path), tmp_path / "out"
@@ -88,7 +88,7 @@ def test_a_thing_that_fails_stops_no_other(
     assert last["event"] == "failed" and last["code"] == 1 and "object 1 of 2: " in last["message"]
 
 
-def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
+def test_an_unreadable_photo_of_several_objects_is_one_failure(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     photo = two_balls(tmp_path)
@@ -97,7 +97,7 @@ def test_a_photo_of_things_that_cannot_be_read_is_one_failure(
     assert len(capsys.readouterr().err.splitlines()) == 1 and not (tmp_path / "out").exists()
 
 
-def test_results_of_more_things_in_the_folder_are_refused(
+def test_a_folder_with_results_of_more_objects_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     photo, out = two_balls(tmp_path), tmp_path / "out"
@@ -109,7 +109,7 @@ def test_results_of_more_things_in_the_folder_are_refused(
     assert [path.name for path in out.iterdir()] == ["3"]
 
 
-def test_want_of_memory_or_room_stops_no_other() -> None:
+def test_exhausted_memory_or_disk_does_not_stop_the_others() -> None:
     events: list[ProgressEvent] = []
 
     def work(error: BaseException | None, monitor: Monitor) -> list[str]:
@@ -240,7 +240,7 @@ def test_verbose_prints_each_stage_with_its_time(
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
-def test_completion_knows_commands_and_options(
+def test_completion_contains_commands_and_options(
     shell: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert isc("completion", shell) == 0

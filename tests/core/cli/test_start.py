@@ -55,7 +55,7 @@ def test_decompose_loads_its_compiler_while_it_works() -> None:
     assert not modules & {"numba", "llvmlite", "cv2"}
 
 
-def test_a_command_of_the_core_looks_for_no_other_package() -> None:
+def test_a_command_of_the_core_does_not_search_other_packages() -> None:
     """The search among installed packages takes a tenth of a second."""
     code = (
         "import importlib.metadata as m\n"
@@ -205,7 +205,7 @@ def test_the_handler_is_installed_before_anything_is_imported() -> None:
     ("variables", "coloured"),
     [({}, False), ({"FORCE_COLOR": "1"}, True), ({"FORCE_COLOR": "1", "NO_COLOR": "1"}, False)],
 )
-def test_errors_have_colour_where_it_is_wanted(variables: dict[str, str], coloured: bool) -> None:
+def test_errors_have_colour_if_enabled(variables: dict[str, str], coloured: bool) -> None:
     environment = {k: v for k, v in os.environ.items() if k not in ("NO_COLOR", "FORCE_COLOR")}
     done = subprocess.run(
         isc_command("separate", "no-such.png", "-o", "out"),

@@ -35,7 +35,7 @@ def scene() -> Decomposition:
     return replace(d, residual=residual, image=d.diffuse + d.specular + residual)
 
 
-def test_edits_that_ask_for_nothing_return_the_image_bit_by_bit(scene: Decomposition) -> None:
+def test_edits_at_defaults_return_a_bit_identical_image(scene: Decomposition) -> None:
     for edit in (
         edit_layers(scene, DichromaticEdit()),
         recolour(scene, ColourEdit()),
@@ -242,7 +242,9 @@ def test_turns_compose_and_come_back() -> None:
         ((0, 0, 90), (1, 0, 0), (0, 1, 0)),
     ],
 )
-def test_yaw_pitch_and_roll_turn_as_they_say(angles: tuple, start: tuple, end: tuple) -> None:
+def test_yaw_pitch_and_roll_rotate_in_the_documented_directions(
+    angles: tuple, start: tuple, end: tuple
+) -> None:
     assert np.array_equal(turn(*angles) @ np.array(start, float), np.array(end, float))
 
 
@@ -446,7 +448,7 @@ def test_a_wider_lobe_does_not_lift_the_edge_at_which_a_highlight_was_cut_off() 
 
 
 @pytest.mark.slow
-def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(
+def test_a_new_highlight_has_the_direction_of_its_light_and_keeps_the_energy(
     scene: Decomposition,
 ) -> None:
     light = DirectionalLight(toward(-0.6, 0.4, 0.7))
@@ -464,7 +466,7 @@ def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(
     )
 
 
-def test_a_light_from_behind_gives_no_highlight_and_says_so(scene: Decomposition) -> None:
+def test_a_light_from_behind_gives_no_highlight_and_a_note(scene: Decomposition) -> None:
     edit = add_highlight(scene, DirectionalLight(toward(0, 0, -1)), level=1.0)
     assert np.array_equal(edit.image, scene.image) and edit.notes
 
@@ -485,7 +487,7 @@ def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> 
     assert color[0] > 2 * color[2]
 
 
-def test_a_matt_object_says_that_it_has_no_gloss_to_change(scene: Decomposition) -> None:
+def test_gloss_of_a_diffuse_object_is_an_error(scene: Decomposition) -> None:
     diffuse_only = replace(
         scene,
         specular=np.zeros_like(scene.specular),

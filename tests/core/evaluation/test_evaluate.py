@@ -106,9 +106,7 @@ def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("model", ["mdr", "joint"])
-def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(
-    root: Path, model: str
-) -> None:
+def test_without_removed_light_the_result_is_that_of_plain_sirfs(root: Path, model: str) -> None:
     """To the bit: the layers are stored in fewer digits than the set's images, and SIRFS' many
     minima would show that.
     """
@@ -156,7 +154,7 @@ def test_old_names_of_priors_are_still_read(root: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
+def test_predictions_are_used_if_the_settings_say_so(root: Path) -> None:
     def height(illumination: str, **priors: str) -> np.ndarray:
         options = RunnerOptions(threads=1, **priors)  # type: ignore[arg-type]
         return make_runner(options, shipped_prior_set())(
@@ -293,7 +291,7 @@ def test_progress_rises_and_cancelling_stops(root: Path) -> None:
         evaluate(root, model="oracle", runner=oracle, monitor=Monitor(cancelled=lambda: True))
 
 
-def test_bootstrap_of_a_constant_ratio_is_sure() -> None:
+def test_the_bootstrap_interval_of_a_constant_ratio_has_no_width() -> None:
     b = np.log([1.0, 2.0, 5.0, 9.0])
     assert paired_bootstrap(b + np.log(0.8), b, 0) == pytest.approx((0.8, 0.8, 0.8))
 

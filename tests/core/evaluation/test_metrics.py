@@ -90,7 +90,7 @@ def test_light_round_trip() -> None:
 
 
 @pytest.mark.parametrize("channels", [1, 3])
-def test_both_conventions_shade_alike(channels: int) -> None:
+def test_both_conventions_give_the_same_shading(channels: int) -> None:
     light, normal = np.random.default_rng(2).normal(size=(9, channels)), directions(500)
     assert (
         np.abs(real_sh(normal) @ light - reference_basis(normal) @ light_to_reference(light)).max()
@@ -321,7 +321,7 @@ def test_average_is_the_geometric_mean_of_the_six() -> None:
 
 
 @pytest.mark.parametrize("changed", ["height", "normal", "shading", "reflectance", "light"])
-def test_each_error_answers_to_its_own_map(truth: MitBerkeleyObject, changed: str) -> None:
+def test_each_error_depends_only_on_its_own_map(truth: MitBerkeleyObject, changed: str) -> None:
     rng, wrong = np.random.default_rng(9), answer(truth)
     wrong[changed] = wrong[changed] + rng.uniform(0.1, 0.5, wrong[changed].shape)
     if changed == "normal":

@@ -22,13 +22,13 @@ def lines(start: np.ndarray, end: np.ndarray, number: int = 200) -> tuple[np.nda
 
 @pytest.mark.parametrize("light", STRONG)
 @pytest.mark.parametrize("albedos", [SOFT, SOFT[:1], SOFT[1:3], GREY])
-def test_strongly_coloured_light_is_told(albedos: np.ndarray, light: np.ndarray) -> None:
+def test_strongly_coloured_light_is_detected(albedos: np.ndarray, light: np.ndarray) -> None:
     found = estimate_illuminant(*ball(albedos, light, 0.5))
     assert found.outcome.too_strong and not found.determined
 
 
 @pytest.mark.parametrize("light", [0.5 + 0.5 * np.sqrt(light) for light in STRONG])
-def test_less_strong_light_is_told_on_grey(light: np.ndarray) -> None:
+def test_moderately_coloured_light_is_detected_on_grey(light: np.ndarray) -> None:
     assert estimate_illuminant(*ball(GREY, light, 0.5)).outcome.too_strong
 
 
@@ -70,7 +70,7 @@ def test_flanks_toward_white_are_known_from_others() -> None:
     assert share_toward_white(*lines(white, white)) == 0  # no colour changes
 
 
-def test_units_and_few_colours_say_nothing() -> None:
+def test_few_colours_are_uninformative_and_thinning_has_no_influence() -> None:
     red = np.repeat([[0.6, 0.1, 0.1]], 200, axis=0)
     assert lacks_white(red, np.zeros_like(red))
     assert not lacks_white(red[:5], np.zeros((5, 3)))

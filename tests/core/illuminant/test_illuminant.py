@@ -59,7 +59,7 @@ def test_one_paint_is_not_enough_and_stays_nearer_to_white():
 
 
 @pytest.mark.parametrize("gloss", [0.0, 0.5])
-def test_white_where_nothing_can_be_said(gloss):
+def test_white_without_information(gloss):
     grey = np.full((1, 3), 0.4)
     albedos = ALBEDOS if gloss == 0 else grey
     found = estimate_illuminant(*ball(albedos, np.ones(3), gloss))
@@ -80,7 +80,7 @@ def test_exposure_turning_and_surroundings_do_not_matter():
     np.testing.assert_array_equal(estimate_illuminant(around, mask).colour, found.colour)
 
 
-def test_clipped_pixels_say_nothing():
+def test_clipped_pixels_are_ignored():
     image, mask = ball(ALBEDOS, LIGHT, 0.5)
     cut = np.minimum(image, 0.7)
     found = estimate_illuminant(cut, mask, (image >= 0.7).any(axis=2))
@@ -88,7 +88,7 @@ def test_clipped_pixels_say_nothing():
     assert not estimate_illuminant(image, mask, mask).determined
 
 
-def test_less_is_believed_the_less_is_usual():
+def test_a_narrower_prior_gives_a_smaller_tint():
     image, mask = ball(ALBEDOS, LIGHT, 0.5)
     near, far = (
         estimate_illuminant(image, mask, options=IlluminantOptions(prior_deviation=usual))
@@ -111,7 +111,7 @@ def test_whitened_and_back(dtype):
     )
 
 
-def test_the_benchmark_relights_exactly_and_knows_the_best_answer():
+def test_the_benchmark_relights_exactly_and_has_the_ground_truth():
     white = np.ones(3)
     (image, mask), (diffuse, _) = ball(ALBEDOS, white, 0.5), ball(ALBEDOS, white, 0.0)
     layers = [layer.astype(np.float32) for layer in (image, diffuse, image - diffuse)]

@@ -17,7 +17,7 @@ def test_a_disc_trimmed_to_its_box_is_whole() -> None:
     assert np.array_equal(continued(mask, 10, 10, 10, 10), np.pad(mask, 10))
 
 
-def test_a_disc_cut_through_its_middle_goes_on() -> None:
+def test_a_disc_cut_through_its_centre_is_extended() -> None:
     mask = disc(101, 40, (0, 50))
     assert np.array_equal(cut_line(mask), mask[0])
     grown = continued(mask, 7, 3, 2, 2)
@@ -35,7 +35,7 @@ def test_each_side_is_judged_alone() -> None:
     assert (grown[4:-4, -4:] == mask[:, -1:]).all()
 
 
-def test_a_full_frame_goes_on_everywhere() -> None:
+def test_a_full_frame_is_extended_on_all_sides() -> None:
     assert continued(np.ones((20, 30), bool), 3, 3, 3, 3).all()
 
 

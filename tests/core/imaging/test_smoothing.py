@@ -47,13 +47,13 @@ def test_channels_are_averaged_by_themselves() -> None:
         assert np.array_equal(whole[..., c], masked_gaussian(image[..., c], mask, 1.2))
 
 
-def test_far_outside_nothing_is_known() -> None:
+def test_the_result_is_0_far_outside_the_mask() -> None:
     mask = np.zeros((40, 50), bool)
     mask[:5, :5] = True
     assert not masked_gaussian(np.ones((40, 50)), mask, 1.0)[30:, 30:].any()
 
 
-def test_without_a_width_nothing_happens() -> None:
+def test_zero_width_is_the_identity() -> None:
     layer = texture(40, 50)
     assert np.array_equal(masked_gaussian(layer, disc(), 0.0), layer)
 

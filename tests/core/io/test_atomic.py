@@ -38,7 +38,7 @@ def test_a_new_folder_appears_with_its_parents(tmp_path: Path) -> None:
     ]
 
 
-def test_nothing_stands_under_the_final_name_before_the_end(tmp_path: Path) -> None:
+def test_the_final_name_does_not_exist_before_the_end(tmp_path: Path) -> None:
     with new_folder(tmp_path / "out", OURS) as partial:
         (partial / "mark.json").write_text("x")
         assert not (tmp_path / "out").exists()

@@ -179,7 +179,7 @@ def test_an_archive_may_unpack_to_the_limit(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="needs Linux's /proc")
 @pytest.mark.parametrize("kind", ["progressive.jpg", "plain.jpg", "p.png", "deep.png", "f.exr"])
-def test_exhausted_memory_is_no_damage_and_says_how_much_is_needed(
+def test_exhausted_memory_is_distinguished_from_damage_and_states_the_amount(
     tmp_path: Path, kind: str
 ) -> None:
     path, side = tmp_path / kind, 3000
@@ -212,7 +212,7 @@ def test_exhausted_memory_has_many_names() -> None:
     assert not is_exhausted(OSError("broken data stream when reading image file"))
 
 
-def test_work_without_memory_says_how_much_it_needs() -> None:
+def test_work_without_memory_states_the_amount() -> None:
     with (
         pytest.raises(InputError, match="4 pixels need about 2.0 GB of memory, more than is avail"),
         enough_memory("4 pixels", 2_000_000_000, "use fewer"),

@@ -63,7 +63,7 @@ def test_rosenbrock_in_20_dimensions() -> None:
     np.testing.assert_allclose(x, 1.0, atol=1e-7)
 
 
-def test_put_down_and_taken_up_it_goes_on_as_if_it_had_never_stopped() -> None:
+def test_suspending_and_resuming_does_not_change_the_course() -> None:
     whole, parts = np.tile([-1.2, 1.0], 10), np.tile([-1.2, 1.0], 10)
     expected = minimise(rosenbrock, whole, EXACT, NumpyAlgebra())
     minimisation = Minimisation(rosenbrock, parts, EXACT, NumpyAlgebra())

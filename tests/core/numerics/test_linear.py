@@ -38,7 +38,7 @@ def test_two_unknowns_that_are_not_negative_are_those_of_scipy() -> None:
     assert (zeros > 5).all(), "each of both has been 0 somewhere"
 
 
-def test_columns_that_are_alike_share_what_one_explains() -> None:
+def test_equal_columns_share_the_coefficient() -> None:
     column = np.linspace(1.0, 2.0, 7)
     first, second = nonnegative_pair(column, 2 * column, 6 * column)
     assert first + 2 * second == pytest.approx(6)

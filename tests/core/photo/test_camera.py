@@ -65,7 +65,7 @@ def test_the_35mm_equivalent_refers_to_the_diagonal(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["jpg", "tif", "png", "deep.png"])
-def test_every_format_with_exif_tells_it(tmp_path: Path, kind: str) -> None:
+def test_the_focal_length_is_read_from_every_format_with_exif(tmp_path: Path, kind: str) -> None:
     path, data = tmp_path / f"photo.{kind}", exif({IN_35MM: 40})
     if kind == "deep.png":
         png_of_16_bits(path, data)

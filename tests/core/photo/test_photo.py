@@ -147,7 +147,7 @@ def test_16_bit_png_is_read_in_full(tmp_path: Path, colour: int) -> None:
     assert photo.code_value == pytest.approx(1 / 65535) and photo.original.bit_depth == 16
 
 
-def test_16_bit_png_is_srgb_unless_told_otherwise(tmp_path: Path) -> None:
+def test_16_bit_png_is_srgb_by_default(tmp_path: Path) -> None:
     stored = codes(65535)
     path = write(tmp_path / "a.png", png(stored, 16, 2))
     assert read_photo(path).image == pytest.approx(srgb_to_linear(stored / 65535), abs=1e-7)
@@ -378,7 +378,7 @@ def test_numpy_arrays_that_are_no_photos(tmp_path: Path, values: np.ndarray, wor
     refused(arrayed(tmp_path / "a.npy", values), words)
 
 
-def test_a_numpy_file_is_believed_only_as_far_as_it_goes(tmp_path: Path) -> None:
+def test_a_numpy_file_with_a_false_header_is_rejected(tmp_path: Path) -> None:
     def header_only(*shape: int) -> Path:
         stream = io.BytesIO()
         np.lib.format.write_array_header_1_0(

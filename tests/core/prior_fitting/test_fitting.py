@@ -133,7 +133,7 @@ class TestScaleMixture:
         assert abs(table.evaluate(np.zeros(1))[0][0]) < 1e-3
         assert table.values.min() >= 0
 
-    def test_histogram_loses_nothing_that_matters(self) -> None:
+    def test_the_binned_fit_equals_that_of_the_samples(self) -> None:
         x = scale_mixture_samples(count=3000)
         binned = fit_scale_mixture(Magnitudes.of(x))
         single = Magnitudes(np.ones(len(x)), x**2, float(np.abs(x).sum()), float(np.abs(x).max()))
@@ -193,7 +193,7 @@ class TestColorMixture:
         assert np.abs(cells.covariance - exact.covariance).max() < 0.01
         assert np.abs(cells.log_density(m) - exact.log_density(m)).max() < 0.03
 
-    def test_opposite_differences_are_alike(self) -> None:
+    def test_opposite_differences_have_equal_statistics(self) -> None:
         x, _ = self.samples(4000)
         flipped = x * np.random.default_rng(2).choice([-1, 1], (len(x), 1))
         one, other = ColorCells.of(x), ColorCells.of(flipped)

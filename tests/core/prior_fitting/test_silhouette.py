@@ -19,7 +19,7 @@ def test_a_balls_profile_is_one_minus_its_depth() -> None:
     assert profile.spread.max() < 0.2
 
 
-def test_objects_count_alike_whatever_their_size() -> None:
+def test_objects_of_any_size_have_equal_weights() -> None:
     small, large = SilhouetteMoments.of(*ball(20, 60)), SilhouetteMoments.of(*ball(60, 140))
     assert abs(small.sums[0].sum() - 1) < 1e-12
     both, swapped = fit_silhouette([small, large]), fit_silhouette([large, small])

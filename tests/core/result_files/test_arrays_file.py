@@ -81,7 +81,7 @@ def test_the_mesh_is_that_of_the_glb(arrays: Arrays, folder: Path) -> None:
     )
 
 
-def test_vertices_know_their_pixels(arrays: Arrays) -> None:
+def test_vertices_have_the_indices_of_their_pixels(arrays: Arrays) -> None:
     row, column = arrays["vertex_pixel"].T
     place = (
         np.stack([column - arrays["origin"][0], arrays["origin"][1] - row], -1)
@@ -217,7 +217,7 @@ def test_the_command_gives_the_same_bytes_as_the_option(
 
 
 @pytest.mark.slow
-def test_a_disk_without_room_for_arrays_is_known_before(
+def test_too_little_disk_space_for_arrays_is_detected_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=50_000_000))

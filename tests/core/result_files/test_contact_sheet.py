@@ -249,7 +249,7 @@ def test_a_black_result_and_a_long_name_can_be_shown() -> None:
     assert (sheet[:HEAD, -EDGE:] == sheet[0, 0]).all()  # the title ends before the edge
 
 
-def test_the_title_says_what_and_how() -> None:
+def test_the_title_depends_on_the_provenance() -> None:
     d = ball()
     nameless = replace(d, provenance=Provenance())
     with_title, without = (np.asarray(contact_sheet(x))[:HEAD].astype(int) for x in (d, nameless))
@@ -333,7 +333,7 @@ def drawn_subtitle(d: Decomposition) -> str:
 
 
 @pytest.mark.slow
-def test_the_title_says_what_was_fitted() -> None:
+def test_the_title_has_the_fitted_lobe() -> None:
     d = ball()
     fit = fit_lobe(d.specular, d.normal, d.mask)
     assert fit.blender_roughness is not None

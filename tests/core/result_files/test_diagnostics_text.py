@@ -174,7 +174,7 @@ def test_every_value_has_a_sentence() -> None:
     assert len(set(lines)) == len(lines) and all(lines)
 
 
-def test_a_note_is_one_short_line_that_says_what_to_do() -> None:
+def test_a_note_is_one_short_line_with_a_remedy() -> None:
     """Whatever else is known, a note fits a terminal's line, and no two say the same."""
     notes = [
         STOPPED_EARLY,
@@ -190,7 +190,7 @@ def test_a_note_is_one_short_line_that_says_what_to_do() -> None:
     assert len(lines) == len(set(lines)) == 4 + len(WarningKind)
 
 
-def test_somebody_elses_file_does_no_harm() -> None:
+def test_foreign_files_are_harmless() -> None:
     odd = {"converged": "no", "gloss": 3, "light_colour": "red", "doubts": {"a": 1}}
     assert status_lines(odd) == status_lines({}) == status_lines([1]) == []
     assert status_lines({"doubts": [1, None, "there seem to be several lights"]}) == [

@@ -67,7 +67,7 @@ def gltf(blob: bytes) -> dict:
     return json.loads(blob[20 : 20 + length])
 
 
-def test_it_stands_in_the_axes_of_gltf() -> None:
+def test_axes_are_those_of_gltf() -> None:
     """Right is +X, up is +Y, the viewer is at +Z; metres; faces turn their front to the viewer."""
     mesh = reopened(built(ball(), rim=0))
     assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(0.1, rel=0.02)
@@ -258,7 +258,7 @@ def test_a_steep_rim_has_no_teeth() -> None:
     assert lengths[3] < 0.5 * lengths[0]
 
 
-def test_a_large_map_is_thinned_to_the_number_of_faces_asked_for() -> None:
+def test_a_large_map_is_simplified_to_the_requested_number_of_faces() -> None:
     d = ball((150, 190), 70, (73, 91))
     for most in (20_000, 5_000, 1_000):
         result = built(d, triangles=most)
@@ -334,7 +334,7 @@ def test_a_mesh_with_a_vertex_at_each_pixel_lacks_nothing() -> None:
     assert (texture(mesh.visual.material.normalTexture) == [128, 128, 255]).all()
 
 
-def test_the_material_is_what_was_asked_for() -> None:
+def test_the_material_has_the_requested_factors() -> None:
     result = built(ball(), roughness=0.4)
     material = gltf(result.glb())["materials"][0]
     assert material["pbrMetallicRoughness"]["roughnessFactor"] == 0.4

@@ -40,7 +40,7 @@ def test_the_cover_is_the_mean_over_a_pixel_near_the_object(tmp_path: Path) -> N
     assert found.alpha() is None, "an outline is opaque"
 
 
-def test_nothing_more_is_known_of_a_hard_mask_or_another_photo(tmp_path: Path) -> None:
+def test_a_hard_mask_or_that_of_another_photo_has_no_coverage(tmp_path: Path) -> None:
     d = halved("file")
     assert read_cover(tmp_path / "mask.png") is None and object_cover(d, None) is None
     assert object_cover(d, ramp(4)[:100]) is None

@@ -71,7 +71,7 @@ def test_it_is_saved_in_the_present_schema(old: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_reason_that_nobody_wrote_is_refused(old: Path) -> None:
+def test_an_unknown_reason_is_rejected(old: Path) -> None:
     about = json.loads((old / "decomposition.json").read_text())
     change(old, brdf=about["brdf"] | {"reason": "it is Tuesday"})
     with pytest.raises(InputError, match="no usable brdf"):

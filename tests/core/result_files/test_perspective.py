@@ -43,7 +43,7 @@ def test_a_saved_result_keeps_its_camera(tmp_path: Path) -> None:
     assert record["axis"] == pytest.approx(object_axis(CAMERA, d.mask).tolist())
 
 
-def test_an_orthographic_result_says_so(tmp_path: Path) -> None:
+def test_an_orthographic_result_is_recorded(tmp_path: Path) -> None:
     save(bump_before_camera(None), tmp_path / "bump")
     assert description(tmp_path / "bump")["camera"] == {"type": "orthographic", "source": "none"}
     assert load(tmp_path / "bump").camera is None

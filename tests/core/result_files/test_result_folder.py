@@ -185,7 +185,7 @@ def test_the_fitted_lobe_is_read_back_number_by_number(tmp_path: Path) -> None:
     assert record["alpha_interval_68"][0] < record["alpha"] < record["alpha_interval_68"][1]
 
 
-def test_a_fit_that_knows_nothing_is_read_back_with_its_reason(tmp_path: Path) -> None:
+def test_an_undetermined_fit_round_trips_with_its_reason(tmp_path: Path) -> None:
     d = ball((24, 30), 9.0, (12, 15))
     save(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)), tmp_path / "out")
     back = load(tmp_path / "out").brdf

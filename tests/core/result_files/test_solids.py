@@ -51,7 +51,7 @@ def test_any_mask_becomes_a_closed_body(back: Back, seed: int) -> None:
     assert (np.bincount(mesh.faces_unique_edges.ravel()) == 2).all(), "an edge of four faces"
 
 
-def test_front_and_back_meet_in_the_outline_alone() -> None:
+def test_front_and_back_meet_only_at_the_outline() -> None:
     rng = np.random.default_rng(0)
     _, mask = hemisphere(25, 64)
     height = 60 * ndimage.gaussian_filter(rng.normal(size=mask.shape), 3)

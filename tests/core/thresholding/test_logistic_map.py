@@ -88,7 +88,7 @@ def test_orbits_that_stop_are_started_again() -> None:
     assert not np.isin(numbers.reshape(6, count)[-1], uniformised(np.array(DEGENERATE))).any()
 
 
-def test_refuses_what_stands_still() -> None:
+def test_degenerate_starts_are_rejected() -> None:
     for start in (*DEGENERATE, -0.1, 1.2):
         with pytest.raises(InputError, match="orbit must start"):
             orbit(start, 10)
