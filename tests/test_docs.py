@@ -1,5 +1,5 @@
-"""The documentation names what exists: links, pictures, programs, paths, commands, options; and it
-builds without warnings and loads nothing from another host.
+"""Links, pictures, programs, paths, commands and options in the documentation exist; the site
+builds without warnings and loads nothing from other hosts.
 """
 
 import ast
@@ -27,7 +27,7 @@ PICTURES = {".png", ".jpg"}
 MOST_PICTURE_BYTES = 2_000_000
 # Pages that tools/docs_site.py makes.
 GENERATED = {"changelog.md", "contributing.md", "security.md", "reference/command_line.md"}
-# Commands on these pages are checked; the log keeps the commands of its time.
+# Commands on these pages are checked; the research log keeps historical commands.
 GUIDES = ("index.md", "quickstart", "how_to", "methods", "results.md", "concepts.md", "reference")
 
 

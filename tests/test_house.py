@@ -43,7 +43,7 @@ FORBIDDEN = {
     "training": {"blender_addon", "benchmarks"} | BLENDER,
     "benchmarks": set(),  # the closed loop measures what Blender renders
 }
-# What builds bodies with Blender: imports it, but only inside of functions.
+# Modules that build bodies with Blender import it only inside functions.
 BUILDERS = "training/world/bodies/"
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "marshal", "shelve"}
 LONGEST_FUNCTION = 80
@@ -73,8 +73,7 @@ def absolute_imports(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             yield node, node.module.split(".")[0]
         elif isinstance(node, ast.Call) and called(node) in {"__import__", "import_module"}:
-            # A name that is put together while the program runs cannot be checked; one that is
-            # written out can.
+            # Names assembled at run time cannot be checked, only literal ones.
             yield from (
                 (node, str(name.value).split(".")[0])
                 for name in node.args[:1]
@@ -174,8 +173,8 @@ def test_imports_between_folders_make_no_cycle(package: str) -> None:
         pytest.fail(" -> ".join("/".join(folder) for folder in error.args[1]))
 
 
-# The way of a photo: a folder imports only folders further up in this list.
-ROOMS = (
+# The order of the pipeline: a folder imports only folders earlier in this list.
+PIPELINE = (
     "numerics",
     "io",
     "imaging",
@@ -205,12 +204,12 @@ ROOMS = (
 
 def test_imports_of_the_core_follow_the_pipeline() -> None:
     folders = {path.parent.name for path in (ROOT / "isc_core").glob("*/__init__.py")}
-    assert folders == set(ROOMS)
+    assert folders == set(PIPELINE)
     wrong = [
         f"{'/'.join(source)} imports {'/'.join(target)}"
         for source, targets in folder_imports("isc_core").items()
         for target in targets
-        if ROOMS.index(target[1]) > ROOMS.index(source[1])
+        if PIPELINE.index(target[1]) > PIPELINE.index(source[1])
     ]
     assert not wrong, "\n".join(wrong)
 
@@ -435,7 +434,7 @@ def tracked_texts() -> list[Path]:
 
 
 def test_no_file_names_a_machine_or_a_registry() -> None:
-    # Written in parts, so that this file does not hold what it looks for.
+    # Written in parts, so that this file does not contain the strings that it searches for.
     homes = [f"/{folder}/" for folder in ("work", "root", "home", "Users", "opt/py" + "pi")]
     options = [
         "--" + name for name in ("index-url", "extra-index-url", "find-links", "trusted-host")

@@ -1,4 +1,4 @@
-"""What the tests of batches share: a few tiny photos, and runs without processes of their own."""
+"""Fixtures of the tests of batches: a few tiny photos, and runs in this process."""
 
 import json
 import shutil

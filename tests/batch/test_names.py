@@ -1,4 +1,4 @@
-"""Names of results are safe, unlike each other, and the same whatever the order."""
+"""Names of results are safe, unique, and independent of the order."""
 
 import os
 import random

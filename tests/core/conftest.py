@@ -1,5 +1,5 @@
-"""Decompositions in these tests solve SIRFS at a quarter of its size: `sirfs` has tests of its
-own, and commands in processes of their own solve at the full size.
+"""Decompositions in these tests solve SIRFS at a quarter of its size: `sirfs` has separate tests,
+and commands in separate processes solve at the full size.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""A result before a camera: a bump beside the middle of a wide-angle photo."""
+"""A result with a perspective camera: a bump off the centre of a wide-angle photo."""
 
 import numpy as np
 
@@ -36,7 +36,7 @@ def bump_photo(camera: Camera | None = CAMERA, radius: float = 18.0) -> Photo:
 
 
 def bump_estimate(photo: Photo) -> SceneEstimate:
-    """What an orthographic solver would say of it."""
+    """The estimate of an orthographic solver."""
     zero = np.zeros_like(photo.image)
     split = Separation(photo.image, zero, zero, photo.mask.astype(np.float32))
     return SceneEstimate(split, bump_height(), light_to_reference(LIGHT), Diagnostics())

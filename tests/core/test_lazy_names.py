@@ -1,6 +1,4 @@
-"""Names that start without numerical libraries, and packages that import a module when a name of it
-is first used.
-"""
+"""Modules that are imported without numerical libraries, and lazy exports of packages."""
 
 import importlib
 import subprocess

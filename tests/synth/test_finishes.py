@@ -114,7 +114,7 @@ def test_classes_by_exponent(gloss: float, expected: str) -> None:
 
 
 def test_classes_by_alpha() -> None:
-    """Alpha .22 is an exponent of 30, .073 of 300, by the fitted rule."""
+    """Alpha .22 is an exponent of 30, .073 of 300, by the fitted formula."""
     for model in ("ggx", "roughplastic"):
         found = [
             gloss_class(Material(WHITE, model, alpha, strength=1.0))

@@ -1,4 +1,4 @@
-"""The stage "gloss": correct where the truth is known, undetermined where it cannot be."""
+"""The stage "gloss": correct where the roughness is determined, undetermined otherwise."""
 
 from dataclasses import replace
 

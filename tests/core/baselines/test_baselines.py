@@ -1,4 +1,4 @@
-"""The baselines on scenes whose shape, light and albedo the tests themselves know."""
+"""The baselines on scenes of known shape, light and albedo."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -450,7 +450,7 @@ def test_a_name_with_a_line_break_stays_on_one_line(
 
 
 def test_the_reference_of_these_tests_is_usable() -> None:
-    """If the ball itself were refused, every test above would pass for nothing."""
+    """If the ball itself were rejected, every test above would pass vacuously."""
     codes = ball_codes()
     assert (
         codes.dtype == np.uint16

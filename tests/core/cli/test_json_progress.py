@@ -37,7 +37,7 @@ m.run = run
 
 
 def started(*arguments: object, before: str = "") -> Process:
-    """The command, held as a program holds it."""
+    """The command, as a program starts it."""
     pipe = subprocess.PIPE
     command = isc_command(*arguments, "--progress", "json", before=before)
     return subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
@@ -187,7 +187,7 @@ def test_work_that_cannot_be_interrupted_ends_with_its_program(tmp_path: Path) -
 
 @pytest.mark.slow
 def test_a_command_without_input_runs_on(tmp_path: Path) -> None:
-    """Cron and CI give an empty standard input: its end is no wish to cancel."""
+    """Cron and CI give an empty standard input: its end does not cancel."""
     words = ("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "out")
     done = subprocess.run(
         isc_command(*words, "--progress", "json"),

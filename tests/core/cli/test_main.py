@@ -1,4 +1,4 @@
-"""The command `isc`: what it writes, what it prints, and how it ends when somebody stops it."""
+"""The command `isc`: what it writes, what it prints, and how it ends when it is cancelled."""
 
 import json
 import os

@@ -27,7 +27,7 @@ SURE, MIRRORED = (0.92, 0.06, 0.02), (0.3, 0.4, 0.3)  # probabilities of `Kind`
 
 
 def told(kinds: tuple[float, float, float], several: float) -> ScenePrediction:
-    """What the network says: one lamp or, with a probability of `several`, more."""
+    """A prediction of the network: one lamp or, with a probability of `several`, more."""
     maps, flat = np.zeros((SIZE, SIZE, 3)), np.zeros((SIZE, SIZE))
     return ScenePrediction(
         NormalEstimate(maps, flat),

@@ -1,4 +1,4 @@
-"""Expected errors: their formula, that they fall with nothing but evidence, and what follows from
+"""Expected errors: their formula, that they decrease only with evidence, and what follows from
 them.
 """
 

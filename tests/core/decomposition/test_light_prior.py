@@ -1,6 +1,4 @@
-"""What SIRFS expects of the light: what the network predicts from the photo, or the lights of all
-photos.
-"""
+"""The light prior of SIRFS: the network's prediction for a photo, or the lights of all photos.
 
 import numpy as np
 import pytest
@@ -34,7 +32,7 @@ def off_the_network(d: Decomposition) -> float:
 @pytest.mark.slow
 @pytest.mark.parametrize("grey", [False, True])
 def test_the_light_is_nearer_to_what_was_seen(grey: bool) -> None:
-    """One ball says nothing of accuracy: docs/methods/scene_network.md has the measurements."""
+    """One ball does not measure accuracy: docs/methods/scene_network.md has the measurements."""
     seen, usual = (
         found((-0.7, 0.2, 0.6), grey, shape_prior="silhouette", light_prior=prior)
         for prior in ("predicted", "dataset")

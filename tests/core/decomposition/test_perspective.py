@@ -1,4 +1,6 @@
-"""Estimates before a camera: the identities, the light, the lobe, and the choice of the camera."""
+"""Estimates with a perspective camera: the identities, the light, the lobe, and the choice of the
+camera.
+"""
 
 from dataclasses import replace
 from typing import Any

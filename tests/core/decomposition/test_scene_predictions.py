@@ -1,4 +1,4 @@
-"""What the scene network sees is given to a task once, and only where it is wanted."""
+"""Predictions of the scene network are added to a task once, and only if they are used."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Grey and toned photos: what the solver sees is grey, and what comes back is the photo."""
+"""Grey and toned photos: the solver gets a grey photo, and the result explains the toned one."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Edits of results before a camera: highlights are where the camera sees them mirrored."""
+"""Edits of results with a perspective camera: highlights are at the mirror direction."""
 
 from dataclasses import replace
 

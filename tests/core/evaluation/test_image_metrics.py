@@ -1,5 +1,5 @@
 """Structural similarity against its definition and published figures; sparsification and ranks
-against what is known by hand.
+against values by hand.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""The errors: zero at the truth, blind to exactly what they should be blind to, and equal to the
-reference's numbers.
+"""The errors: zero at the truth, with the intended invariances, and equal to the reference's
+numbers.
 """
 
 import json
@@ -70,7 +70,7 @@ def truth() -> MitBerkeleyObject:
 
 
 def answer(truth: MitBerkeleyObject) -> dict[str, Any]:
-    """The truth itself, as a method would answer it."""
+    """The truth itself, as the result of a method."""
     return {
         "height": np.nan_to_num(truth.height),
         "normal": np.nan_to_num(truth_normal(truth.height)),

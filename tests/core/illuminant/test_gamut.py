@@ -1,4 +1,4 @@
-"""Whether white is among an object's colours."""
+"""Detection of gamuts without white."""
 
 from itertools import permutations
 

@@ -48,7 +48,7 @@ def test_a_constant_stays_and_no_background_bleeds_in() -> None:
 
 
 def test_nothing_is_darker_than_the_darkest_pixels_around() -> None:
-    """Black print stays as bright as it is: the logarithm makes much of a little less."""
+    """Black print must not become darker: the logarithm amplifies small differences."""
     values = np.full((30, 30, 3), 0.8)
     values[10:20, 12:18] = 0.02
     fine = enlarge_averages(values, np.ones((30, 30), bool), (41, 41))

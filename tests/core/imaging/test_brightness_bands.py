@@ -1,4 +1,4 @@
-"""Bands of bright details: what they hold, and what they must not depend on."""
+"""Bands of bright details: their content, and their invariances."""
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal

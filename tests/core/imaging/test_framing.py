@@ -1,4 +1,4 @@
-"""A photo trimmed to its object is told from a frame that cuts the object."""
+"""A photo cropped to its object is distinguished from a frame that cuts the object."""
 
 import numpy as np
 

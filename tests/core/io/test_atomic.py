@@ -1,4 +1,4 @@
-"""A result appears whole or not at all, and nothing of anybody else's is ever deleted."""
+"""A result appears completely or not at all, and foreign files are never deleted."""
 
 import errno
 import os

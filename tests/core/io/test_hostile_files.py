@@ -1,4 +1,6 @@
-"""Small files that claim or cost much: each is refused at once, with a line that says why."""
+"""Small files that claim large sizes or are expensive: each is rejected at once, with the reason in
+one line.
+"""
 
 import io
 import struct

@@ -175,7 +175,7 @@ def test_every_value_has_a_sentence() -> None:
 
 
 def test_a_note_is_one_short_line_with_a_remedy() -> None:
-    """Whatever else is known, a note fits a terminal's line, and no two say the same."""
+    """A note fits a terminal's line, and no two notes are equal."""
     notes = [
         STOPPED_EARLY,
         STRONG_COLOUR,

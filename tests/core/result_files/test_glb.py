@@ -1,4 +1,4 @@
-"""Files of binary glTF, read by the format's own words and by another program."""
+"""Files of binary glTF, read according to the specification and by another program."""
 
 import io
 import json

@@ -1,4 +1,4 @@
-"""Results before a camera: the record of the camera, the mesh and the arrays."""
+"""Results with a perspective camera: the record of the camera, the mesh and the arrays."""
 
 import json
 from pathlib import Path

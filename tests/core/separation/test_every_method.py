@@ -1,5 +1,5 @@
-"""Whatever a photo is like, every method answers with sound layers or refuses in one line; what
-must not matter does not.
+"""For any photo, every method returns valid layers or a one-line error, with the required
+invariances.
 """
 
 from typing import Any

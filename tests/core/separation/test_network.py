@@ -1,4 +1,4 @@
-"""The separator that asks the highlight network, and when it leaves a photo alone."""
+"""The separator with the highlight network, and when it does not change a photo."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The one function for all methods, what it refuses, and options as people write them."""
+"""The function `separate` for all methods, invalid input, and options on the command line."""
 
 import json
 import re

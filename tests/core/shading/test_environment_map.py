@@ -70,7 +70,7 @@ def test_the_sky_gives_the_recovered_shading(
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_no_bright_spot_stands_behind_the_object(seed: int) -> None:
-    """Few normals see those directions: what they ask for is no lamp."""
+    """Few normals face those directions, which are poorly constrained: there must be no lamp."""
     light, behind = found_light(seed), directions(16)[..., 2] < -0.9
     env_map = recovered_environment(light, 16)
     assert env_map[behind].max() < 2 * env_map.mean() < environment_from_shading(light, 16).max()

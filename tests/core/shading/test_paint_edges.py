@@ -1,4 +1,4 @@
-"""Edges of paint, and what is none."""
+"""Edges of paint, and edges that are not paint."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Surfaces before a camera, against what follows from geometry alone."""
+"""Surfaces seen by a perspective camera, against closed forms."""
 
 import numpy as np
 import pytest

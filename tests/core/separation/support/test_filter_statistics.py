@@ -1,6 +1,4 @@
-"""Filter statistics as a prior: what the filters answer, what the table gives, and its door in the
-separator.
-"""
+"""Filter statistics as a prior: the filters' responses, the table, and its use in the separator."""
 
 import numpy as np
 import pytest

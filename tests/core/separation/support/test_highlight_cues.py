@@ -1,4 +1,4 @@
-"""The cues that tell light from paint, on made examples of both."""
+"""The cues that distinguish light from paint, on synthetic examples of both."""
 
 import numpy as np
 import pytest
