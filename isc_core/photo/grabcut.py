@@ -233,7 +233,10 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
 
     Parameters
     ----------
-    path : str or Path mask : (H, W) bool ndarray, or float cover in [0, 1] Raises
+    path : str or Path
+    mask : (H, W) bool ndarray, or float coverage in [0, 1]
+
+    Raises
     ------
     InputError
         If the file cannot be written.
@@ -248,7 +251,7 @@ def encoded_mask(mask: np.ndarray) -> bytes:
 
     Parameters
     ----------
-    mask : (H, W) bool ndarray, or float cover in [0, 1]
+    mask : (H, W) bool ndarray, or float coverage in [0, 1]
 
     Returns
     -------

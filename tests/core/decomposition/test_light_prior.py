@@ -1,4 +1,4 @@
-"""The light prior of SIRFS: the network's prediction for a photo, or the lights of all photos.
+"""The light prior of SIRFS: the network's prediction for a photo, or the lights of all photos."""
 
 import numpy as np
 import pytest
