@@ -81,7 +81,7 @@ def test_rendered_scenes_are_read_in_both_forms(tmp_path: Path) -> None:
 
 
 def test_what_is_no_scene_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="no rendered scene"):
+    with pytest.raises(InputError, match="not a rendered scene"):
         load_rendered(tmp_path)
     write_channels(tmp_path / "maps.exr", {f"image.{c}": np.ones((4, 4)) for c in "RGB"})
     with pytest.raises(InputError, match="lacks the channel diffuse.R"):
