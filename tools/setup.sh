@@ -1,6 +1,6 @@
 #!/bin/sh
 # Makes the project's own .venv and installs the package there: tools/setup.sh EXTRAS   (for example: tools/setup.sh synth,dev)
-# Runs on Debian and on macOS. As root on Debian it installs what the system lacks; otherwise it prints the command that does.
+# Runs on Debian and on macOS. As root on Debian it installs missing system packages; otherwise it prints the command that does.
 set -eu
 cd "$(dirname "$0")/.."
 extras=$1
@@ -10,7 +10,7 @@ fail() {
     exit 1
 }
 
-# `command -v` is not enough: a version manager leaves launchers behind for Pythons that it does not run.
+# `command -v` is not enough: version managers leave launchers for Pythons that they do not run.
 suitable() {
     "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))' >/dev/null 2>&1
 }
@@ -24,7 +24,7 @@ find_python() {
     done
 }
 
-# system_packages WHY PACKAGE...: installs Debian packages as root, else says how; false where neither is possible.
+# system_packages WHY PACKAGE...: installs Debian packages as root, else prints the command; false if neither is possible.
 system_packages() {
     why=$1
     shift
@@ -63,10 +63,10 @@ pip() {
 printf 'setup: installing isc3d[%s] (once; it takes a few minutes)\n' "$extras"
 pip install --quiet -c constraints.txt setuptools
 pip install --quiet -c constraints.txt --no-build-isolation -e ".[$extras]"
-# As pip does for what it installs: commands start faster, also where Python may not keep bytecode.
+# As pip does for its packages: commands start faster, even if Python may not cache bytecode.
 .venv/bin/python -m compileall -q isc_core synth benchmarks blender_addon
 
-# Mitsuba compiles its kernels with the system's libLLVM, 19 or later; without one it renders all the same, more slowly.
+# Mitsuba compiles its kernels with the system's libLLVM, 19 or later; without one it renders more slowly.
 case $extras in
 *synth*)
     newest_llvm() {
@@ -78,7 +78,7 @@ case $extras in
     ;;
 esac
 
-# The bpy module draws nothing on a screen, yet it links against the libraries that could.
+# The bpy module does not use a display, but links against display libraries.
 case $extras in
 *blender*)
     if [ "$(uname)" = Linux ] && pip show bpy >/dev/null 2>&1 && ! .venv/bin/python -c 'import bpy' >/dev/null 2>&1; then

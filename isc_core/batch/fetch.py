@@ -1,4 +1,4 @@
-"""Local copies of inputs: a path is used as it is, a URL is copied to a temporary file by fsspec.
+"""Local copies of inputs: a path is used directly, a URL is copied to a temporary file by fsspec.
 
 Limits: a file larger than `Limits.max_bytes` is rejected; an object of a store as soon as its copy
 exceeds the limit. Credentials and options of a store are read by its fsspec implementation from the

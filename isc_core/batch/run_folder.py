@@ -156,7 +156,7 @@ class RunFolder:
             return False
 
     def require_run(self, run: str) -> None:
-        """Check that this machine sees the folder of this run.
+        """Check that this machine has access to the folder of this run.
 
         Parameters
         ----------

@@ -52,7 +52,7 @@ class SeparationTruth:
 
 
 def list_shen_zheng(folder: str | Path) -> tuple[str, ...]:
-    """List the photos that have a ground truth (`NAME.bmp` beside `NAME_gt.bmp`).
+    """List the photos that have a ground truth (`NAME.bmp` with `NAME_gt.bmp`).
 
     Parameters
     ----------

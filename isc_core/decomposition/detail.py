@@ -10,14 +10,14 @@ same of the shading by SIRFS' light on the smooth slopes s, the fine changes on 
 
 L being the low frequencies of I - S on the coarsest level (periods above `_PERIOD` of the object's
 length), and U linear interpolation. Edges of paint (`shading.paint_edges`) stay in L, which is a
-bilateral average (`imaging.cross_bilateral`), and d counts little beside them: a Gaussian average
-would leave lines along each edge in d, and these are no relief.
+bilateral average (`imaging.cross_bilateral`), and d has little weight relative to them: a Gaussian
+average would leave lines along each edge in d, and these are no relief.
 
 From the coarsest level on, the relief R of a level is that which explains d
 (`shading.relief_from_shading`), found from 2 U R of the level before. The height is that of the
 solve plus b R of the finest level; b, which is 0 for paint, is estimated from the whole object
 (`shading.relief_evidence`). On the coarsest level R loses its low frequencies too, so that no level
-moves the overall shape; the light stays as it is.
+moves the overall shape; the light is not changed.
 
 Citation: see `shading.relief_from_shading`; pyramid: P. J. Burt, E. H. Adelson, IEEE Trans. Comm.
 31, 1983, doi:10.1109/TCOM.1983.1095851; smooth light apart from edges: F. Durand, J. Dorsey, "Fast
@@ -130,7 +130,7 @@ def with_fine_relief(task: DecompositionTask, estimate: SceneEstimate) -> SceneE
     Parameters
     ----------
     task : DecompositionTask
-        The photo and the settings. The height stays as it is where it is known or was measured, and
+        The photo and the settings. The height is not changed where it is known or was measured, and
         in the illuminations of MIT-Berkeley.
     estimate : SceneEstimate
         What a model recovered.
@@ -222,7 +222,7 @@ class Pyramid:
     mask : (H, W) bool ndarray
         Of the photo.
     frame : _Frame
-        The part of the photo that is looked at.
+        The part of the photo that is used.
     levels : list of Level
         The finest first.
     slope : tuple of (h, w) float32 ndarray
@@ -359,7 +359,7 @@ class _Frame:
         return cls(box, max(sizes), halvings, window)
 
     def coarsest(self, height: np.ndarray) -> np.ndarray:
-        """A height at the coarsest level, in its pixels; the box's border goes on around it."""
+        """A height at the coarsest level, in its pixels; the box's border is replicated around it."""
         of_box = Window(-_MARGIN, -_MARGIN, self.window.height, self.window.width)
         coarse = of_box.cut_replicated(height[self.box])
         for _ in range(self.halvings):

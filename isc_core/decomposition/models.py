@@ -66,8 +66,8 @@ def solve(task: DecompositionTask) -> SceneEstimate:
 
 
 def load(settings: Settings, prior_set: PriorSet | None = None) -> None:
-    """Load what a model needs beside the photo, which `solve` does otherwise: a program can do it
-    on a thread while it reads the photo.
+    """Load the resources of a model, which `solve` does otherwise: a program can do it on a thread
+    while it reads the photo.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ ray is turned at its highlight.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317.
 
-Limits: a known light stays as it is. The lobe itself is fitted to the solver's normals: over one
+Limits: a known light is not changed. The lobe itself is fitted to the solver's normals: over one
 highlight the rays are nearly parallel.
 """
 

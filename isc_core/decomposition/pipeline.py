@@ -320,7 +320,7 @@ def _input_json(photo: Photo, name: str) -> dict[str, object]:
 
 
 def _marks_json(photo: Photo) -> dict[str, object]:
-    """Pixels of the file that a person has marked, by what they are."""
+    """Pixels of the file that a user has marked, by kind."""
     marks = photo.marks.scaled(1 / photo.scale)
     return {
         f"marked_{name}": [[int(x), int(y)] for x, y in places]

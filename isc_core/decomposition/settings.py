@@ -180,7 +180,7 @@ class Settings:
         The maps have the photo's resolution, as with a `max_size` of 0.
     detail : int
         For `SIRFS_MODELS` in the illumination `photo`: long side of the object, pixels, at which
-        the finest relief is looked for, see `decomposition.detail`; 0 for the overall shape alone.
+        the finest relief is recovered, see `decomposition.detail`; 0 for only the overall shape.
     engine : str
         "auto", "numba" or "numpy", see `SolverOptions`.
     threads : int

@@ -56,7 +56,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class SolveOptions:
-    """How the pipeline runs, where a protocol asks for something other than `decompose`'s defaults.
+    """Options of the pipeline for protocols that differ from `decompose`'s defaults.
 
     None of it is a user's setting: the defaults are what every user runs. Evaluation under a
     published protocol sets the others, see `evaluation.runner`.

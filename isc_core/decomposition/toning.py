@@ -7,7 +7,7 @@ Equation: the grey photo, of the luminance Y, is solved with one channel. Every 
 reflectance, is then multiplied by I / Y, pixel by pixel: the layers sum to the photo again, and the
 light is white.
 
-Limits: a photo is toned where the user says so, since a toned photo and a photo of objects of one
+Limits: a photo is toned only if the user says so, since a toned photo and a photo of objects of one
 colour look the same. Otherwise the light is expected to be white, and most of the tone goes into
 the reflectance.
 """

@@ -4,7 +4,7 @@ Equation: diffuse' = reflectance S'(n), with S' by the new light: exp(sum_k L'_k
 distant light with an ambient term, or the irradiance of an environment map (see
 `shading.environment_map`). Highlights have one of these modes:
 
-    keep     they stay as they are;
+    keep     they do not change;
     scale    they follow their pixel's shading, specular' = specular S' / S, at most fourfold;
     remove   they vanish;
     render   a lobe is rendered under the new light, with the strength under which it has the

@@ -19,7 +19,7 @@ pickles) contains all of it as arrays, float32 unless stated otherwise:
     origin (3,)                  column, row, height in pixels of the mesh's origin
     focal_length ()              of the photo's camera in map pixels; absent for orthographic views
     principal_point (2,)         x, y in map pixels from the left and upper edge; absent likewise
-    eye (3,)                     the camera's place, in metres as the vertices; absent likewise
+    eye (3,)                     the camera's position, in metres as the vertices; absent likewise
     illumination (9, 3)          SH coefficients of log shading, for `reflectance`
     mesh_illumination (9, 3)     the same for `base_color`: the shading divided by k
     sky (h, 2 h, 3)              environment map, radiance, that lights `base_color` accordingly
@@ -36,7 +36,7 @@ pickles) contains all of it as arrays, float32 unless stated otherwise:
     specular_level ()            for `base_color`, 1 is plastic (f0 = .04); NaN if unknown
     specular_variation (H, W)    factor of that level, where it varies; else absent
     texture (h, w, 3) uint8      `base_color` in sRGB codes at the photo's resolution, the frame is
-                                 that of the maps; absent if not asked for, or no finer than they
+                                 that of the maps; absent if not requested, or no finer than these
     cover (H, W)                 share of each pixel that the object covers, where more is known
                                  than the mask says; else absent
     soft (H, W) bool             where the rim is soft, see `object_cover`; absent where nowhere

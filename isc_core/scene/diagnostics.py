@@ -1,7 +1,6 @@
 """How a decomposition ended: the solver's convergence, the fits, and violated assumptions.
 
-Values only: the sentences for people are made where they are shown
-(`result_files.diagnostics_text`).
+Values only: the sentences for users are in `result_files.diagnostics_text`.
 """
 
 from dataclasses import dataclass, field

@@ -190,6 +190,6 @@ def _uncrop(layer: np.ndarray, box: tuple[slice, slice], shape: tuple[int, ...])
     import numpy as np
 
     full = np.zeros((*shape, *layer.shape[2:]), layer.dtype)
-    if layer.any():  # zeros that nobody writes take no memory
+    if layer.any():  # zero pages that are never written need no memory
         full[box] = layer
     return full

@@ -291,7 +291,7 @@ def separate(
     unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
     likely = _confidence(image, mask, low, _base(low, mask, peak), split.specular[..., 0])
     for layer in (split.diffuse, split.specular, split.residual):
-        if layer.any():  # zeros that nobody has written take no memory
+        if layer.any():  # zero pages that are never written need no memory
             layer *= unit
     return replace(split, confidence=np.where(unclipped, likely, 0))
 

@@ -1,7 +1,7 @@
 """A specular lobe, and its radiance toward the viewer under a light or an environment map.
 
 Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E; under an environment map as
-`mirrored_environment` says.
+`mirrored_environment` states.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
 doi:10.2312/EGWR/EGSR07/195-206 (see `brdf`).

@@ -13,7 +13,7 @@ chroma, and changes brightness less than most print does: k is small. With the r
 
 The numbers were chosen on the validation set of `benchmarks.detail.sets`.
 
-Citation: none; that chroma tells paint from shading is classical: B. V. Funt, M. S. Drew,
+Citation: none; that chroma distinguishes paint from shading is classical: B. V. Funt, M. S. Drew,
 M. Brockington, "Recovering shading from color images", ECCV 1992, doi:10.1007/3-540-55426-2_15.
 
 Limits: print whose brightness changes by less than a tenth and whose colour does not, such as the

@@ -1,7 +1,7 @@
 """A height map as a surface before a pinhole camera: rays, points and normals.
 
-Problem: SIRFS sees a photo as an orthographic view, in which every pixel is looked at along z. A
-camera looks at each pixel along another ray, and at an object beside the photo's middle from the
+Problem: SIRFS sees a photo as an orthographic view, in which the viewing ray of every pixel is
+along z. A camera has another ray for each pixel, and sees an object off the photo's centre from the
 side: by up to 40 degrees where the lens is that of a telephone.
 
 Equation: d(x) = (a, -b, -1) is the ray of a pixel, a and b its offsets from the principal point

@@ -27,9 +27,9 @@ illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et
 surface texture while simultaneously estimating illumination direction", IJCV 62, 2005,
 doi:10.1007/s11263-005-4635-4.
 
-Limits: one probability for an object, so print beside relief gets an intermediate one. A pattern of
-stripes that lies along the light by chance looks like relief. Where the light is the same from
-everywhere there is no evidence.
+Limits: one probability for an object, so an object with both print and relief gets an intermediate
+one. A pattern of stripes that is aligned with the light by chance looks like relief. Where the
+light is the same from everywhere there is no evidence.
 """
 
 from dataclasses import dataclass

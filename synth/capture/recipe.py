@@ -267,7 +267,7 @@ def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, G
     scene : Scene
         With scaled lights.
     truth : GroundTruth
-        As the sensor sees it.
+        With the sensor's effects applied.
 
     Raises
     ------

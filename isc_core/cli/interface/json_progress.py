@@ -2,7 +2,7 @@
 
     {"event": "progress", "stage": "shape and light", "fraction": 0.42, "detail": "loss 46.100"}
     {"event": "done", "output": "cup", "lines": ["look at cup/preview.png"]}
-    {"event": "failed", "message": "one line for people", "code": 2}
+    {"event": "failed", "message": "one line for users", "code": 2}
     {"event": "cancelled"}
 
 Any number of progress events comes first; their fraction, of the whole job, never decreases; for

@@ -68,7 +68,7 @@ class Kim2013Options:
     hue : float
         Which hues are alike, as a distance in the disc of unit chroma; in [.02, 1].
     purity : float
-        The chroma, as a share of the mask's largest value, below which a hue says little; > 0.
+        The chroma, as a share of the mask's largest value, below which a hue is unreliable; > 0.
     trust : float
         t, the specular light, in units of u, at which a pixel's weight in the diffuse colour falls
         to 1 / e; > 0.

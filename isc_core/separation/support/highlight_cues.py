@@ -3,7 +3,7 @@
 White light raises all channels equally, so it leaves the chroma C = max I - min I unchanged. White
 reflectance, printed or mixed in, looks the same to a single pixel, but C falls where it begins.
 Four cues follow, each a number or a map of a photo's candidate specular layer s. A reflectance edge
-is where log C steps; what s does beside it proves nothing. A highlight is smooth: s has little
+is where log C steps; steps of s next to it prove nothing. A highlight is smooth: s has little
 detail finer than a few pixels, reflectance has texture. Reflectance mixes: where white reflectance
 begins, s rises by (1 + q) times the fall of C, q = min / (max - min) of the reflectance; light does
 not. Objects whose bright pixels are grey on the whole offer no colour to decide by.

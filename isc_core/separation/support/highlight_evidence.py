@@ -20,8 +20,8 @@ of a user decide about the nearest region.
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. That a
 highlight leaves C unchanged: K.-J. Yoon, Y. Choi, I. S. Kweon 2006, doi:10.1109/ICIP.2006.312650.
 The weights are those of `benchmarks.separation.print_rule --mixed` on rendered objects, half of
-them with print, and of a former scene network; docs/methods/print.md says why they were kept and
-how the odds were chosen.
+them with print, and of a former scene network; docs/methods/print.md explains why they were kept
+and how the odds were chosen.
 
 Limits: a region that contains both a highlight and print is kept or restored as a whole. Pale print
 of the same chroma as the paint around it looks like light. Coloured light changes C, as paint does.
@@ -56,7 +56,7 @@ class Evidence:
     Attributes
     ----------
     labels : (H, W) ndarray of int
-        Number of the region at each pixel, from 1 on; 0 outside of all regions.
+        Number of the region at each pixel, from 1; 0 outside of all regions.
     numbers : (K,) ndarray of int
         Those of the regions that can be classified.
     values : (K, 3) ndarray

@@ -113,7 +113,7 @@ def _stage_pictures(
 def _chain_pictures(
     truth: GroundTruth, options: ValidationOptions, monitor: Monitor
 ) -> tuple[StagePicture, ...]:
-    """Shape and light estimated from the photo, with the diffuse layers beside the photo."""
+    """Shape and light estimated from the photo, with the diffuse layers next to the photo."""
     split = SEPARATION.run(stage_inputs(truth, ()), options.settings, monitor)
     answer = SIRFS.run(stage_inputs(truth, (), split.diffuse), options.settings, monitor)
     photo, *rest = SIRFS.show(truth, answer)
