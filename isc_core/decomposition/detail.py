@@ -359,7 +359,7 @@ class _Frame:
         return cls(box, max(sizes), halvings, window)
 
     def coarsest(self, height: np.ndarray) -> np.ndarray:
-        """A height at the coarsest level, in its pixels; the box's border is replicated around it."""
+        """A height at the coarsest level, in its pixels; the box's border is replicated."""
         of_box = Window(-_MARGIN, -_MARGIN, self.window.height, self.window.width)
         coarse = of_box.cut_replicated(height[self.box])
         for _ in range(self.halvings):
