@@ -33,7 +33,7 @@ from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.rim import Rim
 from isc_core.result_files.solids.solid_mesh import make_solid_mesh
-from isc_core.result_files.solids.surface import placed, vertex_normals
+from isc_core.result_files.solids.surface import vertex_normals, vertex_positions
 from isc_core.result_files.turned_view import View, turned_view
 from isc_core.shading.spherical_harmonics import real_sh
 
@@ -94,7 +94,7 @@ def drawn(result: ResultArrays, kind: str) -> Drawn:
         Back(kind),
         0,
     )
-    vertices = placed(body, None)
+    vertices = vertex_positions(body, None)
     normal = vertex_normals(vertices, body.faces)
     rows, columns = body.pixels.T
     normal[body.front] = result.normal[rows, columns][body.front]
