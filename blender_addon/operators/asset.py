@@ -11,7 +11,8 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..scene.asset import save_asset
-from ..scene.build import find_built, why_not_built
+from ..scene.build import find_built
+from .edit import poll_built
 from .messages import sentence
 
 
@@ -52,10 +53,7 @@ class ISC_OT_save_asset(bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        reason = why_not_built(context.object)
-        if reason:
-            cls.poll_message_set(reason)
-        return not reason
+        return poll_built(cls, context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the library.

@@ -13,11 +13,12 @@ from isc_core.result_files.object_folders import object_folders
 
 from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS
-from ..scene.build import find_built, why_not_built
+from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .messages import busy_message, sentence
+from .edit import poll_built
+from .messages import sentence
 from .modal import WorkerOperator
 from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
 from .result import build_in_steps
@@ -27,7 +28,7 @@ from .worker_run import (
     ImportSteps,
     RunOutput,
     WorkerRun,
-    active_run,
+    poll_idle,
     remove_folder,
     require_no_active_run,
 )
@@ -272,7 +273,7 @@ class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
         if context.scene.isc.image is None:
             cls.poll_message_set("Open a photo first")
             return False
-        return _is_idle(cls)
+        return poll_idle(cls)
 
     def request(self, context: Any) -> DecomposeRequest:
         """Return the request of the scene's panel; see `_Overwrites`.
@@ -329,11 +330,7 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        reason = why_not_built(context.object)
-        if reason:
-            cls.poll_message_set(reason)
-            return False
-        return _is_idle(cls)
+        return poll_built(cls, context) and poll_idle(cls)
 
     def request(self, context: Any) -> DecomposeRequest:
         """Return the request that made the active object; see `_Overwrites`.
@@ -363,10 +360,3 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
                 f"{built.object.name} is a copy, and only the original is updated: {instead}"
             )
         return stored_request(built.object, built.scene, self.max_size)
-
-
-def _is_idle(operator: Any) -> bool:
-    present = active_run()
-    if present is not None:
-        operator.poll_message_set(busy_message(present.title))
-    return present is None

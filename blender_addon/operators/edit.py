@@ -36,6 +36,26 @@ _LIGHTS = (
 )
 
 
+def poll_built(operator: Any, context: Any) -> bool:
+    """Return whether an object, camera or sun of ISC is active; else the tooltip says what to do.
+
+    Parameters
+    ----------
+    operator : type
+        Of the button.
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    bool
+    """
+    reason = why_not_built(context.object)
+    if reason:
+        operator.poll_message_set(reason)
+    return not reason
+
+
 class EditOperator:
     """Mixin for operators that change what ISC has built, as one undo step.
 
@@ -59,10 +79,7 @@ class EditOperator:
         bool
             Where False, the tooltip gives the reason.
         """
-        reason = why_not_built(context.object)
-        if reason:
-            cls.poll_message_set(reason)  # type: ignore[attr-defined]
-        return not reason
+        return poll_built(cls, context)
 
     def execute(self, context: Any) -> set[str]:
         """Apply the edit.

@@ -21,9 +21,10 @@ from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
 from ..datablocks.provenance import KEY, ROLE
-from ..scene.build import BuiltObject, find_built, why_not_built
+from ..scene.build import BuiltObject, find_built
 from ..scene.copies import is_copy
 from ..scene.material_edits import specular_level, surface_node
+from .edit import poll_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
 from .messages import sentence
@@ -120,10 +121,7 @@ class _FolderOperator:
         bool
             Where False, the tooltip gives the reason.
         """
-        reason = why_not_built(context.object)
-        if reason:
-            cls.poll_message_set(reason)  # type: ignore[attr-defined]
-        return not reason
+        return poll_built(cls, context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser.

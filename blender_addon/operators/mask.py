@@ -10,19 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import bpy
-import gpu  # type: ignore[import-not-found]
 import numpy as np
 from bpy.props import StringProperty
-from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from isc_core.errors import InputError
 
 from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
-from .messages import busy_message, sentence
+from .messages import sentence
 from .modal import WorkerOperator
-from .photo_canvas import PhotoCanvas, PhotoOperator
+from .photo_canvas import DragOnPhoto, PhotoCanvas
 from .request import find_by_full_name, require_photo
 from .run_steps import mask_steps
 from .worker_run import (
@@ -30,7 +28,7 @@ from .worker_run import (
     RunOutput,
     RunSteps,
     WorkerRun,
-    active_run,
+    poll_idle,
     remove_folder,
     require_no_active_run,
 )
@@ -211,7 +209,7 @@ class ISC_OT_new_mask(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
+class ISC_OT_draw_box(DragOnPhoto, bpy.types.Operator):
     """Draw a box around the object with the mouse, and cut the object out."""
 
     bl_idname = "isc.draw_box"
@@ -219,9 +217,6 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
     bl_description = (
         "Draw a box around the object, with some background, and cut the object out of it"
     )
-
-    _start: tuple[int, int] | None = None
-    _end: tuple[int, int] = (0, 0)
 
     def advice(self) -> str:
         """Return what to do with the mouse; see `PhotoOperator`.
@@ -232,44 +227,24 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
         """
         return "Draw a box around the object, Esc or right mouse button to cancel"
 
-    def modal(self, context: Any, event: Any) -> set[str]:
-        """Follow press, drag and release of the left mouse button.
+    def finish(self, context: Any, canvas: PhotoCanvas, path: list[tuple[int, int]]) -> set[str]:
+        """Cut the object out of the box between both ends of the path; see `DragOnPhoto`.
 
         Parameters
         ----------
         context : bpy.types.Context
             Blender's context.
-        event : bpy.types.Event
-            Event of the mouse or keyboard; its position is in pixels of the window.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        path : list of tuple of int
+            Positions of the mouse.
 
         Returns
         -------
         set of str
-            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while drawing; {"FINISHED"} with a box;
-            {"CANCELLED"} on Esc, the right mouse button or too small a box.
+            {"CANCELLED"} if the box is too small.
         """
-        if self._canvas is None:
-            return {"CANCELLED"}
-        position = self._canvas.position(event)
-        if position is None:
-            return self._leave(context, {"CANCELLED"})
-        if event.type in {"ESC", "RIGHTMOUSE"}:
-            return self._leave(context, {"CANCELLED"})
-        if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            self._start = self._end = position
-        elif event.type == "MOUSEMOVE" and self._start is not None:
-            self._end = position
-            self._canvas.redraw()
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._start is not None:
-            self._end = position
-            return self._finish(context, self._canvas)
-        elif self._start is None:
-            return {"PASS_THROUGH"}  # so that the view can still be moved
-        return {"RUNNING_MODAL"}
-
-    def _finish(self, context: Any, canvas: PhotoCanvas) -> set[str]:
-        first, second = (canvas.place(corner) for corner in (self._start or self._end, self._end))
-        box = box_from_corners(first, second, self._size)
+        box = box_from_corners(canvas.place(path[0]), canvas.place(path[-1]), self._size)
         self._leave(context, set())
         if box is None:
             self.report({"WARNING"}, sentence(_small_box_message()))
@@ -278,17 +253,21 @@ class ISC_OT_draw_box(PhotoOperator, bpy.types.Operator):
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
         return {"FINISHED"}
 
-    def draw_over(self) -> None:
-        """Draw the box; see `PhotoOperator`."""
-        if self._start is None:
-            return
-        (left, bottom), (right, top) = self._start, self._end
-        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-        shader.uniform_float("color", (1.0, 0.6, 0.1, 1.0))
-        corners = ((left, bottom), (right, bottom), (right, top), (left, top), (left, bottom))
-        batch_for_shader(shader, "LINE_STRIP", {"pos": [(x, y, 0.0) for x, y in corners]}).draw(
-            shader
-        )
+    def outline(self, path: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Return the box between both ends of the path; see `DragOnPhoto`.
+
+        Parameters
+        ----------
+        path : list of tuple of int
+            Positions of the mouse so far.
+
+        Returns
+        -------
+        list of tuple of int
+            Its corners, the first one twice.
+        """
+        (left, bottom), (right, top) = path[0], path[-1]
+        return [(left, bottom), (right, bottom), (right, top), (left, top), (left, bottom)]
 
 
 def box_from_corners(
@@ -405,7 +384,4 @@ def can_cut(operator: Any, context: Any) -> bool:
     if context.scene.isc.image is None:
         operator.poll_message_set("Select a photo first")
         return False
-    present = active_run()
-    if present is not None:
-        operator.poll_message_set(busy_message(present.title))
-    return present is None
+    return poll_idle(operator)

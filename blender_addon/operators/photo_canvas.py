@@ -4,7 +4,7 @@ Over the 3D view, the photo fills as much of the region as its shape allows, wit
 scene stays visible around it.
 
 `PhotoOperator` waits for the mouse on it, `ClickOnPhoto` for a click on a pixel, `StrokeOnPhoto`
-for a click or a stroke.
+for a click or a stroke, `DragOnPhoto` for any path of the mouse.
 
 Limits: the photo over the 3D view cannot be zoomed: use an image editor for small objects.
 """
@@ -25,6 +25,7 @@ from .worker_run import active_run
 _FILL = 0.9  # of the region, along the side that limits the photo
 _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
 _SPACING, _MOST_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
+_LINE_COLOR = (1.0, 0.6, 0.1, 1.0)
 _MASK_TINT = (0.4, 0.0, 0.0, 0.5)  # of what the mask excludes
 
 OUTSIDE = "The point lies outside the photo: click on the photo"
@@ -386,11 +387,93 @@ class ClickOnPhoto(PhotoOperator):
         return {"FINISHED"}
 
 
-class StrokeOnPhoto(PhotoOperator):
+class DragOnPhoto(PhotoOperator):
+    """An operator that waits for the mouse to be dragged over the photo, and draws its path."""
+
+    line_width = 1.0
+    _path: list[tuple[int, int]] | None = None
+
+    def finish(self, context: Any, canvas: PhotoCanvas, path: list[tuple[int, int]]) -> set[str]:
+        """Leave, and use the path; the operator's own.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        path : list of tuple of int
+            Positions of the mouse from press to release, in pixels of the region.
+
+        Returns
+        -------
+        set of str
+            {"FINISHED"} or {"CANCELLED"}.
+        """
+        raise NotImplementedError
+
+    def outline(self, path: list[tuple[int, int]]) -> list[tuple[int, int]]:
+        """Return the line that is drawn meanwhile; by default the path.
+
+        Parameters
+        ----------
+        path : list of tuple of int
+            Positions of the mouse so far, in pixels of the region.
+
+        Returns
+        -------
+        list of tuple of int
+        """
+        return path
+
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Follow press, drag and release of the left mouse button.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard; its position is in pixels of the window.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting; as of `finish` at the release;
+            {"CANCELLED"} on Esc, the right mouse button, or where the region is gone.
+        """
+        if event.type in {"ESC", "RIGHTMOUSE"} or self._canvas is None:
+            return self._leave(context, {"CANCELLED"})
+        position = self._canvas.position(event)
+        if position is None:
+            return self._leave(context, {"CANCELLED"})
+        if event.type == "LEFTMOUSE" and event.value == "PRESS":
+            self._path = [position]
+        elif self._path is None:
+            return {"PASS_THROUGH"}  # so that the view can still be moved
+        elif event.type == "MOUSEMOVE":
+            self._path.append(position)
+            self._canvas.redraw()
+        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            return self.finish(context, self._canvas, [*self._path, position])
+        return {"RUNNING_MODAL"}
+
+    def draw_over(self) -> None:
+        """Draw the line; see `PhotoOperator`."""
+        if self._path is None or len(self._path) < 2:
+            return
+        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
+        shader.uniform_float("color", _LINE_COLOR)
+        places = [(x, y, 0.0) for x, y in self.outline(self._path)]
+        gpu.state.line_width_set(self.line_width)
+        batch_for_shader(shader, "LINE_STRIP", {"pos": places}).draw(shader)
+        gpu.state.line_width_set(1.0)
+
+
+class StrokeOnPhoto(DragOnPhoto):
     """An operator that waits for a click or a stroke on the photo, over which the mask is shown."""
 
-    color = (1.0, 0.6, 0.1, 1.0)
-    _path: list[tuple[int, int]] | None = None
+    line_width = 3.0
 
     def take(self, settings: Any, points: Sequence[str]) -> None:
         """Use the points of the stroke; the operator's own.
@@ -418,39 +501,23 @@ class StrokeOnPhoto(PhotoOperator):
         """
         return settings.mask if settings.mask_source == "IMAGE" else None
 
-    def modal(self, context: Any, event: Any) -> set[str]:
-        """Follow press, drag and release of the left mouse button.
+    def finish(self, context: Any, canvas: PhotoCanvas, path: list[tuple[int, int]]) -> set[str]:
+        """Use points along the path; see `DragOnPhoto`.
 
         Parameters
         ----------
         context : bpy.types.Context
             Blender's context.
-        event : bpy.types.Event
-            Event of the mouse or keyboard; its position is in pixels of the window.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        path : list of tuple of int
+            Positions of the mouse.
 
         Returns
         -------
         set of str
-            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting; {"FINISHED"} with points;
-            {"CANCELLED"} on Esc, the right mouse button, or beside the photo.
+            {"CANCELLED"} if all of it lies beside the photo.
         """
-        if event.type in {"ESC", "RIGHTMOUSE"} or self._canvas is None:
-            return self._leave(context, {"CANCELLED"})
-        position = self._canvas.position(event)
-        if position is None:
-            return self._leave(context, {"CANCELLED"})
-        if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            self._path = [position]
-        elif self._path is None:
-            return {"PASS_THROUGH"}  # so that the view can still be moved
-        elif event.type == "MOUSEMOVE":
-            self._path.append(position)
-            self._canvas.redraw()
-        elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            return self._finish(context, self._canvas, [*self._path, position])
-        return {"RUNNING_MODAL"}
-
-    def _finish(self, context: Any, canvas: PhotoCanvas, path: list[tuple[int, int]]) -> set[str]:
         pixels = [point_at(canvas.place(position), self._size) for position in path]
         self._leave(context, set())
         points = spread([pixel for pixel in pixels if pixel is not None], self._size)
@@ -459,17 +526,6 @@ class StrokeOnPhoto(PhotoOperator):
             return {"CANCELLED"}
         self.take(context.scene.isc, [f"{x},{y}" for x, y in points])
         return {"FINISHED"}
-
-    def draw_over(self) -> None:
-        """Draw the stroke; see `PhotoOperator`."""
-        if self._path is None or len(self._path) < 2:
-            return
-        shader = gpu.shader.from_builtin("UNIFORM_COLOR")
-        shader.uniform_float("color", self.color)
-        places = [(x, y, 0.0) for x, y in self._path]
-        gpu.state.line_width_set(3.0)
-        batch_for_shader(shader, "LINE_STRIP", {"pos": places}).draw(shader)
-        gpu.state.line_width_set(1.0)
 
 
 def spread(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple[int, int]]:

@@ -18,9 +18,9 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from .messages import busy_message, sentence
+from .messages import sentence
 from .request import find_by_full_name
-from .worker_run import active_run
+from .worker_run import poll_idle
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".webp", ".tga")
 _EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}
@@ -68,10 +68,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
             False while a run is active; the tooltip then names it.
         """
         del context
-        present = active_run()
-        if present is not None:
-            cls.poll_message_set(busy_message(present.title))
-        return present is None
+        return poll_idle(cls)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser, unless a photo is given.

@@ -400,6 +400,24 @@ def begin_run(run: WorkerRun) -> WorkerRun:
     return run
 
 
+def poll_idle(operator: Any) -> bool:
+    """Return whether no run is active; else the tooltip names it.
+
+    Parameters
+    ----------
+    operator : type
+        Of the button.
+
+    Returns
+    -------
+    bool
+    """
+    present = active_run()
+    if present is not None:
+        operator.poll_message_set(busy_message(present.title))
+    return present is None
+
+
 def require_no_active_run() -> None:
     """Check that no run is active.
 

@@ -10,7 +10,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.operators.photo_canvas import (  # noqa: E402 (after the skip)
+from blender_addon.operators.mask import ISC_OT_draw_box  # noqa: E402 (after the skip)
+from blender_addon.operators.photo_canvas import (  # noqa: E402
     StrokeOnPhoto,
     spread,
 )
@@ -101,3 +102,8 @@ def test_a_fast_stroke_has_points_between_its_events() -> None:
     assert spread([(0, 0), (70, 0)], (100, 100)) == [(10 * k, 0) for k in range(8)]
     assert spread([(0, 0), (3, 0)], (100, 100)) == [(0, 0), (3, 0)]
     assert spread([(0, 0), (1, 0)], (100, 100)) == [(0, 0)]
+
+
+def test_a_box_is_drawn_between_both_ends_of_the_path() -> None:
+    corners = ISC_OT_draw_box.outline(None, [(3, 4), (90, 1), (7, 9)])
+    assert corners == [(3, 4), (7, 4), (7, 9), (3, 9), (3, 4)]
