@@ -26,7 +26,7 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.masking.finder import why_refused
+from isc_core.masking.finder import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
@@ -59,7 +59,7 @@ class MaskScore:
     @property
     def accepted(self) -> bool:
         """Whether the mask would be used."""
-        return not why_refused(self.found)
+        return not refusal_reason(self.found)
 
 
 def score_mask(photo: HeldOut, network: MaskNetwork | None) -> MaskScore:

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 
 from ..decomposition.pipeline import decompose
 from ..errors import InputError
-from ..masking.finder import MaskSearch, read_each
+from ..masking.finder import MaskSearch, read_each_object
 from ..photo import Photo, read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
@@ -125,7 +125,7 @@ def _find(
         return SKIPPED
     monitor.report("reading", 0.0)
     with _locations_named(job, files):
-        photos = read_each(files.photo, files.mask, job.recipe.transfer, job.plan.limits)
+        photos = read_each_object(files.photo, files.mask, job.recipe.transfer, job.plan.limits)
     objects += [(files, photo) for photo in photos]
     return DONE
 

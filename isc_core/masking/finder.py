@@ -1,4 +1,15 @@
-"""Masks for the reader of photos: found, or refused with a remedy."""
+"""Mask finders for the reader of photos.
+
+Problem: a photo without a mask is either masked, or refused with a message that says what to do. A
+wrong mask spoils everything that follows.
+
+Equation: without hints, a mask is used if its confidence (`confidence`) is at least
+`MIN_CONFIDENCE`, and if it has no second component of at least .3 of the area of the largest. With
+hints, the user decides, and a mask is used at any confidence.
+
+Limits: the thresholds were chosen on composites, see docs/methods/automatic_mask.md. Objects that
+touch are found as one.
+"""
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,24 +25,24 @@ from ..photo.masks import MIN_MASK_PIXELS, check_mask
 from ..photo.photo import Photo
 from ..photo.reading import photo_from_raster
 from .hints import Hints
-from .search import find_mask, find_masks, separate_parts
+from .search import connected_components, find_mask, find_masks
 
-LEAST_CONFIDENCE = 0.3  # least confidence of a mask that is used without being asked for
-_LIKELY = 0.5  # the same where the whole photo would do as well
-_SEVERAL = 0.3  # of the largest part: a second one as large is another object
+MIN_CONFIDENCE = 0.3  # of a mask that is used without hints
+_MIN_LENIENT_CONFIDENCE = 0.5  # the same if the whole photo can be used instead
+_SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
 _REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 
 @dataclass(frozen=True)
 class MaskSearch:
-    """A `photo.found_mask.MaskFinder` that asks the network.
+    """A `photo.found_mask.MaskFinder` that uses the network.
 
     Attributes
     ----------
     hints : Hints
-        Where to look. With hints, alpha channels and black borders are not used.
+        With hints, alpha channels and black borders are not used.
     lenient : bool
-        Return None instead of refusing, and of a mask that is rather wrong than right.
+        Without hints, return None instead of refusing, and require a higher confidence.
     """
 
     hints: Hints = field(default_factory=Hints)
@@ -39,7 +50,7 @@ class MaskSearch:
 
     @property
     def always(self) -> bool:
-        """Whether to look even where the photo has an alpha channel or a black border."""
+        """Whether to search even where the photo has an alpha channel or a black border."""
         return bool(self.hints)
 
     def __call__(self, name: str, light: np.ndarray) -> FoundMask | None:
@@ -48,23 +59,25 @@ class MaskSearch:
         Parameters
         ----------
         name : str
-            Opens the error message.
+            Prefix of the error message.
         light : (H, W, 3) float32 ndarray
             Linear, 1 is white.
 
         Returns
         -------
         FoundMask or None
-            None: it is not sure, and lenient.
+            None: the mask is refused, and `lenient`.
 
         Raises
         ------
         InputError
-            If it is not sure, or the hints do not fit.
+            If the mask is refused, or the hints do not match the photo.
         """
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
-        problem = why_refused(found, self.hints, _LIKELY if self.lenient else LEAST_CONFIDENCE)
+        problem = refusal_reason(
+            found, self.hints, _MIN_LENIENT_CONFIDENCE if self.lenient else MIN_CONFIDENCE
+        )
         if not problem:
             return found
         if self.lenient and not self.hints:
@@ -72,18 +85,18 @@ class MaskSearch:
         raise InputError(f"{name}: {problem}")
 
 
-def why_refused(
-    found: FoundMask, hints: Hints | None = None, least: float = LEAST_CONFIDENCE
+def refusal_reason(
+    found: FoundMask, hints: Hints | None = None, minimum: float = MIN_CONFIDENCE
 ) -> str:
-    """Return why a mask is not used.
+    """Return why a mask is refused.
 
     Parameters
     ----------
     found : FoundMask
     hints : Hints, optional
-        With them a mask need not be sure.
-    least : float, optional
-        Confidence of a mask that is used.
+        With hints, the confidence is not checked.
+    minimum : float, optional
+        Minimum confidence of a mask that is used.
 
     Returns
     -------
@@ -93,8 +106,8 @@ def why_refused(
     enough = int(found.mask.sum()) >= MIN_MASK_PIXELS
     if hints:
         return "" if enough else "no object found there: put --point on it, or --box around it"
-    several = enough and is_apart(found.mask)
-    if enough and found.confidence >= least and not several:
+    several = enough and shows_several(found.mask)
+    if enough and found.confidence >= minimum and not several:
         return ""
     kind = Count(int(found.counts.argmax()))
     if several or kind == Count.SEVERAL:
@@ -104,7 +117,7 @@ def why_refused(
     return f"its mask is uncertain (confidence {found.confidence:.0%}): {_REMEDY}"
 
 
-def is_apart(mask: np.ndarray) -> bool:
+def shows_several(mask: np.ndarray) -> bool:
     """Return whether a mask shows several objects.
 
     Parameters
@@ -115,13 +128,13 @@ def is_apart(mask: np.ndarray) -> bool:
     Returns
     -------
     bool
-        Its second part is about as large as its first.
+        Whether a second component is about as large as the first.
     """
-    return len(separate_parts(mask, _SEVERAL)) > 1
+    return len(connected_components(mask, _SEVERAL)) > 1
 
 
-class EachSearch:
-    """A `photo.found_mask.MaskFinder` that keeps the mask of each of several objects.
+class EachObjectSearch:
+    """A `photo.found_mask.MaskFinder` that finds each of several separate objects.
 
     Attributes
     ----------
@@ -140,14 +153,14 @@ class EachSearch:
         Parameters
         ----------
         name : str
-            Opens the error message.
+            Prefix of the error message.
         light : (H, W, 3) float32 ndarray
             Linear, 1 is white.
 
         Returns
         -------
         FoundMask
-            All of them together.
+            The union of all masks, with the lowest of their confidences.
 
         Raises
         ------
@@ -158,11 +171,11 @@ class EachSearch:
         if not self.found:
             raise InputError(f"{name}: no distinct objects found: {_REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
-        least = min(self.found, key=lambda one: one.confidence)
-        return replace(least, cover=cover)
+        least_certain = min(self.found, key=lambda one: one.confidence)
+        return replace(least_certain, cover=cover)
 
 
-def read_each(
+def read_each_object(
     path: Path, mask_path: Path | None, transfer: str = "auto", limits: Limits = DEFAULT_LIMITS
 ) -> list[Photo]:
     """Read a photo of several separate objects.
@@ -183,24 +196,24 @@ def read_each(
     Raises
     ------
     InputError
-        If anything cannot be used.
+        If a file cannot be used, or there is no object.
     """
     raster = read_raster(path, limits)
     mask = None if mask_path is None else read_raster(mask_path, limits)
-    return photos_of_each(raster, str(path), mask, str(mask_path), transfer)
+    return photos_of_each_object(raster, str(path), mask, str(mask_path), transfer)
 
 
-def photos_of_each(
+def photos_of_each_object(
     raster: Raster, name: str, mask: Raster | None, mask_name: str, transfer: str
 ) -> list[Photo]:
-    """Make one photo for each separate object of decoded files.
+    """Make one photo of each separate object from decoded files.
 
     Parameters
     ----------
     raster : Raster
         The photo.
     name : str
-        Opens the error messages.
+        Prefix of the error messages.
     mask : Raster or None
         A mask of all objects.
     mask_name : str
@@ -214,19 +227,19 @@ def photos_of_each(
     Raises
     ------
     InputError
-        If anything cannot be used.
+        If a file cannot be used, or there is no object.
     """
-    search = EachSearch()
+    search = EachObjectSearch()
     photo = photo_from_raster(raster, name, mask, mask_name, transfer=transfer, finder=search)
     if not search.found:
-        photos = [replace(photo, mask=part) for part in separate_parts(photo.mask)]
+        photos = [replace(photo, mask=component) for component in connected_components(photo.mask)]
     else:
-        photos = [_alone(photo, one) for one in search.found]
+        photos = [_photo_of(photo, one) for one in search.found]
     for number, one in enumerate(photos, 1):
         check_mask(one.mask, f"{name}: the mask of object {number}")
     return photos
 
 
-def _alone(photo: Photo, found: FoundMask) -> Photo:
+def _photo_of(photo: Photo, found: FoundMask) -> Photo:
     original = replace(photo.original, mask_from="each", confidence=None)
     return replace(photo, mask=found.mask, original=original, found=found, cover=found.cover)

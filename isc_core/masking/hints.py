@@ -10,27 +10,27 @@ Point = tuple[int, int]
 
 @dataclass(frozen=True)
 class Hints:
-    """Corrections of a mask, in pixels of the upright photo from its top left.
+    """Hints, in pixels of the upright photo from its top left corner.
 
     Attributes
     ----------
     points : tuple of (x, y)
         On the object.
-    others : tuple of (x, y)
+    background : tuple of (x, y)
         On the background.
     box : tuple of int or None
-        (x, y, width, height) around the object: nothing outside belongs to it.
+        (x, y, width, height) around the object, which does not extend beyond it.
     """
 
     points: tuple[Point, ...] = ()
-    others: tuple[Point, ...] = ()
+    background: tuple[Point, ...] = ()
     box: Box | None = None
 
     def __bool__(self) -> bool:
-        return bool(self.points or self.others or self.box)
+        return bool(self.points or self.background or self.box)
 
     def check(self, width: int, height: int) -> None:
-        """Compare the hints with a photo's size, and with each other.
+        """Check the hints against a photo's size, and against each other.
 
         Parameters
         ----------
@@ -40,9 +40,9 @@ class Hints:
         Raises
         ------
         InputError
-            If a point or the box lies outside of the photo, or they contradict each other.
+            If a point or the box lies outside the photo, or they contradict each other.
         """
-        for name, points in (("--point", self.points), ("--not", self.others)):
+        for name, points in (("--point", self.points), ("--not", self.background)):
             for x, y in points:
                 if not (0 <= x < width and 0 <= y < height):
                     raise InputError(
@@ -50,7 +50,7 @@ class Hints:
                         "count from 0 at the top left"
                     )
         for x, y in self.points:
-            if (x, y) in self.others:
+            if (x, y) in self.background:
                 raise InputError(
                     f"--point {x},{y} and --not {x},{y} contradict each other: leave one out"
                 )

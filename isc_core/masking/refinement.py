@@ -1,16 +1,16 @@
 """The outline of a mask at the photo's own pixels.
 
-Problem: the network sees 96 pixels; the outline that it finds is off by up to one of them.
+Problem: the network sees at most 128 pixels; its outline is off by up to one of them.
 
-Equation: pixels of which the network is certain and that lie away from the outline are fixed. So is
-the medial axis of the object, so that thin parts are kept. GrabCut labels all other pixels by
+Equation: pixels of which the network is certain, and which lie away from the outline, are fixed. So
+is the medial axis of the object, so that thin parts are kept. GrabCut labels all other pixels by
 colour and contrast (`photo.grabcut`). The coverage a of the rim is the guided filter of the labels
-with the photo as its guide, a = A I + b in windows of a few pixels.
+with the photo I as its guide: a = A I + b in windows of a few pixels.
 
 Citation: C. Rother et al. 2004, doi:10.1145/1015706.1015720; K. He, J. Sun, X. Tang 2013,
 doi:10.1109/TPAMI.2012.213 (section 4, feathering).
 
-Limits: solved on at most `SIDE` pixels of the longer side of the object's surroundings.
+Limits: solved at a length of at most `SIDE` pixels; a large photo's rim is upsampled from there.
 """
 
 import numpy as np
@@ -22,11 +22,11 @@ from ..imaging.srgb import srgb_codes
 from ..photo.grabcut import Label, segmented
 from ..photo.masks import tidy_mask
 
-SIDE = 384
-_SURE = 0.97  # probability from which the network is trusted, away from the outline
-_LIKELY = 0.8  # the same on the middle line of the object
-_LINE = 5  # pixels: no point of the middle line lies less deep than others as near
-_BAND = 0.03  # of the part's longer side: as far off as the network's outline may be
+SIDE = 384  # pixels of the longer side
+_CERTAIN = 0.97  # probability from which a pixel away from the outline is fixed
+_AXIS_CERTAIN = 0.8  # the same for the medial axis of the object
+_AXIS_WINDOW = 5  # pixels: the medial axis has maxima of the distance to the outline in it
+_BAND = 0.03  # of the longer side: largest error of the network's outline
 _ITERATIONS = 1
 _EPSILON = 1e-3  # of the guided filter, for sRGB codes in [0, 1]
 
@@ -37,34 +37,35 @@ def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarr
     Parameters
     ----------
     light : (H, W, 3) float32 ndarray
-        Linear; the part of the photo that holds the object.
+        Linear; the crop of the photo that contains the object.
     cover : (H, W) float32 ndarray
         The network's probabilities.
     known : (H, W) int8 ndarray
-        1 where the user says that the object is, -1 where it is not, else 0.
+        1 where the user has marked the object, -1 the background, else 0.
 
     Returns
     -------
     (H, W) float32 ndarray
-        Cover, 0 to 1, at the size of `light`.
+        Coverage, 0 to 1.
     """
     height, width = cover.shape
     factor = min(1.0, SIDE / max(width, height))
     small = round(height * factor), round(width * factor)
     codes = srgb_codes(resampled(light, small))
-    soft = soft_cover(codes, resampled(cover, small), _nearest(known, small))
-    return resampled(soft, (height, width))
+    fine = segmented_cover(codes, resampled(cover, small), _nearest(known, small))
+    return resampled(fine, (height, width))
 
 
 def _nearest(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Resample (H, W) values to another shape, by nearest neighbours."""
     height, width = shape
     rows = (np.arange(height) + 0.5) * (values.shape[0] / height)
     columns = (np.arange(width) + 0.5) * (values.shape[1] / width)
     return values[rows.astype(int)[:, None], columns.astype(int)]
 
 
-def soft_cover(codes: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Label the pixels near the outline, and soften it.
+def segmented_cover(codes: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Segment the pixels near the outline, and estimate the coverage of the rim.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def soft_cover(codes: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.nd
     Returns
     -------
     (H, W) float32 ndarray
-        0 where the network is sure of no pixel.
+        0 if no pixel is certain to be of the object.
     """
     labels = trimap(cover, known)
     if not (labels == Label.OBJECT).any():
@@ -88,7 +89,7 @@ def soft_cover(codes: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.nd
 
 
 def trimap(cover: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return what is known of each pixel.
+    """Return which pixels are fixed, and the initial labels of the others.
 
     Parameters
     ----------
@@ -99,24 +100,24 @@ def trimap(cover: np.ndarray, known: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W) uint8 ndarray
-        Of `Label`.
+        Values of `Label`.
     """
     band = _BAND * max(cover.shape)
     inside = cover > 0.5
     labels = np.where(inside, Label.PROBABLY_OBJECT, Label.PROBABLY_BACKGROUND).astype(np.uint8)
     if inside.any() and not inside.all():
-        deep = ndimage.distance_transform_edt(inside)
-        away = ndimage.distance_transform_edt(~inside)
-        labels[(deep > band) & (cover > _SURE)] = Label.OBJECT
-        middle = inside & (deep >= ndimage.maximum_filter(deep, _LINE))
-        labels[middle & (cover > _LIKELY)] = Label.OBJECT
-        labels[(away > band) & (cover < 1 - _SURE)] = Label.BACKGROUND
+        depth = ndimage.distance_transform_edt(inside)
+        distance = ndimage.distance_transform_edt(~inside)
+        labels[(depth > band) & (cover > _CERTAIN)] = Label.OBJECT
+        axis = inside & (depth >= ndimage.maximum_filter(depth, _AXIS_WINDOW))
+        labels[axis & (cover > _AXIS_CERTAIN)] = Label.OBJECT
+        labels[(distance > band) & (cover < 1 - _CERTAIN)] = Label.BACKGROUND
     labels[known > 0], labels[known < 0] = Label.OBJECT, Label.BACKGROUND
     return labels
 
 
 def feathered(codes: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Soften the outline of a mask along the colours of the photo.
+    """Estimate the coverage of a mask's rim from the colours of the photo.
 
     Parameters
     ----------

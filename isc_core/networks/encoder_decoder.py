@@ -134,8 +134,7 @@ class PhotoNetwork(EncoderDecoder):
     coarse : int
         Number of levels, the coarsest ones, that the global prediction uses: two features per
         channel.
-    answers : int
-        Number of global outputs.
+    global_outputs : int
     stored : tuple of str
         Names in the archive: of the second dense layer, and of the calibration.
     dense : tuple of (inputs, outputs) ndarray
@@ -146,7 +145,7 @@ class PhotoNetwork(EncoderDecoder):
     """
 
     coarse: ClassVar[int]
-    answers: ClassVar[int]
+    global_outputs: ClassVar[int]
     stored: ClassVar[tuple[str, str]]
 
     dense: tuple[np.ndarray, ...]
@@ -172,12 +171,12 @@ class PhotoNetwork(EncoderDecoder):
         InputError, KeyError
             If the parameters do not match.
         """
-        others, (answer, calibration) = parameters.others, cls.stored
+        others, (output, calibration) = parameters.others, cls.stored
         return cls(
             parameters.weights,
             parameters.biases,
-            (others["hidden_weight"], others[f"{answer}_weight"]),
-            (others["hidden_bias"], others[f"{answer}_bias"]),
+            (others["hidden_weight"], others[f"{output}_weight"]),
+            (others["hidden_bias"], others[f"{output}_bias"]),
             others[calibration],
         )
 
@@ -186,9 +185,9 @@ class PhotoNetwork(EncoderDecoder):
         if not super().fits() or any(m.ndim != 2 for m in self.dense):
             return False
         hidden = self.dense[0].shape[-1]
-        answer = [(2 * sum(self.widths[-self.coarse :]), hidden), (hidden, self.answers)]
-        return [m.shape for m in self.dense] == answer and [o.shape for o in self.offsets] == [
-            s[1:] for s in answer
+        shapes = [(2 * sum(self.widths[-self.coarse :]), hidden), (hidden, self.global_outputs)]
+        return [m.shape for m in self.dense] == shapes and [o.shape for o in self.offsets] == [
+            s[1:] for s in shapes
         ]
 
     def predict_global(self, features: list[np.ndarray]) -> np.ndarray:
@@ -201,7 +200,7 @@ class PhotoNetwork(EncoderDecoder):
 
         Returns
         -------
-        (answers,) ndarray
+        (global_outputs,) ndarray
         """
         hidden = np.einsum("n,nk->k", np.concatenate(features), self.dense[0]) + self.offsets[0]
         return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]

@@ -94,6 +94,23 @@ def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.concatenate([log_light, mask[..., None].astype(np.float32)], axis=2)
 
 
+def frame_coordinates(rows: int, columns: int) -> np.ndarray:
+    """Return the coordinates of the pixels of a frame.
+
+    Parameters
+    ----------
+    rows, columns : int
+
+    Returns
+    -------
+    (rows, columns, 2) float32 ndarray
+        Right and up from the centre of the frame, in units of half its side.
+    """
+    right = ((np.arange(columns) + 0.5) * (2 / columns) - 1).astype(np.float32)
+    up = (1 - (np.arange(rows) + 0.5) * (2 / rows)).astype(np.float32)
+    return np.stack(np.meshgrid(right, up), axis=2)
+
+
 def space_to_depth(layer: np.ndarray, block: int) -> np.ndarray:
     """Rearrange each block of pixels into the channels of one pixel.
 

@@ -9,15 +9,15 @@ one before; a decoder with skip connections predicts the log odds that each pixe
 object (`encoder_decoder`). Means and maxima of the coarsest feature maps give the log odds of none,
 one and several objects. The predictions for the photo and its mirror image are averaged. Hints are
 drawn into channels of their own: points on the object, points on the background, a box. A logistic
-regression on held-out photos gives the confidence (`masking.evidence`).
+regression on held-out photos gives the confidence (`masking.confidence`).
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; hints as channels: N. Xu et al., "Deep interactive object
 selection", CVPR 2016, doi:10.1109/CVPR.2016.47; confidence: J. Platt, "Probabilistic outputs for
-support vector machines", 1999. Weights, training pictures and losses are our own: `python -m
+support vector machines", 1999. Weights, training images and losses are our own: `python -m
 training.masks.mask_network`.
 
-Limits: measured in docs/methods/automatic_mask.md. It sees 96 pixels of the longer side.
+Limits: measured in docs/methods/automatic_mask.md. Photos are downsampled to a length of 96 pixels.
 """
 
 from dataclasses import dataclass
@@ -26,14 +26,14 @@ from enum import IntEnum
 import numpy as np
 
 from .encoder_decoder import PhotoNetwork
-from .layers import DARK, softmax
+from .layers import DARK, frame_coordinates, softmax
 
-SIDE = 96  # pixels of the network's frame
+SIDE = 96  # side of the network's frame, pixels
 INPUTS = 9
-POINT = 2.5  # pixels: radius of a point's disc
-COARSE = 2  # levels that the number of objects is read from, the coarsest ones
-EVIDENCE = 6  # numbers that the confidence in a mask is computed from
-_LEAST = 1e-6
+POINT_RADIUS = 2.5  # radius of the disc of a point, pixels
+COARSE = 2  # number of levels, the coarsest ones, that the number of objects is predicted from
+FEATURES = 6  # number of features of the confidence, see `masking.confidence`
+_EPSILON = 1e-6
 
 
 class Count(IntEnum):
@@ -46,21 +46,21 @@ class Count(IntEnum):
 
 @dataclass(frozen=True)
 class MaskNetwork(PhotoNetwork):
-    """The mask network; its answer is the log odds of `Count`."""
+    """The mask network; its global prediction is the log odds of `Count`."""
 
     title = "mask network"
     file = "mask_network.npz"
-    inputs, outputs, coarse, answers = INPUTS, 1, COARSE, len(Count)
+    inputs, outputs, coarse, global_outputs = INPUTS, 1, COARSE, len(Count)
     stored = "count", "sureness"  # the names in trained archives
 
     @property
     def confidence_weights(self) -> np.ndarray:
-        """Weights (EVIDENCE,) of the log odds that a mask is right, see `masking.evidence`."""
+        """Weights (FEATURES,) of the log odds of a correct mask, see `masking.confidence`."""
         return self.calibration
 
     def fits(self) -> bool:
-        """Return whether the parts fit each other."""
-        return super().fits() and self.calibration.shape == (EVIDENCE,)
+        """Return whether the shapes of the parts match."""
+        return super().fits() and self.calibration.shape == (FEATURES,)
 
     def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Predict the mask and the number of objects.
@@ -68,7 +68,7 @@ class MaskNetwork(PhotoNetwork):
         Parameters
         ----------
         channels : (H, W, INPUTS) ndarray
-            See `channels_of`; sides are multiples of 32.
+            See `channels_of`. Sides are multiples of 32.
 
         Returns
         -------
@@ -87,12 +87,12 @@ class MaskNetwork(PhotoNetwork):
 
 @dataclass(frozen=True)
 class MaskPrediction:
-    """What the network says of a photo.
+    """The network's prediction for a photo.
 
     Attributes
     ----------
     cover : (H, W) float32 ndarray
-        Probability of the object at each pixel of the frame; 0 outside of the photo.
+        Probability of the object at each pixel of the frame; 0 outside the photo.
     counts : (3,) ndarray
         Probabilities of `Count`.
     """
@@ -111,7 +111,7 @@ def predict_mask(
     light : (side, side, 3) ndarray
         Linear, not negative; `SIDE` pixels or another multiple of 32.
     frame : (side, side) bool ndarray
-        The photo's place in the frame.
+        1 inside the photo.
     hints : (side, side, 3) ndarray
         See `channels_of`.
     network : MaskNetwork, optional
@@ -120,7 +120,7 @@ def predict_mask(
     Returns
     -------
     MaskPrediction
-        That of the mirrored photo is mirrored.
+        The prediction for the mirrored photo is the mirror image.
     """
     network = network or MaskNetwork.shipped()
     odds, counts = network(channels_of(light, frame, hints))
@@ -139,27 +139,24 @@ def channels_of(light: np.ndarray, frame: np.ndarray, hints: np.ndarray) -> np.n
     light : (H, W, 3) ndarray
         Linear.
     frame : (H, W) bool ndarray
-        Where the photo is.
+        1 inside the photo.
     hints : (H, W, 3) ndarray
         1 on points of the object, on points of the background, in the box; else 0.
 
     Returns
     -------
     (H, W, INPUTS) float32 ndarray
-        Log light over the photo's mean and the frame; right and up from the middle of the frame,
-        half its side being 1; the hints. All are 0 outside of the photo.
+        Log light over the photo's mean, the frame, the coordinates of `frame_coordinates`, and the
+        hints. All are 0 outside the photo.
     """
-    rows, columns = frame.shape
     inside = frame[..., None].astype(np.float32)
-    right = ((np.arange(columns) + 0.5) * (2 / columns) - 1).astype(np.float32)
-    up = (1 - (np.arange(rows) + 0.5) * (2 / rows)).astype(np.float32)
-    place = np.stack(np.meshgrid(right, up), axis=2)
+    place = frame_coordinates(*frame.shape)
     light = np.where(frame[..., None], light, 0).astype(np.float32)
-    # rows first, then the sums of rows in pairs that mirroring exchanges: the mirrored photo has
-    # the same mean to the last bit
-    lines = light.sum(axis=(0, 2), dtype=np.float64)
-    mean = float((lines + lines[::-1]).sum()) / (6 * max(int(frame.sum()), 1))
-    log_light = np.log(light / np.float32(max(mean, _LEAST)) + np.float32(DARK))
+    # Sums of columns are added in pairs that mirroring exchanges, so that the mirrored photo has
+    # the same mean to the last bit.
+    columns = light.sum(axis=(0, 2), dtype=np.float64)
+    mean = float((columns + columns[::-1]).sum()) / (6 * max(int(frame.sum()), 1))
+    log_light = np.log(light / np.float32(max(mean, _EPSILON)) + np.float32(DARK))
     return np.concatenate(
         [log_light * inside, inside, place * inside, hints.astype(np.float32) * inside], axis=2
     )

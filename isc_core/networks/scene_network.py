@@ -38,7 +38,7 @@ from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 from .encoder_decoder import PhotoNetwork
 from .frame import NetworkFrame, at_full_size, framed
-from .layers import inputs_of, softmax
+from .layers import frame_coordinates, inputs_of, softmax
 
 SIDE, LONG_SIDE = 128, 112  # sides of the network's frame and of the object in it, pixels
 INPUTS = 6
@@ -109,7 +109,7 @@ class SceneNetwork(PhotoNetwork):
 
     title = "scene network"
     file = "scene_network.npz"
-    inputs, outputs, coarse, answers = INPUTS, CHANNELS, COARSE, GLOBAL
+    inputs, outputs, coarse, global_outputs = INPUTS, CHANNELS, COARSE, GLOBAL
     stored = "light", "temperatures"
 
     @property
@@ -165,13 +165,10 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     Returns
     -------
     (H, W, INPUTS) float32 ndarray
-        Log light over the object's mean, the mask, and the coordinates right and up from the centre
-        of the frame, in units of half its side. All are 0 outside the mask.
+        Log light over the object's mean, the mask, and the coordinates of `frame_coordinates`. All
+        are 0 outside the mask.
     """
-    rows, columns = mask.shape
-    right = ((np.arange(columns) + 0.5) * (2 / columns) - 1).astype(np.float32)
-    up = (1 - (np.arange(rows) + 0.5) * (2 / rows)).astype(np.float32)
-    place = np.stack(np.meshgrid(right, up), axis=2) * mask[..., None]
+    place = frame_coordinates(*mask.shape) * mask[..., None]
     return np.concatenate([inputs_of(image, mask), place], axis=2)
 
 

@@ -20,14 +20,14 @@ class FoundMask:
         The probability that the overlap (IoU) with the intended object is at least .5.
     counts : (3,) ndarray
         Probabilities that the photo shows none, one and several objects.
-    evidence : (N,) ndarray
-        Features from which the confidence was computed, see `masking.evidence`.
+    features : (N,) ndarray
+        Features from which the confidence was computed, see `masking.confidence`.
     """
 
     cover: np.ndarray
     confidence: float
     counts: np.ndarray
-    evidence: np.ndarray
+    features: np.ndarray
 
     @property
     def mask(self) -> np.ndarray:

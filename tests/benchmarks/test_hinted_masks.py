@@ -16,8 +16,8 @@ def test_hints_lie_on_the_thing_and_beside_it() -> None:
         hints = drawn_hints(truth, kind, rng)
         hints.check(80, 60)
         assert all(truth[y, x] for x, y in hints.points)
-        assert not any(truth[y, x] for x, y in hints.others)
-        assert bool(hints.others) is (kind == "points and not")
+        assert not any(truth[y, x] for x, y in hints.background)
+        assert bool(hints.background) is (kind == "points and not")
         if hints.box is not None:
             x, y, width, height = hints.box
             outside = truth.copy()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
-from isc_core.networks.mask_network import POINT
+from isc_core.networks.mask_network import POINT_RADIUS
 
 from ..world.tensor_batch import TensorBatch
 
@@ -141,7 +141,7 @@ def _discs(where: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
     row, column = ((part)[..., None] for part in (at // width, at % width))
     off = [torch.arange(n, device=where.device) for n in where.shape[1:]]
     tall, wide = (off[0] - row).square(), (off[1] - column).square()
-    disc = tall[..., :, None] + wide[..., None, :] <= POINT**2
+    disc = tall[..., :, None] + wide[..., None, :] <= POINT_RADIUS**2
     return (disc & ((shares < 1) & (total > 0))[..., None, None]).any(1)
 
 

@@ -3,7 +3,7 @@
   python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
 Equation: logistic regression of "the photo shows one object, and the mask overlaps it by .5 or
-more" on `isc_core.masking.evidence`, with a small ridge. Photos are those of part A of
+more" on `isc_core.masking.confidence`, with a small ridge. Photos are those of part A of
 `training.masks.held_out`; part B is the test set. A table of thresholds follows.
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
@@ -20,7 +20,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
-from isc_core.masking.finder import is_apart
+from isc_core.masking.finder import shows_several
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 
@@ -64,7 +64,7 @@ def observed(
 
     Returns
     -------
-    evidence : (N, EVIDENCE) ndarray
+    evidence : (N, FEATURES) ndarray
     right : (N,) bool ndarray
     whole : (N,) bool ndarray
         False where the mask shows nothing or several objects: it is refused at any confidence.
@@ -74,9 +74,9 @@ def observed(
         found = find_mask(photo.light, network=network)
         truth = photo.cover >= 0.5
         overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
-        rows.append(found.evidence)
+        rows.append(found.features)
         right.append(photo.count == Count.ONE and overlap >= _RIGHT)
-        whole.append(bool(found.mask.any()) and not is_apart(found.mask))
+        whole.append(bool(found.mask.any()) and not shows_several(found.mask))
     return np.array(rows), np.array(right), np.array(whole)
 
 

@@ -19,7 +19,7 @@ from torch.nn import functional
 
 from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
-from isc_core.networks.mask_network import COARSE, EVIDENCE, INPUTS, Count
+from isc_core.networks.mask_network import COARSE, FEATURES, INPUTS, Count
 
 from ..networks.blocks import load_arrays, stored_arrays
 from ..networks.encoder_decoder import EncoderDecoderModule, start_small
@@ -113,7 +113,7 @@ class MaskNetworkModule(EncoderDecoderModule):
     def arrays(self) -> dict[str, np.ndarray]:
         """Return the weights in the layout that the core reads."""
         found = stored_arrays(self.pairs, self.out, self._dense)
-        found["sureness"] = np.eye(EVIDENCE, dtype=np.float32)[1]
+        found["sureness"] = np.eye(FEATURES, dtype=np.float32)[1]
         return found
 
     def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:

@@ -11,7 +11,7 @@ from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError
 from ...imaging.bounding_box import mask_box
-from ...masking.finder import MaskSearch, read_each
+from ...masking.finder import MaskSearch, read_each_object
 from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
@@ -297,7 +297,7 @@ def _decompose_each(
     path: Path = options.photo[0]
     monitor.report("finding the objects", 0.0)
     with photo_file(path, options) as file:
-        photos = read_each(file, options.mask, options.transfer, limits_of(options))
+        photos = read_each_object(file, options.mask, options.transfer, limits_of(options))
     _require_no_other_objects(options.output, len(photos))
     works = {
         f"object {number} of {len(photos)}": partial(

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from ...errors import InputError
-from ...masking.finder import MaskSearch, read_each
+from ...masking.finder import MaskSearch, read_each_object
 from ...masking.hints import Hints
 from ...photo.grabcut import check_mask_path, write_mask
 from ...photo.mask_overlay import write_mask_overlay
@@ -108,7 +108,7 @@ def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
 
 
 def _each(file: Path, options: argparse.Namespace) -> list[str]:
-    photos = read_each(file, None, options.transfer, limits_of(options))
+    photos = read_each_object(file, None, options.transfer, limits_of(options))
     output: Path = options.output
     return [
         _write(photo, output.with_name(f"{output.stem}_{number}{output.suffix}"))

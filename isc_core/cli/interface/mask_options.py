@@ -4,7 +4,7 @@ import argparse
 
 from ...errors import InputError
 from ...masking.hints import Hints
-from ...masking.search import separate_parts
+from ...masking.search import connected_components
 from ...photo.grabcut import Box
 from ...photo.photo import Photo
 from .options import add_pixels
@@ -83,7 +83,7 @@ def mask_notes(photo: Photo) -> list[str]:
     notes = []
     if found := how_found(photo):
         notes.append(f"{found}: check mask.png in the result; --box, --point and --not correct it")
-    parts = len(separate_parts(photo.mask))
+    parts = len(connected_components(photo.mask))
     if parts > 1:
         notes.append(
             f"the mask has {parts} separate parts, which are treated as one object: use --each to "

@@ -1,4 +1,4 @@
-"""Masks that are found: of what is plain to see, the same mirrored, moved by points."""
+"""Masks of simple photos, without and with hints."""
 
 from pathlib import Path
 
@@ -7,8 +7,15 @@ import pytest
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.masking import Hints, MaskSearch, find_mask, find_masks, read_each, separate_parts
-from isc_core.masking.refinement import soft_cover, trimap
+from isc_core.masking import (
+    Hints,
+    MaskSearch,
+    connected_components,
+    find_mask,
+    find_masks,
+    read_each_object,
+)
+from isc_core.masking.refinement import segmented_cover, trimap
 from isc_core.photo import read_photo
 from isc_core.photo.grabcut import Label, write_mask
 from tests.core.command_line import write_image
@@ -74,23 +81,22 @@ def test_the_mask_is_the_same_on_any_number_of_threads() -> None:
     assert covers[0] == covers[1]
 
 
-def test_points_choose_the_thing() -> None:
+def test_points_select_an_object() -> None:
     light, (left, right) = balls(TWO)
     for point, other, truth in (((50, 80), (150, 75), left), ((150, 75), (50, 80), right)):
-        found = find_mask(light, Hints(points=(point,), others=(other,)))
+        found = find_mask(light, Hints(points=(point,), background=(other,)))
         assert found.mask[point[1], point[0]] and not found.mask[other[1], other[0]]
         assert overlap(found.mask, truth) > 0.8
 
 
-def test_hints_make_a_mask_sure_or_not() -> None:
-    """Points on the thing do, points on the wall that say it were one do not."""
+def test_points_raise_the_confidence_if_they_are_on_an_object_and_lower_it_if_not() -> None:
     light, _ = balls(ONE)
     right = find_mask(light, Hints(points=((100, 75),)))
-    wrong = find_mask(light, Hints(points=((12, 12), (190, 20)), others=((100, 75), (90, 70))))
+    wrong = find_mask(light, Hints(points=((12, 12), (190, 20)), background=((100, 75), (90, 70))))
     assert right.confidence > 0.8 and wrong.confidence < right.confidence - 0.3
 
 
-def test_each_thing_is_found() -> None:
+def test_each_of_two_objects_is_found() -> None:
     light, truths = balls(TWO)
     found = find_masks(light)
     assert len(found) == 2
@@ -110,10 +116,12 @@ def test_a_photo_without_mask_is_read(tmp_path: Path) -> None:
     assert overlap(photo.mask, truth) > 0.95
 
 
-@pytest.mark.parametrize("what", ["wall", "noise"])
-def test_nothing_is_refused_in_one_line_that_names_the_remedies(tmp_path: Path, what: str) -> None:
+@pytest.mark.parametrize("content", ["wall", "noise"])
+def test_a_photo_without_object_is_refused_in_one_line_that_names_the_remedies(
+    tmp_path: Path, content: str
+) -> None:
     light, _ = balls(())
-    if what == "noise":
+    if content == "noise":
         light = np.random.default_rng(1).uniform(0, 1, light.shape).astype(np.float32)
     path = photo_of(light, tmp_path / "nothing.png")
     with pytest.raises(InputError) as error:
@@ -124,7 +132,7 @@ def test_nothing_is_refused_in_one_line_that_names_the_remedies(tmp_path: Path, 
     assert lenient.original.mask_from == "whole frame"
 
 
-def test_hints_come_before_the_alpha_channel(tmp_path: Path) -> None:
+def test_hints_take_precedence_over_the_alpha_channel(tmp_path: Path) -> None:
     light, (left, right) = balls(TWO)
     codes = np.rint(255 * linear_to_srgb(light)).astype(np.uint8)
     alpha = np.where(left | right, 255, 0).astype(np.uint8)
@@ -132,30 +140,32 @@ def test_hints_come_before_the_alpha_channel(tmp_path: Path) -> None:
 
     Image.fromarray(np.dstack([codes, alpha])).save(tmp_path / "two.png")
     assert read_photo(tmp_path / "two.png", finder=MaskSearch()).original.mask_from == "alpha"
-    hints = Hints(points=((50, 80),), others=((150, 75),))
+    hints = Hints(points=((50, 80),), background=((150, 75),))
     photo = read_photo(tmp_path / "two.png", finder=MaskSearch(hints))
     assert photo.original.mask_from == "hints" and not photo.mask[75, 150]
     assert photo.found is not None and photo.original.confidence == photo.found.confidence
 
 
-def test_each_part_of_a_given_mask_becomes_a_photo(tmp_path: Path) -> None:
+def test_each_component_of_a_given_mask_becomes_a_photo(tmp_path: Path) -> None:
     light, truths = balls(TWO)
     path = photo_of(light, tmp_path / "two.png")
     write_mask(tmp_path / "mask.png", truths[0] | truths[1])
-    photos = read_each(path, tmp_path / "mask.png")
+    photos = read_each_object(path, tmp_path / "mask.png")
     assert len(photos) == 2
     for photo, truth in zip(photos, truths, strict=True):
         assert np.array_equal(photo.mask, truth) and photo.original.mask_from == "file"
 
 
-def test_small_specks_are_no_parts() -> None:
+def test_specks_are_not_components() -> None:
     _, truths = balls(TWO)
     mask = truths[0] | truths[1]
     mask[0, 0] = True
-    assert [int(part.sum()) for part in separate_parts(mask)] == [int(t.sum()) for t in truths]
+    assert [int(part.sum()) for part in connected_components(mask)] == [
+        int(t.sum()) for t in truths
+    ]
 
 
-def test_what_the_user_says_is_known() -> None:
+def test_marked_pixels_are_fixed_in_the_trimap() -> None:
     cover = np.full((40, 40), 0.02, np.float32)
     cover[10:30, 10:30] = 0.98
     known = np.zeros(cover.shape, np.int8)
@@ -166,7 +176,7 @@ def test_what_the_user_says_is_known() -> None:
     assert labels[10, 10] == Label.PROBABLY_OBJECT
 
 
-def test_thin_parts_are_known_along_their_middle() -> None:
+def test_thin_parts_are_fixed_along_their_medial_axis() -> None:
     cover = np.full((60, 60), 0.01, np.float32)
     cover[28:31, 5:55] = 0.9
     labels = trimap(cover, np.zeros(cover.shape, np.int8))
@@ -174,10 +184,10 @@ def test_thin_parts_are_known_along_their_middle() -> None:
     assert (labels[28, 10:50] == Label.PROBABLY_OBJECT).all()
 
 
-def test_the_outline_moves_to_the_objects_own() -> None:
+def test_refinement_moves_the_outline_to_the_edge_in_the_photo() -> None:
     light, (truth,) = balls(ONE)
     codes = np.rint(255 * linear_to_srgb(light)).astype(np.uint8)
     rough = np.zeros(truth.shape, np.float32)
     rough[2:, 3:] = truth[:-2, :-3]  # the network's outline is off by some pixels
-    found = soft_cover(codes, rough, np.zeros(truth.shape, np.int8)) >= 0.5
+    found = segmented_cover(codes, rough, np.zeros(truth.shape, np.int8)) >= 0.5
     assert overlap(found, truth) > max(0.97, overlap(rough > 0.5, truth))

@@ -7,7 +7,7 @@ pytest.importorskip("torch")
 
 import torch
 
-from isc_core.networks.mask_network import POINT
+from isc_core.networks.mask_network import POINT_RADIUS
 from training.masks.hints import HintDraws, draw_hints, hint_maps, hinted
 
 SIDE = 96
@@ -25,7 +25,7 @@ def test_hints_lie_where_they_say() -> None:
     found, drawn = maps(200, truth)
     # discs reach over the outline by their radius
     near = torch.zeros(SIDE, SIDE, dtype=torch.bool)
-    reach = int(POINT)
+    reach = int(POINT_RADIUS)
     near[20 - reach : 60 + reach, 30 - reach : 80 + reach] = True
     assert not bool(found[:, 0, ~near].any())
     assert not bool(found[:, 1, 20 + reach : 60 - reach, 30 + reach : 80 - reach].any())
