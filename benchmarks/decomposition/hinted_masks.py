@@ -28,7 +28,7 @@ from isc_core.imaging.bounding_box import mask_box
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
 from training.masks.composites import CompositeDraws, Composites
-from training.masks.held_out import SIDE, masked_picture
+from training.masks.held_out import SIDE, masked_cutout
 from training.masks.ingredients import panoramas_in
 from training.masks.packs import Ingredients
 
@@ -76,9 +76,9 @@ def composites(
     """
     rng = np.random.default_rng(_SEED)
     torch.manual_seed(_SEED)
-    pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
+    pictures = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
     rooms, patterns = panoramas_in(panoramas, 0, held_out=True), np.zeros((1, 8, 8), np.uint8)
-    draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0.5, 0.5), grounds=(0, 0))
+    draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0.5, 0.5), backgrounds=(0, 0))
     compose = Composites(Ingredients(np.stack(pictures), rooms, patterns), draw, SIDE)
     made = 0
     while made < count:

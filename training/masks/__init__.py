@@ -1,1 +1,1 @@
-"""Training pictures of the mask network: lit bodies pasted before backgrounds."""
+"""Training images of the mask network: cut-outs of rendered objects, pasted before backgrounds."""

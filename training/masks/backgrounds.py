@@ -1,14 +1,14 @@
 """Backgrounds of composites: crops of panoramas, tables before them, plain backdrops.
 
-Problem: behind an object in a photo is a room, a street or a wood, a table with a pattern
-before one of them, or a wall and a cloth of one colour. None is to be seen twice.
+Problem: behind an object in a photo is a room, a street or a wood, a patterned table in front of
+one of them, or a plain wall or cloth. The network should see none of them twice.
 
-Equation: a crop is the perspective picture of a camera in the panorama's middle: pixel (x, y) sees
-along R (x tan(f / 2), y tan(f / 2), -1) for a field of view f and a turn R. A table is a plane
-below the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h). The pattern is
-blurred by a Gaussian whose Fourier transform is exp(-2 pi^2 s^2 f^2).
+Equation: a crop is the perspective image of a camera at the panorama's centre: pixel (x, y) has the
+viewing ray R (x tan(f / 2), y tan(f / 2), -1) for a field of view f and a rotation R. A table is a
+plane below the horizon row h: the pattern's coordinates at (x, y) are (x, 1) k / (y - h). The
+pattern is blurred by a Gaussian whose Fourier transform is exp(-2 pi^2 s^2 f^2).
 
-Limits: panoramas of 512 columns are soft in narrow crops.
+Limits: panoramas of 512 columns are blurred in narrow crops.
 """
 
 from dataclasses import dataclass
@@ -20,35 +20,35 @@ from torch.nn import functional
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch, chosen
 
-SHARES = (0.2, 0.45)  # of backgrounds: plain ones; tables before crops or plain ones
-_PATTERN_PIXEL = 0.3  # standard deviation of the blur of a pattern, pixels of the table's front
-_SPARSE = 3  # the exposure of a crop is that of every third row and column
+SHARES = (0.2, 0.45)  # of plain backgrounds; of tables before crops or plain ones
+_PATTERN_PIXEL = 0.3  # standard deviation of a pattern's blur, pixels at the front of the table
+_STRIDE = 3  # the exposure of a crop is computed from every third row and column
 
 
 @dataclass(frozen=True)
 class Crops(TensorBatch):
-    """Perspective pictures of panoramas.
+    """Perspective crops of panoramas.
 
     Attributes
     ----------
     photo : (B,) int64 tensor
-        In which photos they are.
+        Index of the photo.
     panorama : (B,) tensor
-        Which it is, as a share of all, in [0, 1).
+        Index as a fraction of the number of panoramas, in [0, 1).
     half : (B,) tensor
-        Tangent of half of the field of view.
-    turn : (B, 3, 3) tensor
-        R of the module, for rows.
+        Tangent of half the field of view.
+    rotation : (B, 3, 3) tensor
+        Transpose of R of the module.
     azimuth : (B,) tensor
         Radians.
     quantile, exposure : (B,) tensor
-        The share of the pixels that are darker than that which gets this light.
+        This quantile of the light is scaled to this value.
     """
 
     photo: torch.Tensor
     panorama: torch.Tensor
     half: torch.Tensor
-    turn: torch.Tensor
+    rotation: torch.Tensor
     azimuth: torch.Tensor
     quantile: torch.Tensor
     exposure: torch.Tensor
@@ -56,23 +56,24 @@ class Crops(TensorBatch):
 
 @dataclass(frozen=True)
 class Backdrops(TensorBatch):
-    """Walls and cloths of one colour.
+    """Plain walls and cloths.
 
     Attributes
     ----------
     photo : (B,) int64 tensor
-        In which photos they are.
+        Index of the photo.
     colour : (B, 3) tensor
-    slope : (B, 2) tensor
+    gradient : (B, 2) tensor
         Of the log light, right and down.
     vignette : (B,) tensor
+        Decrease of the log light at distance 1 from the centre.
     grain, width : (B,) tensor
-        Standard deviation of a faint texture's log light, and its size in pixels.
+        Standard deviation of the log light of a faint texture, and its size in pixels.
     """
 
     photo: torch.Tensor
     colour: torch.Tensor
-    slope: torch.Tensor
+    gradient: torch.Tensor
     vignette: torch.Tensor
     grain: torch.Tensor
     width: torch.Tensor
@@ -85,19 +86,20 @@ class Tables(TensorBatch):
     Attributes
     ----------
     photo : (B,) int64 tensor
-        In which photos they are.
+        Index of the photo.
     pattern : (B,) tensor
-        Which it is, as a share of all, in [0, 1).
+        Index as a fraction of the number of patterns, in [0, 1).
     horizon, edge : (B,) tensor
-        h of the module; where the table ends.
+        h of the module; row of the far edge.
     tilt : (B,) tensor
-        By how much rows fall to the right.
-    spin, scale : (B,) tensor
+        Slope of the rows.
+    angle, scale : (B,) tensor
         Of the pattern; radians.
     offset : (B, 2) tensor
+        Of the pattern, in its sides.
     first, second : (B, 3) tensor
-        Its colours.
-    fall : (B, 2) tensor
+        Colours of the pattern.
+    gradient : (B, 2) tensor
         Of the log light, right and down.
     """
 
@@ -106,27 +108,27 @@ class Tables(TensorBatch):
     horizon: torch.Tensor
     edge: torch.Tensor
     tilt: torch.Tensor
-    spin: torch.Tensor
+    angle: torch.Tensor
     scale: torch.Tensor
     offset: torch.Tensor
     first: torch.Tensor
     second: torch.Tensor
-    fall: torch.Tensor
+    gradient: torch.Tensor
 
 
 @dataclass(frozen=True)
-class Grounds(TensorBatch):
-    """What is drawn of the backgrounds of a batch.
+class BackgroundDraws(TensorBatch):
+    """Random variables of the backgrounds of a batch.
 
     Attributes
     ----------
     window : (B, 2, 2) tensor
-        Scale and place, right and down, of what is shown of a picture.
+        Scale and centre, right and down, of the visible part of a background.
     crops : Crops
     backdrops : Backdrops
-        In all other photos.
+        Of all other photos.
     tables : Tables
-        Before some of either.
+        In front of some of either.
     """
 
     window: torch.Tensor
@@ -135,9 +137,9 @@ class Grounds(TensorBatch):
     tables: Tables
 
 
-def draw_grounds(
+def draw_backgrounds(
     rng: np.random.Generator, number: int, shares: tuple[float, float] = SHARES
-) -> Grounds:
+) -> BackgroundDraws:
     """Draw backgrounds.
 
     Parameters
@@ -145,18 +147,18 @@ def draw_grounds(
     rng : numpy.random.Generator
     number : int
     shares : tuple of float
-        Of plain ones, and of those with a table.
+        Of plain backgrounds, and of backgrounds with a table.
 
     Returns
     -------
-    Grounds
+    BackgroundDraws
         On the CPU.
     """
     zoom = rng.uniform(0.6, 1, (number, 1))
     place = (1 - zoom) * rng.uniform(-1, 1, (number, 2))
     scale = zoom * np.stack([rng.choice([-1, 1], number), np.ones(number)], axis=1)
-    plain, table = (_some(rng, number, share) for share in shares)
-    return Grounds(
+    plain, table = (_random_subset(rng, number, share) for share in shares)
+    return BackgroundDraws(
         torch.from_numpy(np.stack([scale, place], axis=1)).float(),
         _draw_crops(rng, np.setdiff1d(np.arange(number), plain)),
         _draw_backdrops(rng, plain),
@@ -164,20 +166,20 @@ def draw_grounds(
     )
 
 
-def _some(rng: np.random.Generator, number: int, share: float) -> np.ndarray:
-    """A share of so many photos: nearly always equally many, which devices like."""
+def _random_subset(rng: np.random.Generator, number: int, share: float) -> np.ndarray:
+    """Random indices of a share of the photos: nearly the same number in each batch."""
     return np.sort(rng.permutation(number)[: int(number * share + rng.random())])
 
 
 def _draw_crops(rng: np.random.Generator, photo: np.ndarray) -> Crops:
     number = len(photo)
-    turn = _turns(2, rng.normal(0, 5, number)) @ _turns(0, rng.normal(10, 18, number))
+    rotation = _rotations(2, rng.normal(0, 5, number)) @ _rotations(0, rng.normal(10, 18, number))
     return Crops.of(
         {
             "photo": photo,
             "panorama": rng.random(number),
             "half": np.tan(np.radians(log_uniforms(rng, 35, 105, number)) / 2),
-            "turn": turn,
+            "rotation": rotation,
             "azimuth": rng.uniform(0, 2 * np.pi, number),
             "quantile": rng.uniform(0.6, 0.98, number),
             "exposure": rng.uniform(0.4, 1, number),
@@ -185,7 +187,7 @@ def _draw_crops(rng: np.random.Generator, photo: np.ndarray) -> Crops:
     )
 
 
-def _turns(axis: int, degrees: np.ndarray) -> np.ndarray:
+def _rotations(axis: int, degrees: np.ndarray) -> np.ndarray:
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     matrix = np.tile(np.eye(3), (len(degrees), 1, 1))
     one, other = (k for k in range(3) if k != axis)
@@ -200,7 +202,7 @@ def _draw_backdrops(rng: np.random.Generator, photo: np.ndarray) -> Backdrops:
         {
             "photo": photo,
             "colour": _colours(rng, number),
-            "slope": rng.normal(0, 0.35, (number, 2)),
+            "gradient": rng.normal(0, 0.35, (number, 2)),
             "vignette": rng.uniform(0, 0.4, number),
             "grain": rng.uniform(0.01, 0.08, number) * (rng.random(number) < 0.4),
             "width": rng.uniform(1, 8, number),
@@ -221,18 +223,18 @@ def _draw_tables(rng: np.random.Generator, photo: np.ndarray) -> Tables:
             "horizon": horizon,
             "edge": np.where(rng.random(number) < 0.7, edge, -2.0),
             "tilt": rng.normal(0, 0.05, number),
-            "spin": rng.uniform(0, 2 * np.pi, number),
+            "angle": rng.uniform(0, 2 * np.pi, number),
             "scale": log_uniforms(rng, 0.3, 4, number),
             "offset": rng.random((number, 2)),
             "first": first,
             "second": first * np.exp(two * rng.normal(0, 0.5, (number, 3))),
-            "fall": rng.normal((0, 0.1), (0.3, 0.25), (number, 2)),
+            "gradient": rng.normal((0, 0.1), (0.3, 0.25), (number, 2)),
         }
     )
 
 
 def _colours(rng: np.random.Generator, number: int) -> np.ndarray:
-    """Colours (N, 3) of walls, cloths and tables, linear: mostly pale."""
+    """Colours (N, 3) of walls, cloths and tables, linear: mostly of low saturation."""
     spread = np.where(rng.random((number, 1)) < 0.7, 0.12, 0.6)
     tint = spread * rng.normal(0, 1, (number, 3))
     grey = log_uniforms(rng, 0.03, 0.9, (number, 1))
@@ -240,7 +242,7 @@ def _colours(rng: np.random.Generator, number: int) -> np.ndarray:
 
 
 class Backgrounds:
-    """Shows backgrounds on the device that holds panoramas and patterns.
+    """Renders backgrounds on the device of the panoramas and patterns.
 
     Parameters
     ----------
@@ -251,15 +253,15 @@ class Backgrounds:
 
     def __init__(self, panoramas: torch.Tensor, patterns: torch.Tensor) -> None:
         self._number, self._rows = panoramas.shape[:2]
-        tower = panoramas.float().flatten(0, 1).permute(2, 0, 1)[None]  # one above the other
-        self._panoramas, self._patterns = _periodic(tower), patterns
+        stacked = panoramas.float().flatten(0, 1).permute(2, 0, 1)[None]  # one above the other
+        self._panoramas, self._patterns = _periodic(stacked), patterns
 
-    def __call__(self, drawn: Grounds, side: int) -> torch.Tensor:
-        """Show backgrounds.
+    def __call__(self, drawn: BackgroundDraws, side: int) -> torch.Tensor:
+        """Render backgrounds.
 
         Parameters
         ----------
-        drawn : Grounds
+        drawn : BackgroundDraws
             On the device.
         side : int
             Pixels.
@@ -275,31 +277,31 @@ class Backgrounds:
         light = x.new_empty(len(x), 3, side, side)
         crops, backdrops, tables = drawn.crops, drawn.backdrops, drawn.tables
         if len(at := crops.photo):
-            light[at] = self._cropped(crops, x[at], y[at])
+            light[at] = self._crop(crops, x[at], y[at])
         if len(at := backdrops.photo):
-            light[at] = _backdrop(backdrops, x[at], y[at])
+            light[at] = _render_backdrop(backdrops, x[at], y[at])
         if len(at := tables.photo):
-            light[at] = self._before(light[at], tables, x[at], y[at])
+            light[at] = self._with_table(light[at], tables, x[at], y[at])
         return light.clamp(0, 1)
 
-    def _cropped(self, drawn: Crops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    def _crop(self, drawn: Crops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
         rows, half = self._rows, drawn.half[:, None, None]
         rays = torch.stack([x * half, -y * half, -torch.ones_like(x)], dim=-1)
-        rays = torch.einsum("bhwi,bij->bhwj", rays, drawn.turn)
+        rays = torch.einsum("bhwi,bij->bhwj", rays, drawn.rotation)
         up = rays[..., 1] / rays.norm(dim=-1)
         turn = torch.atan2(rays[..., 0], -rays[..., 2]) + drawn.azimuth[:, None, None]
         at = (up.clamp(-1, 1).arccos(), turn)
         row, column = (angle * (rows / torch.pi) - 0.5 for angle in at)
         floor = rows * chosen(drawn.panorama, self._number)[:, None, None]
         place = (floor + row.clamp(0, rows - 1), column)
-        picture = _looked_up(self._panoramas, *(one.flatten(0, 1)[None] for one in place))
+        picture = _sampled(self._panoramas, *(one.flatten(0, 1)[None] for one in place))
         picture = picture[0].unflatten(1, row.shape[:2]).transpose(0, 1)
-        bright = picture[..., ::_SPARSE, ::_SPARSE].amax(1).flatten(1).sort(1).values
+        bright = picture[..., ::_STRIDE, ::_STRIDE].amax(1).flatten(1).sort(1).values
         place = (drawn.quantile * (bright.shape[1] - 1)).round().long()
         bright = bright.gather(1, place[:, None])[:, 0].clamp(min=1e-6)
         return picture * (drawn.exposure / bright)[:, None, None, None]
 
-    def _before(
+    def _with_table(
         self, light: torch.Tensor, drawn: Tables, x: torch.Tensor, y: torch.Tensor
     ) -> torch.Tensor:
         side, size = x.shape[-1], self._patterns.shape[-1]
@@ -307,33 +309,33 @@ class Backgrounds:
         y = y + value["tilt"] * x
         away = (y - value["horizon"]).clamp(min=0.05)
         u, v = x * value["scale"] / away, 1.5 * value["scale"] / away
-        sine, cosine = value["spin"].sin(), value["spin"].cos()
+        sine, cosine = value["angle"].sin(), value["angle"].cos()
         row = (sine * u + cosine * v + value["offset"][..., 0]) * size
         column = (cosine * u - sine * v + value["offset"][..., 1]) * size
         maps = self._patterns[chosen(drawn.pattern, len(self._patterns))]
         maps = _blurred(maps, drawn.scale * (_PATTERN_PIXEL / side))[:, None]
-        grey = _looked_up(_periodic(maps), row, column)
-        fall = value["fall"][..., 0] * x + value["fall"][..., 1] * y
+        grey = _sampled(_periodic(maps), row, column)
+        gradient = value["gradient"][..., 0] * x + value["gradient"][..., 1] * y
         first, second = drawn.first[..., None, None], drawn.second[..., None, None]
-        table = torch.lerp(first, second, grey) * fall.exp()[:, None]
+        table = torch.lerp(first, second, grey) * gradient.exp()[:, None]
         share = ((y - value["edge"]) * (side / 4)).clamp(0, 1)
         return torch.lerp(light, table, share[:, None])
 
 
-def _backdrop(drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+def _render_backdrop(drawn: Backdrops, x: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
     value = {name: part[:, None, None] for name, part in vars(drawn).items()}
     side = x.shape[-1]
     noise = torch.randn(len(x), 1, side, side, device=x.device)
     place = torch.arange(side, device=x.device) / value["width"]
     row, column = torch.broadcast_tensors(place.mT, place)
-    log_light = value["grain"] * _looked_up(_periodic(noise), row, column)[:, 0]
-    log_light = log_light + value["slope"][..., 0] * x + value["slope"][..., 1] * y
+    log_light = value["grain"] * _sampled(_periodic(noise), row, column)[:, 0]
+    log_light = log_light + value["gradient"][..., 0] * x + value["gradient"][..., 1] * y
     log_light = log_light - value["vignette"] * (x.square() + y.square())
     return drawn.colour[..., None, None] * log_light.exp()[:, None]
 
 
 def _blurred(patterns: torch.Tensor, deviation: torch.Tensor) -> torch.Tensor:
-    """Patterns (B, side, side) of 8 bits that repeat, in [0, 1]; the deviation in their sides."""
+    """Blur periodic patterns (B, side, side) of 8 bits; the deviation is in units of their side."""
     side = patterns.shape[-1]
     waves = [torch.fft.fftfreq(side, 1 / side), torch.fft.rfftfreq(side, 1 / side)]
     rows, columns = (one.to(patterns.device).square() for one in waves)
@@ -343,12 +345,12 @@ def _blurred(patterns: torch.Tensor, deviation: torch.Tensor) -> torch.Tensor:
 
 
 def _periodic(maps: torch.Tensor) -> torch.Tensor:
-    """Maps (B, C, rows, columns) that repeat, with their first row and column again at the end."""
+    """Periodic maps (B, C, rows, columns) with their first row and column repeated at the end."""
     return functional.pad(maps, (0, 1, 0, 1), mode="circular")
 
 
-def _looked_up(maps: torch.Tensor, row: torch.Tensor, column: torch.Tensor) -> torch.Tensor:
-    """Interpolate (B, C, H, W) in what `_periodic` returns, at rows and columns (B, H, W)."""
+def _sampled(maps: torch.Tensor, row: torch.Tensor, column: torch.Tensor) -> torch.Tensor:
+    """Sample maps of `_periodic` at rows and columns (B, H, W): (B, C, H, W)."""
     rows, columns = (size - 1 for size in maps.shape[2:])
     grid = torch.stack([column % columns / columns, row % rows / rows], dim=-1) * 2 - 1
     return functional.grid_sample(maps, grid, padding_mode="border", align_corners=True)

@@ -1,13 +1,13 @@
 """Photos of objects before backgrounds, with the mask of the target object.
 
-Problem: a photo shows one object, none or several; some are in its background or cut by its frame.
-Without a hint the target is the object in front; with points or a box it is what they mark.
+Problem: a photo shows no object, one or several; others may be small in the background or cut by
+the frame. Without hints, the target is the object in front; with hints, the object that they mark.
 
 Equation: see `training.masks.pasting`. Then exposure, white balance, and the camera of
 `training.world.camera`.
 
-Random numbers are drawn in NumPy; all else happens in batches on one device without
-synchronisation: array shapes are decided before the numbers go there.
+Random numbers are drawn in NumPy on the CPU, which determines all array shapes. Everything else
+runs in batches on the device without synchronisation.
 
 Limits: those of `training.masks.pasting` and `training.masks.backgrounds`.
 """
@@ -22,23 +22,23 @@ from isc_core.networks.mask_network import Count
 from ..world.camera import draw_camera, exposed, photographed
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
-from .backgrounds import SHARES as GROUND_SHARES
-from .backgrounds import Backgrounds, Grounds, draw_grounds
+from .backgrounds import SHARES as BACKGROUND_SHARES
+from .backgrounds import BackgroundDraws, Backgrounds, draw_backgrounds
 from .hints import HintDraws, draw_hints, hint_maps, hinted
 from .ingredients import LENGTH, SIDE
 from .packs import Ingredients
 from .pasting import CutOuts, shadows
-from .scenes import MOST, SHARES, PastedObjects, Scenes, draw_scenes
+from .scenes import MAX_OBJECTS, SHARES, PastedObjects, Scenes, draw_scenes
 from .variation import (
-    GroundVariation,
+    BackgroundVariation,
     ObjectVariation,
-    ground_variation,
-    match,
-    varied_light,
+    draw_background_variation,
+    matched_colours,
+    varied_backgrounds,
     varied_objects,
 )
 
-_GREY = 0.04  # share of photos without colours
+_GREY = 0.04  # share of monochrome photos
 
 
 @dataclass(frozen=True)
@@ -48,15 +48,15 @@ class Composite(TensorBatch):
     Attributes
     ----------
     photo : (B, 3, SIDE, SIDE) tensor
-        Linear light, 0 outside of the frame.
+        Linear light, 0 outside the frame.
     frame : (B, 1, SIDE, SIDE) tensor
-        1 inside of the photo.
+        1 inside the photo.
     hints : (B, 3, SIDE, SIDE) tensor
         Points on the object, points on the background, the box.
     mask : (B, 1, SIDE, SIDE) tensor
-        Cover of the targets.
+        Coverage by the targets.
     count : (B,) int64 tensor
-        Of `isc_core.networks.mask_network.Count`.
+        Values of `isc_core.networks.mask_network.Count`.
     """
 
     photo: torch.Tensor
@@ -68,13 +68,13 @@ class Composite(TensorBatch):
 
 @dataclass(frozen=True)
 class Cameras(TensorBatch):
-    """Colours of the light, and the attributes of `CameraDraw`, one for each photo.
+    """White balance, and the attributes of `CameraDraw`, one for each photo.
 
     Attributes
     ----------
     balance : (B, 3) tensor
     grey : (B,) bool tensor
-        The photo has no colours.
+        The photo is monochrome.
     """
 
     balance: torch.Tensor
@@ -92,26 +92,26 @@ class Cameras(TensorBatch):
 
 @dataclass(frozen=True)
 class CompositeDraw(TensorBatch):
-    """All that is drawn of a batch.
+    """All random variables of a batch.
 
     Attributes
     ----------
     scenes : Scenes
     objects : PastedObjects
-    grounds : Grounds
+    backgrounds : BackgroundDraws
     hints : HintDraws
     cameras : Cameras
-    object_variation, ground_variation : ObjectVariation, GroundVariation or None
-        None: as they are.
+    object_variation, background_variation : ObjectVariation, BackgroundVariation or None
+        None: without variation.
     """
 
     scenes: Scenes
     objects: PastedObjects
-    grounds: Grounds
+    backgrounds: BackgroundDraws
     hints: HintDraws
     cameras: Cameras
     object_variation: ObjectVariation | None = None
-    ground_variation: GroundVariation | None = None
+    background_variation: BackgroundVariation | None = None
 
 
 @dataclass(frozen=True)
@@ -125,17 +125,17 @@ class CompositeDraws:
     hinted : float
         Share of photos with hints.
     shares : tuple of float
-        Of scenes without an object, with one, with several.
-    grounds : tuple of float
-        Shares of plain backgrounds, and of those with a table.
+        Of scenes with no object, one and several.
+    backgrounds : tuple of float
+        Shares of plain backgrounds, and of backgrounds with a table.
     varied : bool
-        Vary bodies and backgrounds, see `variation`.
+        Vary objects and backgrounds, see `variation`.
     """
 
     size: int
     hinted: float = 0.5
     shares: tuple[float, ...] = SHARES
-    grounds: tuple[float, float] = GROUND_SHARES
+    backgrounds: tuple[float, float] = BACKGROUND_SHARES
     varied: bool = False
 
     def __call__(self, rng: np.random.Generator) -> CompositeDraw:
@@ -150,19 +150,19 @@ class CompositeDraws:
         CompositeDraw
             On the CPU.
         """
-        drawn, objects = draw_scenes(rng, self.size, self.shares)
-        object_variation, ground_varied = None, None
+        scenes, objects = draw_scenes(rng, self.size, self.shares)
+        object_variation, of_backgrounds = None, None
         if self.varied:
             objects, object_variation = varied_objects(objects, rng)
-            ground_varied = ground_variation(rng, self.size)
+            of_backgrounds = draw_background_variation(rng, self.size)
         return CompositeDraw(
-            drawn,
+            scenes,
             objects,
-            draw_grounds(rng, self.size, self.grounds),
-            draw_hints(rng, self.size, self.hinted, MOST),
+            draw_backgrounds(rng, self.size, self.backgrounds),
+            draw_hints(rng, self.size, self.hinted, MAX_OBJECTS),
             _draw_cameras(rng, self.size),
             object_variation,
-            ground_varied,
+            of_backgrounds,
         )
 
 
@@ -176,7 +176,7 @@ def _draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
 
 
 class Composites:
-    """Draws and composes photos on one device.
+    """Draws photos, and composes them on one device.
 
     Parameters
     ----------
@@ -194,12 +194,12 @@ class Composites:
         side: int = SIDE,
         device: str | torch.device = "cpu",
     ) -> None:
-        bodies, panoramas, patterns = (
+        cutouts, panoramas, patterns = (
             torch.from_numpy(part).to(device) for part in vars(ingredients).values()
         )
         self._draw, self._side, self._device = draw, side, device
-        self._bodies, self._grounds = CutOuts(bodies), Backgrounds(panoramas, patterns)
-        self._factor = side / bodies.shape[-1] / LENGTH
+        self._cutouts, self._backgrounds = CutOuts(cutouts), Backgrounds(panoramas, patterns)
+        self._factor = side / cutouts.shape[-1] / LENGTH
 
     def __call__(self, rng: np.random.Generator) -> Composite:
         """Return the next batch.
@@ -212,9 +212,9 @@ class Composites:
         -------
         Composite
         """
-        return self.finished(self._draw(rng))
+        return self.composed(self._draw(rng))
 
-    def finished(self, drawn: CompositeDraw) -> Composite:
+    def composed(self, drawn: CompositeDraw) -> Composite:
         """Compose the photos of a draw.
 
         Parameters
@@ -227,32 +227,32 @@ class Composites:
         Composite
             On the device.
         """
-        levels = self._grouped(self._bodies.levels(drawn.objects.length * self._factor))
-        layers = self._grouped(drawn.objects.layer)
+        levels = self._rows_of(self._cutouts.levels(drawn.objects.length * self._factor))
+        layers = self._rows_of(drawn.objects.layer)
         drawn = drawn.to(self._device)
-        frame, light = frames(drawn.scenes.shape, self._side), self._behind(drawn)
+        frame, light = frames(drawn.scenes.shape, self._side), self._background(drawn)
         covers = light.new_zeros(len(light), max(len(layers), 1), *light.shape[2:])
         if layers:
-            body, cover = self._bodies.placed(drawn.objects, levels, self._side)
-            _paste(light, covers, body, cover, drawn, layers)
+            foreground, cover = self._cutouts.placed(drawn.objects, levels, self._side)
+            _paste(light, covers, foreground, cover, drawn, layers)
         mask, hints, count = _ground_truth(covers * frame, frame, drawn)
-        return Composite(_taken(light, frame, drawn.cameras), frame, hints, mask, count)
+        return Composite(_photographed(light, frame, drawn.cameras), frame, hints, mask, count)
 
-    def _grouped(self, numbers: torch.Tensor) -> dict[int, torch.Tensor]:
-        """The rows of each number that occurs, found before the numbers go to the device."""
+    def _rows_of(self, numbers: torch.Tensor) -> dict[int, torch.Tensor]:
+        """The rows in which each number occurs, found on the CPU, moved to the device."""
         found = {int(k): torch.nonzero(numbers == k)[:, 0] for k in numbers.unique()}
         return {k: rows.to(self._device) for k, rows in found.items()}
 
-    def _behind(self, drawn: CompositeDraw) -> torch.Tensor:
-        light = self._grounds(drawn.grounds, self._side)
-        if drawn.ground_variation is not None:
-            light = varied_light(light, drawn.ground_variation)
+    def _background(self, drawn: CompositeDraw) -> torch.Tensor:
+        light = self._backgrounds(drawn.backgrounds, self._side)
+        if drawn.background_variation is not None:
+            light = varied_backgrounds(light, drawn.background_variation)
         level = drawn.scenes.level[:, None, None, None]
         return light * (level / light.mean((1, 2, 3), keepdim=True).clamp(min=1e-3))
 
 
 def frames(shapes: torch.Tensor, side: int) -> torch.Tensor:
-    """Return where photos lie in the network's frame.
+    """Return which pixels of the network's frame lie in the photos.
 
     Parameters
     ----------
@@ -273,18 +273,18 @@ def frames(shapes: torch.Tensor, side: int) -> torch.Tensor:
 def _paste(
     light: torch.Tensor,
     covers: torch.Tensor,
-    body: torch.Tensor,
+    foreground: torch.Tensor,
     cover: torch.Tensor,
     drawn: CompositeDraw,
     layers: dict[int, torch.Tensor],
 ) -> None:
-    """Put objects before backgrounds: changes the light, and what is seen of each object (B, T)."""
+    """Paste objects into the light, in place; `covers` (B, T, H, W) receives the visible parts."""
     shade, varied = shadows(cover, drawn.objects), drawn.object_variation
     for k, rows in layers.items():
-        photos, over, front = drawn.objects.photo[rows], cover[rows], body[rows]
+        photos, over, front = drawn.objects.photo[rows], cover[rows], foreground[rows]
         behind = light[photos]
         if varied is not None:
-            front = match(front, over, behind, varied.chosen(rows))
+            front = matched_colours(front, over, behind, varied.chosen(rows))
         light[photos] = (1 - over) * behind * (1 - shade[rows]) + front
         covers[photos, :k] *= 1 - over
         covers[photos, k] = over[:, 0]
@@ -293,7 +293,7 @@ def _paste(
 def _ground_truth(
     covers: torch.Tensor, frame: torch.Tensor, drawn: CompositeDraw
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Masks, hints and counts that the network is trained with."""
+    """Masks, hints and counts that the network is trained on."""
     objects, given = drawn.objects, drawn.hints.given
     alone = torch.zeros(covers.shape[:2], dtype=torch.bool, device=covers.device)
     alone[objects.photo, objects.layer] = objects.target
@@ -305,8 +305,8 @@ def _ground_truth(
     return mask, hints, count
 
 
-def _taken(light: torch.Tensor, frame: torch.Tensor, cameras: Cameras) -> torch.Tensor:
-    """Expose, balance and photograph pictures; 0 outside of the frame."""
+def _photographed(light: torch.Tensor, frame: torch.Tensor, cameras: Cameras) -> torch.Tensor:
+    """Apply white balance, exposure and the camera; 0 outside the frame."""
     light = light * cameras.balance[..., None, None]
     grey = cameras.grey[:, None, None, None]
     light = torch.where(grey, light.mean(1, keepdim=True), light)

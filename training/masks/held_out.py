@@ -1,9 +1,12 @@
-"""Composites of held-out bodies and panoramas, larger than the network sees them.
+"""Composites of held-out objects and panoramas, at a higher resolution than the network's.
 
-Bodies and panoramas are those that every fit leaves out. They are halved: part A chooses
-thresholds, part B is the test set. Masked photos of real objects can replace the bodies.
+Problem: thresholds and errors of the mask network need photos with known masks, of objects and
+backgrounds that no training run has used.
 
-Limits: bodies are traced at 160 pixels and panoramas have 512 columns: both are soft.
+The objects and panoramas that every training run leaves out are halved: part A is for choosing
+thresholds, part B is the test set. Masked photos of real objects can replace the rendered objects.
+
+Limits: objects are rendered at 160 pixels and panoramas have 512 columns: both are blurred.
 """
 
 from collections.abc import Iterator
@@ -19,25 +22,25 @@ from isc_core.photo import read_photo
 from ..networks.scene_batches import read_world
 from ..world.files import Split
 from .composites import CompositeDraws, Composites
-from .ingredients import cut_out, lit_bodies, panoramas_in
+from .ingredients import cut_out, lit_cutouts, panoramas_in
 from .packs import Ingredients
 
 SIDE = 320  # pixels of a composite's longer side
-_PICTURE = 256  # of a body
+_CUTOUT_SIDE = 256  # pixels
 _BATCH = 8
 PARTS = ("A", "B")
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """A composite with its truth.
+    """A composite with its ground truth.
 
     Attributes
     ----------
     light : (H, W, 3) float32 ndarray
         Linear, 1 is white.
     cover : (H, W) float32 ndarray
-        Of the target; of all objects, if there are several.
+        Coverage by the target; by all objects if there are several.
     count : Count
     """
 
@@ -49,14 +52,14 @@ class HeldOut:
 def held_out_ingredients(
     world: Path, panoramas: Path, part: str, photos: Path | None = None, seed: int = 0
 ) -> Ingredients:
-    """Light held-out bodies, and read held-out panoramas.
+    """Render held-out objects, and read held-out panoramas.
 
     Parameters
     ----------
     world, panoramas : Path
     part : {"A", "B"}
     photos : Path, optional
-        Folder of masked photos to use in place of the bodies.
+        Folder of masked photos to use in place of rendered objects.
     seed : int
 
     Returns
@@ -72,18 +75,18 @@ def held_out_ingredients(
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.UNSEEN_BODY,), seed)
     if photos is not None:
-        pictures = [masked_picture(path) for path in sorted(photos.glob("*.png"))]
+        cutouts = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
     else:
         found.views[Split.UNSEEN_BODY][:] = found.views[Split.UNSEEN_BODY][half::2]
-        pictures = list(
-            lit_bodies(found, Split.UNSEEN_BODY, found.held_out_environments, rng, _PICTURE)
+        cutouts = list(
+            lit_cutouts(found, Split.UNSEEN_BODY, found.held_out_environments, rng, _CUTOUT_SIDE)
         )
     kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
-    return Ingredients(np.stack(pictures), kept, found.atlas.maps)
+    return Ingredients(np.stack(cutouts), kept, found.atlas.maps)
 
 
-def masked_picture(path: Path) -> np.ndarray:
-    """Read a masked photo as a body of composites.
+def masked_cutout(path: Path) -> np.ndarray:
+    """Read a masked photo as a cut-out.
 
     Parameters
     ----------
@@ -92,11 +95,11 @@ def masked_picture(path: Path) -> np.ndarray:
     Returns
     -------
     (4, 256, 256) uint8 ndarray
-        As of `Ingredients.bodies`.
+        As in `Ingredients.cutouts`.
     """
     photo = read_photo(path)
     light = torch.from_numpy(photo.image).permute(2, 0, 1)[None]
-    return next(cut_out(light, torch.from_numpy(photo.mask)[None, None].float(), _PICTURE))
+    return next(cut_out(light, torch.from_numpy(photo.mask)[None, None].float(), _CUTOUT_SIDE))
 
 
 def held_out_composites(
@@ -108,7 +111,7 @@ def held_out_composites(
     ----------
     ingredients : Ingredients
     count : Count
-        How many objects each shows.
+        Of the objects in each photo.
     number : int
         Of photos.
     seed : int

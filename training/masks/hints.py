@@ -1,9 +1,11 @@
-"""Points and boxes as a user gives them, for a whole batch at once.
+"""Simulated hints of users: points and boxes, for a batch.
 
-Equation: the pixel that a share u of the pixels of a set S chooses is the first at which the
-running count of S exceeds u |S|.
+Problem: the network learns to use hints, and each photo needs other ones.
 
-Limits: pixels are drawn evenly; people point at the middle.
+Equation: a random pixel of a set S is the first at which the running count of S exceeds u |S|, for
+u uniform in [0, 1).
+
+Limits: points are uniform over the object; people point at its middle.
 """
 
 from dataclasses import dataclass
@@ -15,33 +17,33 @@ from isc_core.networks.mask_network import POINT_RADIUS
 
 from ..world.tensor_batch import TensorBatch
 
-_POINTS = 3  # most of one kind
-_NOTHING, _SAME = 0.06, 0.6  # shares: hints at the background; at the target without hints
-_VISIBLE = 40  # visible pixels that an object needs to be hinted at
+_MAX_POINTS = 3  # of one kind
+_BACKGROUND, _SAME = 0.06, 0.6  # shares of hints on the background; on the target without hints
+_MIN_PIXELS = 40  # visible pixels of an object that hints may select
 
 
 @dataclass(frozen=True)
 class HintDraws(TensorBatch):
-    """What is drawn of the hints of a batch.
+    """Random variables of the hints of a batch.
 
     Attributes
     ----------
     given : (B,) bool tensor
         The photo has hints.
-    nothing, same : (B,) bool tensor
-        They lie on the background; on the target without hints.
-    preferred : (B, MOST) tensor
-        Else on the visible object with the largest number.
-    points : (B, 2, _POINTS) tensor
-        Shares of the pixels: on the object, on the background; above 1: no point.
+    background, same : (B,) bool tensor
+        Hints lie on the background; on the target without hints.
+    preferred : (B, MAX_OBJECTS) tensor
+        Otherwise, hints lie on the visible object with the largest of these numbers.
+    points : (B, 2, _MAX_POINTS) tensor
+        u of the module, on the object and on the background; above 1: no point.
     box : (B,) bool tensor
-        There is a box.
+        Whether there is a box.
     margins : (B, 4) tensor
-        Its distance from the object above, below, left and right, of the object's sides.
+        Distances of the box from the object above, below, left and right, of the object's sides.
     """
 
     given: torch.Tensor
-    nothing: torch.Tensor
+    background: torch.Tensor
     same: torch.Tensor
     preferred: torch.Tensor
     points: torch.Tensor
@@ -60,7 +62,7 @@ def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -
     share : float
         Of photos with hints.
     most : int
-        Objects of a photo.
+        Maximum number of objects in a photo.
 
     Returns
     -------
@@ -68,14 +70,14 @@ def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -
         On the CPU.
     """
     kind = rng.random(number)
-    counts = rng.integers(1, _POINTS + 1, (number, 2, 1))
+    counts = rng.integers(1, _MAX_POINTS + 1, (number, 2, 1))
     counts[:, 0, 0] *= kind < 0.7
     counts[:, 1, 0] *= rng.random(number) < 0.35
-    points = rng.random((number, 2, _POINTS)) + 2 * (np.arange(_POINTS) >= counts)
+    points = rng.random((number, 2, _MAX_POINTS)) + 2 * (np.arange(_MAX_POINTS) >= counts)
     return HintDraws.of(
         {
             "given": rng.random(number) < share,
-            "nothing": rng.random(number) < _NOTHING,
+            "background": rng.random(number) < _BACKGROUND,
             "same": rng.random(number) < _SAME,
             "preferred": rng.random((number, most)),
             "points": points,
@@ -99,23 +101,23 @@ def hinted(covers: torch.Tensor, target: torch.Tensor, draws: HintDraws) -> torc
     Returns
     -------
     (B, T) bool tensor
-        At most one of each photo; none: the background.
+        At most one per photo; none if the hints lie on the background.
     """
-    seen = (covers > 0.5).sum((2, 3)) > _VISIBLE
+    seen = (covers > 0.5).sum((2, 3)) > _MIN_PIXELS
     alone = target & (target.sum(1, keepdim=True) == 1)
     preferred = draws.preferred[:, : covers.shape[1]] + 2 * (alone & draws.same[:, None])
     preferred = torch.where(seen, preferred, -1)
     best = preferred == preferred.amax(1, keepdim=True)
-    return best & seen & ~draws.nothing[:, None]
+    return best & seen & ~draws.background[:, None]
 
 
 def hint_maps(truth: torch.Tensor, inside: torch.Tensor, draws: HintDraws) -> torch.Tensor:
-    """Draw the maps that the network sees.
+    """Draw the hint channels of the network.
 
     Parameters
     ----------
     truth : (B, H, W) bool tensor
-        The target; empty: points lie on the background.
+        The target; if empty, points lie on the background.
     inside : (B, H, W) bool tensor
         The frame.
     draws : HintDraws
@@ -132,21 +134,21 @@ def hint_maps(truth: torch.Tensor, inside: torch.Tensor, draws: HintDraws) -> to
     return torch.stack([*maps, box], 1).float() * draws.given[:, None, None, None]
 
 
-def _discs(where: torch.Tensor, shares: torch.Tensor) -> torch.Tensor:
-    """Discs (B, H, W) around points, given as shares (B, K) of the pixels of sets."""
+def _discs(where: torch.Tensor, uniform: torch.Tensor) -> torch.Tensor:
+    """Discs (B, H, W) around random pixels of sets, chosen by u (B, K) of the module."""
     counted = where.flatten(1).cumsum(1)
     total = counted[:, -1:]
-    at = torch.searchsorted(counted, (shares * total).long(), right=True)
+    at = torch.searchsorted(counted, (uniform * total).long(), right=True)
     width = where.shape[2]
-    row, column = ((part)[..., None] for part in (at // width, at % width))
+    row, column = (part[..., None] for part in (at // width, at % width))
     off = [torch.arange(n, device=where.device) for n in where.shape[1:]]
     tall, wide = (off[0] - row).square(), (off[1] - column).square()
     disc = tall[..., :, None] + wide[..., None, :] <= POINT_RADIUS**2
-    return (disc & ((shares < 1) & (total > 0))[..., None, None]).any(1)
+    return (disc & ((uniform < 1) & (total > 0))[..., None, None]).any(1)
 
 
 def _box(truth: torch.Tensor, margins: torch.Tensor) -> torch.Tensor:
-    """Boxes (B, H, W) around sets."""
+    """Filled boxes (B, H, W) around sets."""
     sides = []
     for axis, off in ((2, margins[:, :2]), (1, margins[:, 2:])):
         line = truth.any(axis)

@@ -1,16 +1,16 @@
-"""What composites are made of: bodies lit and cut out, panoramas, and patterns of tables.
+"""Ingredients of composites: cut-outs of rendered objects, panoramas, and patterns of tables.
 
   python -m training.masks.ingredients WORLD --panoramas DIR -o FOLDER
 
-Problem: the mask network sees millions of photos of objects before other objects. Lighting a body
-takes as long as a step of the network, pasting it a hundredth of that: bodies are lit once and
-pasted many times, each time elsewhere, in another size, before another background.
+Problem: the mask network is trained on millions of photos. Rendering an object takes as long as a
+training step, pasting its cut-out a hundredth of that. Objects are therefore rendered once and
+pasted many times, each time at another place, at another size, in front of another background.
 
-FOLDER/learned.npz and FOLDER/judged.npz are compressed (`training.masks.packs`) so that they may
-travel to another machine. `--first 3` after `--rounds 3` lights the bodies in other ways than the
-run before, for a second folder beside the first.
+FOLDER/learned.npz, for training, and FOLDER/judged.npz, with held-out objects and panoramas, are
+compressed (`training.masks.packs`), so that they can be copied to another machine. `--first 3`
+after `--rounds 3` renders the objects in other lights than the previous run, for a second folder.
 
-Limits: a body is not lit by the background that it is pasted before.
+Limits: the light on an object is not that of the background in front of which it is pasted.
 """
 
 import argparse
@@ -34,45 +34,45 @@ from ..world.recipes import Shares, draw_recipe
 from ..world.view_batches import batch_of
 from .packs import SUFFIX, Ingredients
 
-SIDE = 128  # pixels of a picture
-LENGTH = 120  # longer side of a body in it
-_LIT = 8  # views lit together
-_WHITE = 0.99  # share of a body's pixels that are darker than white
-_LEAST_COVER = 0.02  # of a picture: smaller bodies are left out
-SETS = ("learned", "judged")  # for training, and held out
+SIDE = 128  # of a cut-out, pixels
+LENGTH = 120  # of the object in it, pixels
+_BATCH = 8  # views rendered together
+_WHITE = 0.99  # quantile of an object's light that becomes white
+_MIN_COVER = 0.02  # of an image: smaller objects are left out
+SETS = ("learned", "judged")  # names of the files for training, and of the held-out set
 ROWS = 256  # of panoramas
-_BRIGHTEST = 6e4  # that half floats hold
+_MAX_LIGHT = 6e4  # half floats end at 65504
 _FILES = (".exr", ".hdr")
 _PATTERNS = 600
 
 
-def lit_bodies(
+def lit_cutouts(
     world: World,
     split: Split,
     environments: np.ndarray,
     rng: np.random.Generator,
     side: int = SIDE,
 ) -> np.ndarray:
-    """Light every view and cut the bodies out.
+    """Render every view, and cut out the objects.
 
     Parameters
     ----------
     world : World
     split : Split
     environments : (N,) ndarray of int
-        Those of the bank that may light.
+        Indices of the bank's environments to use.
     rng : numpy.random.Generator
     side : int
-        Pixels of a picture.
+        Of a cut-out, pixels.
 
     Returns
     -------
     (N, 4, side, side) uint8 ndarray
-        As `packs.Ingredients.bodies`.
+        As `packs.Ingredients.cutouts`.
     """
     views, shares, found = world.views[split], Shares(), list[np.ndarray]()
-    for start in range(0, len(views), _LIT):
-        some = views[start : start + _LIT]
+    for start in range(0, len(views), _BATCH):
+        some = views[start : start + _BATCH]
         recipes = stacked(
             [draw_recipe(one.directions, world.atlas, environments, rng, shares) for one in some]
         )
@@ -83,7 +83,7 @@ def lit_bodies(
 
 
 def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Iterator[np.ndarray]:
-    """Bring bodies to one size and to 8 bits.
+    """Scale objects to one size, and convert them to 8 bits.
 
     Parameters
     ----------
@@ -91,19 +91,19 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Itera
         Linear.
     cover : (B, 1, H, W) tensor
     side : int
-        Pixels of a picture.
+        Of a cut-out, pixels.
 
     Yields
     ------
     (4, side, side) uint8 ndarray
-        Of those that are not tiny.
+        One per object, in order; objects that are too small are left out.
     """
-    for picture, body in zip(light, cover, strict=True):
-        rows, columns = torch.nonzero(body[0] > 0.5, as_tuple=True)
-        if len(rows) < _LEAST_COVER * body.numel():
+    for image, covered in zip(light, cover, strict=True):
+        rows, columns = torch.nonzero(covered[0] > 0.5, as_tuple=True)
+        if len(rows) < _MIN_COVER * covered.numel():
             continue
-        white = torch.quantile(picture.amax(0)[body[0] > 0.5], _WHITE).clamp(min=1e-6)
-        layers = torch.cat([(picture / white).clamp(max=1) * body, body])
+        white = torch.quantile(image.amax(0)[covered[0] > 0.5], _WHITE).clamp(min=1e-6)
+        layers = torch.cat([(image / white).clamp(max=1) * covered, covered])
         part = layers[:, rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
         factor = LENGTH * side / SIDE / max(part.shape[1:])
         size = [max(round(n * factor), 1) for n in part.shape[1:]]
@@ -124,9 +124,9 @@ def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
     ----------
     folder : Path
     seed : int
-        Chooses which are held out.
+        Determines which are held out.
     held_out : bool
-        Whether to read those, or the others.
+        Whether to read the held-out ones, or the others.
 
     Returns
     -------
@@ -136,7 +136,7 @@ def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
     Raises
     ------
     InputError
-        If there is none of the set, or one cannot be used.
+        If there is none, or one cannot be used.
     """
     wanted = {one.name for one in read_panoramas(folder, seed) if one.held_out == held_out}
     size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
@@ -144,7 +144,7 @@ def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
         if path.suffix.lower() in _FILES and path.stem in wanted:
             light = torch.from_numpy(read_linear(path, "linear")).permute(2, 0, 1)[None].float()
             light = functional.interpolate(light, size, mode="bilinear", antialias=True)[0]
-            found.append(light.clamp(max=_BRIGHTEST).permute(1, 2, 0).numpy().astype(np.float16))
+            found.append(light.clamp(max=_MAX_LIGHT).permute(1, 2, 0).numpy().astype(np.float16))
     if not found:
         raise InputError(f"{folder} has too few panoramas to hold one out: six are enough")
     return np.stack(found)
@@ -158,8 +158,8 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--rounds", type=int, default=1, help="lights of each view (default: %(default)s)")
-    add("--first", type=int, default=0, help="number of the first (default: %(default)s)")
+    add("--rounds", type=int, default=1, help="renderings of each view (default: %(default)s)")
+    add("--first", type=int, default=0, help="index of the first (default: %(default)s)")
     add("--seed", type=int, default=0, help="default: %(default)s")
     add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="where to write")
     given = parser.parse_args()
@@ -176,13 +176,13 @@ def main() -> None:
     splits = zip(SETS, (Split.TRAIN, Split.UNSEEN_BODY), environments, strict=True)
     for k, (name, split, usable) in enumerate(splits):
         rounds = range(given.first, given.first + given.rounds)
-        bodies = [
-            lit_bodies(world, split, usable, np.random.default_rng([given.seed, k, n]))
+        cutouts = [
+            lit_cutouts(world, split, usable, np.random.default_rng([given.seed, k, n]))
             for n in rounds
         ]
-        made = Ingredients(np.concatenate(bodies), panoramas[k], world.atlas.maps[:_PATTERNS])
+        made = Ingredients(np.concatenate(cutouts), panoramas[k], world.atlas.maps[:_PATTERNS])
         path = given.output / f"{name}{SUFFIX}"
-        print(f"{path}: {len(made.bodies)} bodies, {made.write(path) / 1e6:.1f} MB", flush=True)
+        print(f"{path}: {len(made.cutouts)} cut-outs, {made.write(path) / 1e6:.1f} MB", flush=True)
 
 
 if __name__ == "__main__":

@@ -2,9 +2,9 @@
 
   python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
-Equation: logistic regression of "the photo shows one object, and the mask overlaps it by .5 or
-more" on `isc_core.masking.confidence`, with a small ridge. Photos are those of part A of
-`training.masks.held_out`; part B is the test set. A table of thresholds follows.
+Equation: ridge logistic regression of "the photo shows one object, and the overlap (IoU) of the
+mask is at least .5" on the features of `isc_core.masking.confidence`. Photos are those of part A of
+`training.masks.held_out`; part B is the test set. The program prints a table of thresholds.
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
 regularized likelihood methods", 1999.
@@ -27,17 +27,17 @@ from isc_core.networks.mask_network import Count, MaskNetwork
 from .held_out import HeldOut, held_out_composites, held_out_ingredients
 
 _RIDGE, _STEPS = 0.1, 50
-_RIGHT = 0.5  # overlap of a mask that counts as right
+_MIN_OVERLAP = 0.5  # of a correct mask
 _THRESHOLDS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7)
 
 
-def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
+def logistic_weights(features: np.ndarray, correct: np.ndarray) -> np.ndarray:
     """Fit a logistic regression by Newton's method.
 
     Parameters
     ----------
     features : (N, K) ndarray
-    right : (N,) bool ndarray
+    correct : (N,) bool ndarray
 
     Returns
     -------
@@ -46,7 +46,7 @@ def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
     weights = np.zeros(features.shape[1])
     for _ in range(_STEPS):
         share = 1 / (1 + np.exp(-features @ weights))
-        gradient = features.T @ (share - right) + _RIDGE * weights
+        gradient = features.T @ (share - correct) + _RIDGE * weights
         curvature = (features.T * (share * (1 - share))) @ features
         weights = weights - np.linalg.solve(curvature + _RIDGE * np.eye(len(weights)), gradient)
     return weights
@@ -55,7 +55,7 @@ def logistic_weights(features: np.ndarray, right: np.ndarray) -> np.ndarray:
 def observed(
     photos: list[HeldOut], network: MaskNetwork
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the evidence of each photo, whether its mask is right, and whether it may be used.
+    """Find the mask of each photo, and compare it with the ground truth.
 
     Parameters
     ----------
@@ -64,20 +64,21 @@ def observed(
 
     Returns
     -------
-    evidence : (N, FEATURES) ndarray
-    right : (N,) bool ndarray
-    whole : (N,) bool ndarray
-        False where the mask shows nothing or several objects: it is refused at any confidence.
+    features : (N, FEATURES) ndarray
+        Of the confidence.
+    correct : (N,) bool ndarray
+    single : (N,) bool ndarray
+        False where the mask is empty or shows several objects: it is refused at any confidence.
     """
-    rows, right, whole = [], [], []
+    rows, correct, single = [], [], []
     for photo in photos:
         found = find_mask(photo.light, network=network)
         truth = photo.cover >= 0.5
         overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
         rows.append(found.features)
-        right.append(photo.count == Count.ONE and overlap >= _RIGHT)
-        whole.append(bool(found.mask.any()) and not shows_several(found.mask))
-    return np.array(rows), np.array(right), np.array(whole)
+        correct.append(photo.count == Count.ONE and overlap >= _MIN_OVERLAP)
+        single.append(bool(found.mask.any()) and not shows_several(found.mask))
+    return np.array(rows), np.array(correct), np.array(single)
 
 
 def main() -> None:
@@ -88,7 +89,7 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--weights", type=Path, required=True, metavar="NPZ", help="what was fitted")
+    add("--weights", type=Path, required=True, metavar="NPZ", help="weights to calibrate")
     add("--count", type=int, default=480, help="photos (default: %(default)s)")
     add("--seed", type=int, default=0, help="of the photos (default: %(default)s)")
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
@@ -105,17 +106,17 @@ def main() -> None:
         for kind, part in numbers
         for photo in held_out_composites(ingredients, kind, given.count // part, given.seed + 1)
     ]
-    evidence, right, whole = observed(photos, network)
-    weights = logistic_weights(evidence, right)
-    print("weights", np.round(weights, 3), "right", right.mean())
-    confidence = 1 / (1 + np.exp(-evidence @ weights))
+    features, correct, single = observed(photos, network)
+    weights = logistic_weights(features, correct)
+    print("weights", np.round(weights, 3), "correct", correct.mean())
+    confidence = 1 / (1 + np.exp(-features @ weights))
     one = np.array([photo.count for photo in photos]) == Count.ONE
     for limit in _THRESHOLDS:
-        used = whole & (confidence >= limit)
+        used = single & (confidence >= limit)
         print(
             f"{limit:.2f}: refuses {(~used)[one].mean():.1%} of single objects, "
-            f"{(~used)[right].mean():.1%} of right masks; accepts {used[~one].mean():.1%} without "
-            "a single object"
+            f"{(~used)[correct].mean():.1%} of correct masks; accepts {used[~one].mean():.1%} "
+            "without a single object"
         )
     with new_file(given.output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **{**arrays, "sureness": weights.astype(np.float32)})

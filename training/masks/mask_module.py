@@ -1,8 +1,8 @@
 """The trainable mask network and its loss; the counterpart of `isc_core.networks.mask_network`.
 
-Equation: with the log odds o of a pixel, p = 1 / (1 + exp(-o)) and the true cover a,
+Equation: with the log odds o of a pixel, p = 1 / (1 + exp(-o)) and the true coverage a,
 
-    mean of -a log p - (1 - a) log(1 - p), counted more near the outline
+    mean of -a log p - (1 - a) log(1 - p), weighted by 4 near the outline
     + 1 - sum (2 a p) / sum (a + p)                                   (where there is an object)
     + .3 (cross entropy of the number of objects)
 
@@ -78,7 +78,8 @@ class MaskNetworkModule(EncoderDecoderModule):
         -------
         loss : () tensor
         terms : dict of str to tensor
-            Not weighted; "iou" is the mean of objects' overlap, "right" the share of right counts.
+            Not weighted; "iou" is the mean overlap of objects with their masks, "right" the
+            fraction of correct counts.
         """
         odds, counts = self(network_channels(batch))
         truth, frame = batch.mask, batch.frame
@@ -117,7 +118,7 @@ class MaskNetworkModule(EncoderDecoderModule):
         return found
 
     def load_arrays(self, arrays: dict[str, np.ndarray]) -> None:
-        """Continue from weights in the core's layout.
+        """Load weights in the layout of the core.
 
         Parameters
         ----------

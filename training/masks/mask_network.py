@@ -2,11 +2,11 @@
 
   python -m training.masks.mask_network FOLDER ... [--weights NPZ] [--minutes N] -o MASK.npz
 
-FOLDER has the ingredients that `python -m training.masks.ingredients` writes; bodies are those of
-all folders. Photos are composed during training (`training.masks.composites`), and none is used
-twice. `--weights` starts from an archive that an earlier run wrote, `--resume` continues an
+FOLDER contains the ingredients that `python -m training.masks.ingredients` writes; the cut-outs of
+all folders are used. Photos are composed during training (`training.masks.composites`), and none is
+used twice. `--weights` starts from an archive that an earlier run wrote, `--resume` continues an
 interrupted one; without either, the encoder starts with the weights of the shipped scene network.
-`--side 64` makes photos smaller, which is half of the work. The loss on held-out bodies and
+`--side 64` makes photos smaller, which halves the computation. The loss on held-out objects and
 panoramas is measured every thousand steps.
 
 Equation: see `training.masks.mask_module`.
@@ -64,7 +64,7 @@ def main() -> None:
     compose = Composites(training, draw, arguments.side, options.device)
     measured = Composites(held_out, CompositeDraws(options.batch), arguments.side, options.device)
     schedule = replace(SCHEDULE, rate=arguments.rate)
-    fit(network, draw, schedule, options, measured, compose.finished)
+    fit(network, draw, schedule, options, measured, compose.composed)
 
 
 if __name__ == "__main__":

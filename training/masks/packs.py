@@ -1,11 +1,13 @@
-"""Ingredients of composites in files that are small enough to travel.
+"""Compressed files of the ingredients of composites.
 
-Equation: colours of bodies are JPEG files, at a quality at which they lose less than in the photos
-that they become part of. Outside of a body they go on as the mean of the colours around, so that
-its rim keeps its colour. Covers, and differences between neighbouring pixels of patterns and of
-panoramas, which are half floats with 6 of their 10 binary digits, are compressed by LZMA.
+Problem: thousands of cut-outs and panoramas must be small enough to be copied to another machine.
 
-Limits: colours are off by some hundredths, panoramas by up to 1 %.
+Equation: colours of cut-outs are JPEG files, whose loss is smaller than that of the JPEG files of
+the composites. Outside the object, they continue with the mean of the nearby colours, so that the
+rim keeps its colour. LZMA compresses coverage and, as differences between neighbouring pixels,
+patterns and panoramas; of panoramas, in half floats, 6 of the 10 bits of the mantissa are kept.
+
+Limits: colours have errors of a few hundredths, panoramas of up to 1 %.
 """
 
 import io
@@ -24,26 +26,26 @@ from isc_core.io.atomic import new_file
 
 SUFFIX = ".npz"
 _FORMAT, _QUALITY = 1, 85
-_AROUND = 15  # pixels: as wide as two of JPEG's blocks
-_DROPPED = 4  # binary digits of half floats
-_DAMAGES = (ValueError, KeyError, OSError, BadZipFile, EOFError, lzma.LZMAError)
+_BORDER = 15  # pixels: about two blocks of JPEG
+_DROPPED = 4  # bits of the mantissa
+_READ_ERRORS = (ValueError, KeyError, OSError, BadZipFile, EOFError, lzma.LZMAError)
 
 
 @dataclass(frozen=True)
 class Ingredients:
-    """What to compose photos from.
+    """Ingredients of composites.
 
     Attributes
     ----------
-    bodies : (N, 4, SIDE, SIDE) uint8 ndarray
-        sRGB and cover; the longer side of each body is `LENGTH` pixels.
+    cutouts : (N, 4, SIDE, SIDE) uint8 ndarray
+        sRGB and coverage; the longer side of each object is `LENGTH` pixels.
     panoramas : (P, ROWS, 2 ROWS, 3) float16 ndarray
         Linear.
     patterns : (M, side, side) uint8 ndarray
-        Of tables: shares of the second colour.
+        Of tables: fraction of the second colour.
     """
 
-    bodies: np.ndarray
+    cutouts: np.ndarray
     panoramas: np.ndarray
     patterns: np.ndarray
 
@@ -57,20 +59,20 @@ class Ingredients:
         Returns
         -------
         int
-            Its bytes.
+            Its size, bytes.
         """
-        files = [_jpeg(body) for body in self.bodies]
+        files = [_jpeg(one) for one in self.cutouts]
         digits = self.panoramas.view(np.uint16) >> _DROPPED
         steps = np.diff(digits, axis=2, prepend=np.uint16(0))
         arrays = {
             "format": np.array(_FORMAT),
             "colours": np.frombuffer(b"".join(files), np.uint8),
             "sizes": np.array([len(one) for one in files]),
-            "covers": _stream(np.ascontiguousarray(self.bodies[:, 3])),
+            "covers": _compressed(np.ascontiguousarray(self.cutouts[:, 3])),
             # high bytes first: they hardly ever change
-            "panoramas": _stream(np.stack([steps >> 8, steps & 255]).astype(np.uint8)),
+            "panoramas": _compressed(np.stack([steps >> 8, steps & 255]).astype(np.uint8)),
             "rows": np.array(self.panoramas.shape[1]),
-            "patterns": _stream(np.diff(self.patterns, prepend=np.uint8(0))),
+            "patterns": _compressed(np.diff(self.patterns, prepend=np.uint8(0))),
             "side": np.array(self.patterns.shape[1]),
         }
         with new_file(path) as temporary, temporary.open("wb") as file:
@@ -84,7 +86,7 @@ class Ingredients:
         Parameters
         ----------
         paths : sequence of Path
-            Bodies are those of all, panoramas and patterns those of the first.
+            Cut-outs are those of all files, panoramas and patterns those of the first.
 
         Returns
         -------
@@ -93,20 +95,20 @@ class Ingredients:
         Raises
         ------
         InputError
-            If one is no such file.
+            If a file does not contain ingredients.
         """
         found = [_read(path) for path in paths]
-        bodies = np.concatenate([one.bodies for one in found])
-        return cls(bodies, found[0].panoramas, found[0].patterns)
+        cutouts = np.concatenate([one.cutouts for one in found])
+        return cls(cutouts, found[0].panoramas, found[0].patterns)
 
 
 def _read(path: Path) -> Ingredients:
     try:
         with np.load(path, allow_pickle=False) as data:
             if int(data["format"]) != _FORMAT:
-                raise ValueError("it is of another version")
+                raise ValueError("it has another version")
             return _unpacked({name: data[name] for name in data.files})
-    except _DAMAGES as error:
+    except _READ_ERRORS as error:
         raise InputError(
             f"{path} holds no ingredients: {error}; make them with "
             "python -m training.masks.ingredients"
@@ -117,11 +119,11 @@ def _unpacked(data: dict[str, np.ndarray]) -> Ingredients:
     ends = np.cumsum(data["sizes"])
     parts = np.split(data["colours"], ends[:-1])
     colours = np.stack([np.asarray(Image.open(io.BytesIO(one.tobytes()))) for one in parts])
-    covers = _bytes(data["covers"]).reshape(colours.shape[:3])[:, None]
+    covers = _decompressed(data["covers"]).reshape(colours.shape[:3])[:, None]
     rows, side = int(data["rows"]), int(data["side"])
-    high, low = _bytes(data["panoramas"]).reshape(2, -1, rows, 2 * rows, 3).astype(np.uint16)
+    high, low = _decompressed(data["panoramas"]).reshape(2, -1, rows, 2 * rows, 3).astype(np.uint16)
     digits = np.cumsum((high << 8) | low, axis=2, dtype=np.uint16) << _DROPPED
-    steps = _bytes(data["patterns"]).reshape(-1, side, side)
+    steps = _decompressed(data["patterns"]).reshape(-1, side, side)
     return Ingredients(
         np.concatenate([colours.transpose(0, 3, 1, 2), covers], axis=1),
         digits.view(np.float16),
@@ -129,14 +131,14 @@ def _unpacked(data: dict[str, np.ndarray]) -> Ingredients:
     )
 
 
-def _jpeg(body: np.ndarray) -> bytes:
-    """The colours of a body (4, side, side), which go on outside of it."""
-    weight = body[3:] / 255.0
+def _jpeg(cutout: np.ndarray) -> bytes:
+    """The colours of a cut-out (4, side, side), continued outside the object."""
+    weight = cutout[3:] / 255.0
     around = [
-        ndimage.uniform_filter(one, (0, _AROUND, _AROUND)) for one in (body[:3] * weight, weight)
+        ndimage.uniform_filter(one, (0, _BORDER, _BORDER)) for one in (cutout[:3] * weight, weight)
     ]
     mean = around[0] / np.maximum(around[1], 1e-6)
-    colours = np.where(weight > 0, body[:3], mean).round().clip(0, 255).astype(np.uint8)
+    colours = np.where(weight > 0, cutout[:3], mean).round().clip(0, 255).astype(np.uint8)
     file = io.BytesIO()
     Image.fromarray(colours.transpose(1, 2, 0)).save(
         file, "JPEG", quality=_QUALITY, subsampling=0, optimize=True
@@ -144,9 +146,9 @@ def _jpeg(body: np.ndarray) -> bytes:
     return file.getvalue()
 
 
-def _stream(values: np.ndarray) -> np.ndarray:
+def _compressed(values: np.ndarray) -> np.ndarray:
     return np.frombuffer(lzma.compress(values.tobytes(), preset=6), np.uint8)
 
 
-def _bytes(stream: np.ndarray) -> np.ndarray:
+def _decompressed(stream: np.ndarray) -> np.ndarray:
     return np.frombuffer(lzma.decompress(stream.tobytes()), np.uint8)

@@ -1,7 +1,9 @@
-"""The layout of composites, drawn for a whole batch at once.
+"""The random layout of composites, for a batch.
 
-Limits: a scene of one object has others only in its background or cut by its frame; they are at
-most half as long.
+Problem: photos show no object, one in front of or beside others, several side by side, or a pile.
+
+Limits: a scene of one object has others only in its background, at most half as long, or cut by
+its frame.
 """
 
 from dataclasses import dataclass
@@ -16,26 +18,26 @@ from ..world.tensor_batch import TensorBatch
 from .ingredients import LENGTH, SIDE
 
 SHARES = (0.17, 0.58, 0.25)  # of scenes without an object, with one, with several
-MOST = 8  # objects of a scene
-_TINY = 0.2  # of the frame: objects of scenes without a target are at most half as long
-_PILES = 0.35  # of scenes with several
-_AROUND = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes of 0 to 4 objects besides
+MAX_OBJECTS = 8  # objects of a scene
+_REFERENCE = 0.2  # of the frame: in scenes without a target, objects are at most half as long
+_PILES = 0.35  # share of piles among scenes with several objects
+_OTHERS = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes with 0 to 4 other objects
 _SHAPES = np.array([(1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625)])
-_ROWS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns and rows of objects in order
+_GRIDS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns, rows
 
 
 @dataclass(frozen=True)
 class Scenes(TensorBatch):
-    """What the photos of a batch show.
+    """Random variables of the scenes of a batch.
 
     Attributes
     ----------
     shape : (B, 2) tensor
-        Width and height of a photo over the longer one.
+        Width and height of a photo, relative to the longer one.
     level : (B,) tensor
         Mean light of the background.
     count : (B,) int64 tensor
-        Of `Count`.
+        Values of `Count`.
     """
 
     shape: torch.Tensor
@@ -45,59 +47,59 @@ class Scenes(TensorBatch):
 
 @dataclass(frozen=True)
 class PastedObjects(TensorBatch):
-    """The pasted objects of a batch: photo by photo, from the back to the front.
+    """The pasted objects of a batch: by photo, from the back to the front.
 
     Attributes
     ----------
     photo, layer : (N,) int64 tensor
-        Number of the photo, and number of objects behind this one in it.
+        Index of the photo, and number of objects behind this one in it.
     target : (N,) bool tensor
-        Whether the mask without hints covers it.
-    body : (N,) tensor
-        Which it is, as a share of all bodies, in [0, 1).
+        Whether the mask without hints contains it.
+    cutout : (N,) tensor
+        Index as a fraction of the number of cut-outs, in [0, 1).
     length : (N,) tensor
-        Its longer side, pixels of a frame of `SIDE`.
+        Longer side, pixels of a frame of `SIDE`.
     angle : (N,) tensor
         Radians.
     mirror : (N,) tensor
         -1 or 1.
     place : (N, 2) tensor
-        Its middle, right and down from that of the frame, half the frame's side being 1.
+        Centre, right and down from that of the frame, in units of half its side.
     gain : (N, 3) tensor
-        Its mean light.
+        Mean light.
     shear : (N, 2) tensor
-        k_x and k_y of its cast shadow.
-    touch : (N, 2) tensor
-        By how much the shadow where it touches is moved, as `place`.
+        k_x and k_y of the cast shadow, see `pasting`.
+    contact : (N, 2) tensor
+        Offset of the contact shadow, in units of `place`.
     strength : (N, 2) tensor
-        Of the cast shadow and of that where it touches, 0 to 1.
+        Of the cast shadow and of the contact shadow, 0 to 1.
     blur : (N,) int64 tensor
-        Of its shadows, 0 to 3.
+        Number of box filters of the shadows, 0 to 3.
     stretch : (N,) tensor
-        Factor along the picture's first axis; the other has its inverse.
+        Factor along the first axis of the cut-out; the second has its inverse.
     channels : (N, 3) int64 tensor
-        Those of its picture that are shown as red, green and blue.
+        Channels of the cut-out that become red, green and blue.
     """
 
     photo: torch.Tensor
     layer: torch.Tensor
     target: torch.Tensor
-    body: torch.Tensor
+    cutout: torch.Tensor
     length: torch.Tensor
     angle: torch.Tensor
     mirror: torch.Tensor
     place: torch.Tensor
     gain: torch.Tensor
     shear: torch.Tensor
-    touch: torch.Tensor
+    contact: torch.Tensor
     strength: torch.Tensor
     blur: torch.Tensor
     stretch: torch.Tensor
     channels: torch.Tensor
 
     @property
-    def to_body(self) -> torch.Tensor:
-        """The affine maps (N, 2, 3) from the frame to the bodies' pictures, for `affine_grid`."""
+    def to_cutout(self) -> torch.Tensor:
+        """The affine maps (N, 2, 3) from the frame to the cut-outs, for `affine_grid`."""
         c, s = self.angle.cos(), self.angle.sin()
         across = self.mirror / self.stretch
         turn = torch.stack([across * c, across * s, -s * self.stretch, c * self.stretch], 1)
@@ -107,7 +109,7 @@ class PastedObjects(TensorBatch):
 
 @dataclass(frozen=True)
 class _Places:
-    """Up to MOST objects of each photo: (B, MOST) arrays; `place` has an axis more."""
+    """Objects of each photo: arrays (B, MAX_OBJECTS); `place` has a last axis of 2."""
 
     size: np.ndarray
     place: np.ndarray
@@ -126,7 +128,7 @@ def draw_scenes(
     number : int
         Of photos.
     shares : tuple of float
-        Of scenes without an object, with one, with several.
+        Of scenes with no object, one and several.
 
     Returns
     -------
@@ -137,7 +139,7 @@ def draw_scenes(
     shape = _SHAPES[rng.integers(len(_SHAPES), size=number)]
     level = 0.2 * np.exp(rng.normal(0, 0.5, number))
     count = rng.choice(len(shares), number, p=shares)
-    few, many = _around(rng, shape, count == Count.ONE), _several(rng, shape)
+    few, many = _one_or_none(rng, shape, count == Count.ONE), _several(rng, shape)
     crowded = (count == Count.SEVERAL)[:, None]
     photo, layer = np.nonzero(np.where(crowded, many.present, few.present))
 
@@ -156,21 +158,21 @@ def draw_scenes(
 def _objects(
     rng: np.random.Generator, length: np.ndarray, level: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """All that does not depend on where objects stand."""
+    """All attributes that do not depend on the objects' places."""
     number = len(length)
     upright = rng.random(number) < 0.7
     brightness = level * np.exp(rng.normal(0.1, 0.6, number))
     fall = rng.uniform(0.12, 0.5, number) * rng.choice([-1, 1], number)
-    touch = np.stack([rng.normal(0, 0.06, number), rng.uniform(0, 0.12, number)], 1)
+    contact = np.stack([rng.normal(0, 0.06, number), rng.uniform(0, 0.12, number)], 1)
     strength = rng.uniform((0.2, 0.1), (0.85, 0.7), (number, 2))
     return {
-        "body": rng.random(number),
+        "cutout": rng.random(number),
         "length": length,
         "angle": np.where(upright, rng.normal(0, 0.12, number), rng.uniform(0, 2 * np.pi, number)),
         "mirror": rng.choice([-1.0, 1.0], number),
         "gain": brightness[:, None] * np.exp(rng.normal(0, 0.1, (number, 3))),
         "shear": np.stack([rng.uniform(-1, 1, number), fall], 1),
-        "touch": touch * (length / SIDE * 2)[:, None],
+        "contact": contact * (length / SIDE * 2)[:, None],
         "strength": strength * (rng.random((number, 2)) < (0.6, 0.7)),
         "blur": rng.integers(4, size=number),
         "stretch": np.ones(number),
@@ -178,35 +180,35 @@ def _objects(
     }
 
 
-def _around(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> _Places:
-    """Objects in the background or cut by the frame; in front of them the target, if it is one."""
+def _one_or_none(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> _Places:
+    """Objects in the background or cut by the frame; the target, if there is one, in front."""
     number, short = len(shape), SIDE * shape.min(axis=1)
     length = np.minimum(SIDE * log_uniforms(rng, 0.27, 0.95, number), 1.1 * short)
-    shown = np.where(single, length, _TINY * SIDE)[:, None]
-    small = shown * rng.uniform(0.15, 0.5, (number, MOST))
-    inside = shape[:, None] * rng.uniform(-1, 1, (number, MOST, 2))
+    shown = np.where(single, length, _REFERENCE * SIDE)[:, None]
+    small = shown * rng.uniform(0.15, 0.5, (number, MAX_OBJECTS))
+    inside = shape[:, None] * rng.uniform(-1, 1, (number, MAX_OBJECTS, 2))
     large = np.minimum(
-        short[:, None] * rng.uniform(0.2, 0.8, (number, MOST)),
+        short[:, None] * rng.uniform(0.2, 0.8, (number, MAX_OBJECTS)),
         1.3 * np.maximum(shown, 0.3 * SIDE),
     )
-    turn = rng.uniform(0, 2 * np.pi, (number, MOST))
+    turn = rng.uniform(0, 2 * np.pi, (number, MAX_OBJECTS))
     edge = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
     edge /= np.abs(edge).max(axis=-1, keepdims=True)
-    off = rng.uniform(0.1, 0.7, (number, MOST)) * large / SIDE
-    cut = rng.random((number, MOST)) < 0.5
+    off = rng.uniform(0.1, 0.7, (number, MAX_OBJECTS)) * large / SIDE
+    cut = rng.random((number, MAX_OBJECTS)) < 0.5
     size = np.where(cut, large, small)
     place = np.where(cut[..., None], edge * (shape[:, None] + off[..., None]), inside)
-    others = rng.choice(len(_AROUND), number, p=_AROUND)
+    others = rng.choice(len(_OTHERS), number, p=_OTHERS)
     rows = np.flatnonzero(single)
     size[rows, others[rows]] = length[rows]
     place[rows, others[rows]] = _middle(rng, shape, length)[rows]
-    slots = np.arange(MOST)
+    slots = np.arange(MAX_OBJECTS)
     target = single[:, None] & (slots == others[:, None])
     return _Places(size, place, target | (slots < others[:, None]), target)
 
 
 def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> np.ndarray:
-    """Places of the targets: somewhere near the middle, seldom cut by the frame."""
+    """Places of the targets: near the middle, rarely cut by the frame."""
     part = (length / SIDE)[:, None]
     place = np.maximum(shape - part, 0) * rng.normal(0, 0.4, shape.shape).clip(-1, 1)
     cut = rng.random((len(shape), 1)) < 0.15
@@ -215,11 +217,11 @@ def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> 
 
 def _several(rng: np.random.Generator, shape: np.ndarray) -> _Places:
     """Objects of similar size side by side, or in a pile."""
-    number, slots = len(shape), np.arange(MOST)
+    number, slots = len(shape), np.arange(MAX_OBJECTS)
     pile = rng.random(number) < _PILES
     spread = rng.uniform(0.4, 1, (number, 1, 1))
-    piled = shape[:, None] * spread * rng.uniform(-1, 1, (number, MOST, 2))
-    grid = _ROWS[rng.integers(len(_ROWS), size=number)]
+    piled = shape[:, None] * spread * rng.uniform(-1, 1, (number, MAX_OBJECTS, 2))
+    grid = _GRIDS[rng.integers(len(_GRIDS), size=number)]
     grid = np.where(shape[:, :1] < shape[:, 1:], grid[:, ::-1], grid)
     cell = 2 * shape / grid
     length = np.where(
@@ -230,8 +232,8 @@ def _several(rng: np.random.Generator, shape: np.ndarray) -> _Places:
     free = np.maximum(cell - 2 * (length / SIDE)[:, None], 0)[:, None] / 2
     column, row = slots % grid[:, :1], slots // grid[:, :1]
     ordered = (np.stack([column, row], axis=-1) + 0.5) * cell[:, None] - shape[:, None]
-    ordered = ordered + free * rng.uniform(-1, 1, (number, MOST, 2))
-    count = np.where(pile, rng.integers(5, MOST + 1, number), grid.prod(axis=1))
+    ordered = ordered + free * rng.uniform(-1, 1, (number, MAX_OBJECTS, 2))
+    count = np.where(pile, rng.integers(5, MAX_OBJECTS + 1, number), grid.prod(axis=1))
     present = slots < count[:, None]
-    size = length[:, None] * rng.uniform(0.7, 1.05, (number, MOST))
+    size = length[:, None] * rng.uniform(0.7, 1.05, (number, MAX_OBJECTS))
     return _Places(size, np.where(pile[:, None, None], piled, ordered), present, present)

@@ -1,4 +1,4 @@
-"""Composites show what their masks and hints say."""
+"""Composites, and their masks, hints and counts."""
 
 import copy
 from collections.abc import Iterator
@@ -17,7 +17,7 @@ from training.masks.composites import CompositeDraws, Composites, frames
 from training.masks.ingredients import LENGTH, SIDE, cut_out
 from training.masks.mask_module import MaskNetworkModule, network_channels
 from training.masks.packs import Ingredients
-from training.masks.scenes import MOST
+from training.masks.scenes import MAX_OBJECTS
 
 
 @pytest.fixture(autouse=True)
@@ -30,13 +30,13 @@ def one_thread() -> Iterator[None]:
 
 def ingredients() -> Ingredients:
     """White discs and bars, and black surroundings."""
-    bodies = np.zeros((2, 4, SIDE, SIDE), np.uint8)
+    cutouts = np.zeros((2, 4, SIDE, SIDE), np.uint8)
     y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
-    bodies[0, 3] = 255 * (x**2 + y**2 < (LENGTH / 2) ** 2)
-    bodies[1, 3] = 255 * ((abs(x) < LENGTH / 2) & (abs(y) < LENGTH / 6))
-    bodies[:, :3] = 255 * (bodies[:, 3:] > 0)
+    cutouts[0, 3] = 255 * (x**2 + y**2 < (LENGTH / 2) ** 2)
+    cutouts[1, 3] = 255 * ((abs(x) < LENGTH / 2) & (abs(y) < LENGTH / 6))
+    cutouts[:, :3] = 255 * (cutouts[:, 3:] > 0)
     dark = np.zeros((3, 32, 64, 3), np.float16)
-    return Ingredients(bodies, dark, np.zeros((2, 16, 16), np.uint8))
+    return Ingredients(cutouts, dark, np.zeros((2, 16, 16), np.uint8))
 
 
 def drawn(count: Count, hinted: float = 0, size: int = 12, side: int = FRAME) -> Composites:
@@ -45,7 +45,7 @@ def drawn(count: Count, hinted: float = 0, size: int = 12, side: int = FRAME) ->
 
 
 @pytest.mark.parametrize("count", list(Count))
-def test_the_mask_covers_what_the_count_says(count: Count) -> None:
+def test_the_mask_is_empty_only_without_objects(count: Count) -> None:
     batch = drawn(count)(np.random.default_rng(0))
     assert (batch.count == int(count)).all() and not batch.hints.any()
     covered = batch.mask.flatten(1).sum(1)
@@ -55,7 +55,7 @@ def test_the_mask_covers_what_the_count_says(count: Count) -> None:
     )
 
 
-def test_bodies_are_brighter_than_a_black_background() -> None:
+def test_white_objects_are_brighter_than_a_black_background() -> None:
     torch.manual_seed(0)
     batch = drawn(Count.ONE)(np.random.default_rng(1))
     grey = batch.photo.mean(1, keepdim=True)
@@ -64,24 +64,24 @@ def test_bodies_are_brighter_than_a_black_background() -> None:
         assert photo[mask > 0.9].median() > 3 * photo[away].median() + 1e-3
 
 
-def test_hinted_photos_have_one_thing_or_none() -> None:
+def test_hinted_photos_have_one_target_or_none() -> None:
     batch = drawn(Count.SEVERAL, hinted=1.0)(np.random.default_rng(3))
     assert set(batch.count.tolist()) <= {Count.NONE, Count.ONE}
     covered = batch.mask.flatten(1).sum(1) > 0
     assert torch.equal(covered, batch.count == Count.ONE)
 
 
-def test_a_cut_out_body_has_its_length_and_its_colours() -> None:
+def test_a_cut_out_object_has_its_length_and_its_colours() -> None:
     light, cover = torch.full((1, 3, 160, 160), 0.5), torch.zeros(1, 1, 160, 160)
     cover[:, :, 40:80, 20:120] = 1
-    (body,) = cut_out(light, cover)
-    rows, columns = np.nonzero(body[3] > 127)
+    (cutout,) = cut_out(light, cover)
+    rows, columns = np.nonzero(cutout[3] > 127)
     assert np.ptp(columns) + 1 == pytest.approx(LENGTH, abs=1)
     assert np.ptp(rows) + 1 == pytest.approx(0.4 * LENGTH, abs=1)
-    assert body[:3, body[3] > 250].min() > 250, "the brightest is white"
+    assert cutout[:3, cutout[3] > 250].min() > 250, "the brightest is white"
 
 
-def test_the_channels_are_those_of_the_core() -> None:
+def test_channels_equal_those_of_the_core() -> None:
     batch = drawn(Count.ONE, hinted=0.7, size=4)(np.random.default_rng(5))
     found = network_channels(batch).permute(0, 2, 3, 1).numpy()
     for k in range(4):
@@ -96,7 +96,7 @@ def test_frames_are_centred() -> None:
     assert frame.sum() == 32 * 24 and torch.equal(frame, frame.flip(0))
 
 
-def test_the_network_learns_bright_bodies() -> None:
+def test_training_lowers_the_loss_on_white_objects() -> None:
     torch.manual_seed(0)
     network = MaskNetworkModule((8, 12, 12, 8), (8, 8, 8))
     compose, rng = drawn(Count.ONE, size=8, side=32), np.random.default_rng(0)
@@ -111,36 +111,36 @@ def test_the_network_learns_bright_bodies() -> None:
 
 
 @pytest.mark.parametrize("varied", [False, True])
-def test_a_device_composes_without_telling_numbers(varied: bool) -> None:
-    # tensors of the device "meta" have shapes only: whoever asks for a number of one fails
+def test_composition_does_not_read_values_from_the_device(varied: bool) -> None:
+    # tensors of the device "meta" have shapes only: reading a value raises
     draw = CompositeDraws(6, 0.5, varied=varied)
     compose = Composites(ingredients(), draw, 64, "meta")
-    batch = compose.finished(draw(np.random.default_rng(0)))
+    batch = compose.composed(draw(np.random.default_rng(0)))
     wanted = Composites(ingredients(), draw, 64)(np.random.default_rng(0))
     for found, known in zip(vars(batch).values(), vars(wanted).values(), strict=True):
         assert found.is_meta and found.shape == known.shape and found.dtype == known.dtype
 
 
-def test_draws_of_a_seed_are_the_same_after_a_way_between_processes() -> None:
+def test_draws_give_equal_composites_after_being_sent_to_another_process() -> None:
     draw = CompositeDraws(6, 0.5, varied=True)
     compose, photos = Composites(ingredients(), draw, 64), []
     for sent in (False, True):
         batch = draw(np.random.default_rng(7))
         batch = copy.deepcopy(batch) if sent else batch  # as processes exchange it
         torch.manual_seed(0)
-        photos.append(compose.finished(batch))
+        photos.append(compose.composed(batch))
     for one, other in zip(*(vars(photo).values() for photo in photos), strict=True):
         assert torch.equal(one, other)
 
 
-def test_no_pixel_shows_two_things() -> None:
+def test_visible_parts_of_objects_do_not_overlap() -> None:
     compose, draw = drawn(Count.SEVERAL, size=40), CompositeDraws(40, 0, (0, 0, 1))
     batch = draw(np.random.default_rng(2))
-    assert int(batch.objects.layer.max()) == MOST - 1, "there are piles"
+    assert int(batch.objects.layer.max()) == MAX_OBJECTS - 1, "there are piles"
     alone = [
-        compose.finished(
+        compose.composed(
             replace(batch, objects=replace(batch.objects, target=batch.objects.layer == k))
         ).mask
-        for k in range(MOST)
+        for k in range(MAX_OBJECTS)
     ]
-    assert torch.allclose(torch.stack(alone).sum(0), compose.finished(batch).mask, atol=1e-4)
+    assert torch.allclose(torch.stack(alone).sum(0), compose.composed(batch).mask, atol=1e-4)

@@ -1,4 +1,4 @@
-"""Hints of a batch lie where they say."""
+"""Hints lie on the object or on the background, as drawn."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ def maps(count: int, truth: torch.Tensor) -> tuple[torch.Tensor, HintDraws]:
     return hint_maps(truth.expand(count, SIDE, SIDE), inside, drawn), drawn
 
 
-def test_hints_lie_where_they_say() -> None:
+def test_points_and_boxes_lie_on_the_target_or_off_it_as_drawn() -> None:
     truth = torch.zeros(1, SIDE, SIDE, dtype=torch.bool)
     truth[:, 20:60, 30:80] = True
     found, drawn = maps(200, truth)
@@ -36,7 +36,7 @@ def test_hints_lie_where_they_say() -> None:
     assert 0.4 < float(drawn.box.float().mean()) < 0.6
 
 
-def test_points_are_spread_evenly() -> None:
+def test_points_are_uniform_over_the_target() -> None:
     truth = torch.zeros(1, SIDE, SIDE, dtype=torch.bool)
     truth[:, :10, :10] = truth[:, -30:, -10:] = True
     found, _ = maps(600, truth)
@@ -44,19 +44,19 @@ def test_points_are_spread_evenly() -> None:
     assert 1.5 < float(lower / upper) < 4  # three times as many pixels
 
 
-def test_hints_at_nothing_are_points_of_the_background() -> None:
+def test_hints_without_a_target_are_points_on_the_background() -> None:
     found, drawn = maps(100, torch.zeros(1, SIDE, SIDE, dtype=torch.bool))
     assert not bool(found[:, 2].any())
     pointed = (drawn.points[:, 0] < 1).any(1)
     assert torch.equal(found[:, 0].flatten(1).any(1), pointed)
 
 
-def test_hints_mean_one_visible_thing() -> None:
+def test_hints_select_one_visible_object() -> None:
     drawn = draw_hints(np.random.default_rng(1), 300, 1.0, 4)
     covers = torch.zeros(300, 3, 16, 16)
     covers[:, 0, :8], covers[:, 2, 8:] = 1, 1  # the second is hidden
     target = torch.tensor([True, False, False]).expand(300, 3)
     found = hinted(covers, target, drawn)
-    assert torch.equal(found.any(1), ~drawn.nothing) and int(found.sum(1).max()) == 1
+    assert torch.equal(found.any(1), ~drawn.background) and int(found.sum(1).max()) == 1
     assert not bool(found[:, 1].any())
     assert 0.65 < float(found[:, 0].float().mean()) < 0.85  # .94 (.6 + .4 / 2)

@@ -14,7 +14,7 @@ from training.masks.ingredients import SIDE
 from training.masks.packs import Ingredients
 
 
-def ingredients(bodies: int) -> Ingredients:
+def ingredients(count: int) -> Ingredients:
     """Discs with gradients, before what is smooth."""
     y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
     cover = np.clip(60 - np.hypot(x, y), 0, 1)
@@ -22,18 +22,18 @@ def ingredients(bodies: int) -> Ingredients:
     disc = np.concatenate([colours, 255 * cover[None]]).round().astype(np.uint8)
     panoramas = np.exp(np.random.default_rng(0).normal(0, 2, (2, 8, 16, 3))).astype(np.float16)
     patterns = np.random.default_rng(1).integers(256, size=(3, 8, 8)).astype(np.uint8)
-    return Ingredients(np.stack([disc] * bodies), panoramas, patterns)
+    return Ingredients(np.stack([disc] * count), panoramas, patterns)
 
 
 def test_files_are_read_as_they_were_written(tmp_path: Path) -> None:
     sizes = [ingredients(k).write(tmp_path / f"{k}.npz") for k in (1, 2)]
     assert sizes[1] < 2 * 10_000
     found, wanted = Ingredients.read([tmp_path / "1.npz", tmp_path / "2.npz"]), ingredients(3)
-    np.testing.assert_array_equal(found.bodies[:, 3], wanted.bodies[:, 3])
+    np.testing.assert_array_equal(found.cutouts[:, 3], wanted.cutouts[:, 3])
     np.testing.assert_array_equal(found.patterns, wanted.patterns)
     np.testing.assert_allclose(found.panoramas, wanted.panoramas, rtol=0.016)
-    off = np.abs(found.bodies[:, :3].astype(int) - wanted.bodies[:, :3])
-    off = off.transpose(0, 2, 3, 1)[wanted.bodies[:, 3] > 0]
+    off = np.abs(found.cutouts[:, :3].astype(int) - wanted.cutouts[:, :3])
+    off = off.transpose(0, 2, 3, 1)[wanted.cutouts[:, 3] > 0]
     assert off.mean() < 2 and off.max() < 20, "the rim, too, keeps its colours"
 
 
