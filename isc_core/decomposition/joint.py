@@ -93,15 +93,18 @@ class JointOptions:
         t above which albedo is unreliable.
     change_of_variables : float
         b of the energy.
-    network : RemovalOptions
-        When light that the network expects to be a highlight is removed.
+    deviations : float
+        Of the predicted log ratio, by which it is lowered, see `ratio_lower_bound`.
+    removal : RemovalOptions
+        When light that the network predicts to be a highlight is removed.
     odds : float
         Least odds at which removed light is taken for a highlight; above 0.
     """
 
     unreliable_from: float = 0.15
     change_of_variables: float = 5.0
-    network: RemovalOptions = field(default_factory=lambda: RemovalOptions(doubt=1.6))
+    deviations: float = 1.6
+    removal: RemovalOptions = field(default_factory=RemovalOptions)
     odds: float = HIGHLIGHT_ODDS
 
 
@@ -374,12 +377,12 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options = options or JointOptions()
-    expected = ratio_lower_bound(prediction or predict_scene(image, mask), options.network.doubt)
+    expected = ratio_lower_bound(prediction or predict_scene(image, mask), options.deviations)
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows
         left[rows] = _remaining_ratio(image[rows], diffuse[rows], expected[rows], mask[rows])
-    if not highlights_stand_out(left, mask, options.network.stands_out):
+    if not highlights_stand_out(left, mask, options.removal.stands_out):
         return None
     much = left.mean(axis=2) > options.unreliable_from
     unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask
@@ -389,7 +392,7 @@ def detect_residual_highlights(
     for block in row_blocks(mask.shape):
         before = diffuse[block.rows]
         after = before * np.exp(-left[block.rows])
-        cleaner[block.rows] = limit_tint(before, after, options.network.tint)
+        cleaner[block.rows] = limit_tint(before, after, options.removal.tint)
     return ResidualHighlights(cleaner, unreliable)
 
 

@@ -72,7 +72,7 @@ class HighlightPrediction:
 def predict_highlights(
     image: np.ndarray,
     mask: np.ndarray,
-    doubt: float = 0.0,
+    log_odds_margin: float = 0.0,
     network: HighlightNetwork | None = None,
 ) -> HighlightPrediction:
     """Predict the highlights of a photo.
@@ -82,8 +82,8 @@ def predict_highlights(
     image : (H, W, 3) ndarray
         Linear, not negative inside the mask.
     mask : (H, W) ndarray of bool
-    doubt : float
-        Bias against highlights: subtracted from the log odds.
+    log_odds_margin : float
+        Subtracted from the log odds.
     network : HighlightNetwork, optional
         By default the shipped one.
 
@@ -104,7 +104,8 @@ def predict_highlights(
     light, details, variance = (np.zeros_like(values) for _ in range(3))
     reaches = [max(1, round(reach * scale)) for reach in REACHES]
     for k, band in enumerate(brightness_bands(values, mask, reaches)):
-        probability = 1 / (1 + np.exp(np.clip(doubt - odds[..., k], -_LARGEST_ODDS, _LARGEST_ODDS)))
+        exponent = np.clip(log_odds_margin - odds[..., k], -_LARGEST_ODDS, _LARGEST_ODDS)
+        probability = 1 / (1 + np.exp(exponent))
         light += band * probability
         details += band
         variance += np.square(band) * (probability * (1 - probability))

@@ -6,7 +6,7 @@ bright albedo for highlights. Light that is removed by mistake does more harm th
 remains.
 
 Equation: the network predicts specular light s, with a standard deviation
-(`networks.highlight_network`); `doubt` is subtracted from its log odds. Where the odds are right,
+(`networks.highlight_network`); `log_odds_margin` is subtracted from its log odds. Where the odds are right,
 removing s lowers the expected squared error; s of less than a fifth of a detail stays. Nothing is
 removed from the photo unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
 `stands_out`. D = I exp(-t), and `light_tint` limits the colour of the removed light. Confidence is
@@ -17,7 +17,7 @@ Citation: see `networks.highlight_network`.
 Limits: those of the network. Clipped pixels: see `support.clipped`.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,13 +39,26 @@ _MIN_SHARE = 1e-3  # of a channel that stays
 _LEAST_LIKELY = 0.2  # share of a detail that is specular: less stays
 
 
-VARIANTS = {"improved": RemovalOptions()}
+@dataclass(frozen=True)
+class NetworkOptions(RemovalOptions):
+    """Options of the method.
+
+    Attributes
+    ----------
+    log_odds_margin : float
+        Subtracted from the log odds of a highlight; not negative.
+    """
+
+    log_odds_margin: float = 0.0
+
+
+VARIANTS = {"improved": NetworkOptions()}
 
 
 def separate(
     image: np.ndarray,
     mask: np.ndarray,
-    options: RemovalOptions | None = None,
+    options: NetworkOptions | None = None,
     *,
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
@@ -58,7 +71,7 @@ def separate(
     image : (H, W, 3) ndarray
         Linear light.
     mask : (H, W) bool ndarray
-    options : RemovalOptions, optional
+    options : NetworkOptions, optional
     clipped : (H, W) bool ndarray, optional
     monitor : Monitor, optional
     network : HighlightNetwork, optional
@@ -76,13 +89,13 @@ def separate(
         If the user cancels.
     """
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
-    if options.doubt < 0 or options.stands_out < 0 or not options.tint >= 1:
+    if options.log_odds_margin < 0 or options.stands_out < 0 or not options.tint >= 1:
         raise InputError(
-            "the method network needs doubt and stands_out at least 0 and tint at least 1"
+            "the method network needs log_odds_margin and stands_out at least 0 and tint at least 1"
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
-    prediction = predict_highlights(image, mask, options.doubt, network)
+    prediction = predict_highlights(image, mask, options.log_odds_margin, network)
     excess = expected_ratio(image, prediction)
     if not highlights_stand_out(excess, mask, options.stands_out):
         excess = np.zeros_like(excess)

@@ -3,10 +3,10 @@
 Problem: the network also mistakes some bright albedo for highlights, and light that is removed by
 mistake does more harm than a highlight that remains.
 
-Equation: the network predicts y = log(I / D) with a Laplace distribution of scale b. At a pixel, t
-= max(y - d b, 0) is a lower bound of y, d = `doubt`: more than what is there is removed with a
-probability of exp(-d) / 2 only, so that the expected error falls. Highlights stand out in a photo
-if t, opened so that texture of a few pixels does not count, exceeds its 90th percentile by
+Equation: the network predicts y = log(I / D) with a Laplace distribution of scale b, its mean
+absolute deviation. At a pixel, t = max(y - d b, 0) is a lower bound of y for d = `deviations`: more
+than the highlight is removed with a probability of exp(-d) / 2 only. Highlights stand out in a
+photo if t, opened so that texture of a few pixels does not count, exceeds its 90th percentile by
 `stands_out` somewhere.
 
 Citation: see `networks.scene_network`; grey opening: J. Serra, "Image Analysis and Mathematical
@@ -33,34 +33,33 @@ class RemovalOptions:
 
     Attributes
     ----------
-    doubt : float
-        Margin subtracted from the network's prediction; not negative. From a log ratio, in error
-        scales (`ratio_lower_bound`); from the log odds of a highlight, as it is.
     stands_out : float
         By how much the strongest highlight exceeds what is usual on the object.
     tint : float
         How coloured the removed light may be, see `light_tint`; at least 1.
     """
 
-    doubt: float = 0.0
     stands_out: float = 0.6
     tint: float = 1.5
 
 
-def ratio_lower_bound(prediction: ScenePrediction | LayerPrediction, doubt: float) -> np.ndarray:
+def ratio_lower_bound(
+    prediction: ScenePrediction | LayerPrediction, deviations: float
+) -> np.ndarray:
     """Return a lower bound of the predicted log ratio of a photo and its diffuse image.
 
     Parameters
     ----------
     prediction : ScenePrediction or LayerPrediction
-    doubt : float
+    deviations : float
+        d of the module; not negative.
 
     Returns
     -------
     (H, W, 3) float32 ndarray
         Not negative, 0 outside the mask.
     """
-    return np.maximum(prediction.log_ratio - doubt * prediction.ratio_scale[..., None], 0)
+    return np.maximum(prediction.log_ratio - deviations * prediction.ratio_scale[..., None], 0)
 
 
 def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, stands_out: float) -> bool:

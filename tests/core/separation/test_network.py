@@ -51,9 +51,9 @@ def test_confidence_sorts_pixels_by_their_error() -> None:
     assert error[order[:fifth]].sum() > 2 * error[order[-fifth:]].sum()
 
 
-def test_doubt_removes_less() -> None:
+def test_a_margin_of_the_log_odds_removes_less() -> None:
     image, _, mask = ball()
-    found = [predict_highlights(image, mask, doubt) for doubt in (0, 1, 3)]
+    found = [predict_highlights(image, mask, margin) for margin in (0, 1, 3)]
     ratios = [expected_ratio(image, one) for one in found]
     assert ratios[0].sum() > ratios[1].sum() > ratios[2].sum() > 0
     left = image * np.exp(-ratios[0])
@@ -85,7 +85,8 @@ def test_white_light_stays_off_and_green_light_on_green_goes_back() -> None:
 
 
 @pytest.mark.parametrize(
-    "change", [{"doubt": -1.0}, {"stands_out": -0.1}, {"tint": 0.9}, {"tint": float("nan")}]
+    "change",
+    [{"log_odds_margin": -1.0}, {"stands_out": -0.1}, {"tint": 0.9}, {"tint": float("nan")}],
 )
 def test_options_out_of_range_are_refused(change: dict[str, object]) -> None:
     image, _, mask = ball(40)

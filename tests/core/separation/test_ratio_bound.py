@@ -8,7 +8,7 @@ from isc_core.networks.scene_network import predict_scene
 from isc_core.separation.support.ratio_bound import highlights_stand_out, ratio_lower_bound
 
 
-def test_doubt_removes_less() -> None:
+def test_more_deviations_remove_less() -> None:
     line = np.linspace(-1.1, 1.1, 96)
     x, y = np.meshgrid(line, -line)
     mask = x**2 + y**2 < 1
@@ -18,7 +18,7 @@ def test_doubt_removes_less() -> None:
     spot = 0.5 * np.exp(-((x - 0.3) ** 2 + (y - 0.3) ** 2) / 0.02)
     image = ((0.5 * shading + spot)[..., None] * mask[..., None] * np.ones(3)).astype(np.float32)
     seen = predict_scene(image, mask)
-    ratios = [ratio_lower_bound(seen, doubt) for doubt in (0, 1, 3)]
+    ratios = [ratio_lower_bound(seen, deviations) for deviations in (0, 1, 3)]
     np.testing.assert_array_equal(ratios[0], seen.log_ratio)
     assert ratios[0].sum() > ratios[1].sum() > ratios[2].sum()
     certain = replace(seen, ratio_scale=np.zeros_like(seen.ratio_scale))
