@@ -6,9 +6,9 @@ bright albedo for highlights. Light that is removed by mistake does more harm th
 remains.
 
 Equation: the network predicts specular light s, with a standard deviation
-(`networks.highlight_network`); `log_odds_margin` is subtracted from its log odds. Where the odds are right,
-removing s lowers the expected squared error; s of less than a fifth of a detail stays. Nothing is
-removed from the photo unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
+(`networks.highlight_network`); `log_odds_margin` is subtracted from its log odds. Where the odds
+are right, removing s lowers the expected squared error; s of less than a fifth of a detail stays.
+Nothing is removed from the photo unless t = log(I / (I - s)) stands out (`support.ratio_bound`) by
 `stands_out`. D = I exp(-t), and `light_tint` limits the colour of the removed light. Confidence is
 1 / (1 + e / u), e the deviation and u a tenth of the mean light.
 

@@ -110,7 +110,7 @@ def _read(path: Path) -> Ingredients:
             return _unpacked({name: data[name] for name in data.files})
     except _READ_ERRORS as error:
         raise InputError(
-            f"{path} holds no ingredients: {error}; make them with "
+            f"{path} contains no ingredients: {error}; make them with "
             "python -m training.masks.ingredients"
         ) from error
 

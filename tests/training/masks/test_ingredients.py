@@ -1,4 +1,4 @@
-"""Ingredients are read with the split that networks learn with."""
+"""Panoramas of composites have the split of the other networks."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ def write(path: Path, radiance: float) -> None:
     write_channels(path, {name: np.full((64, 128), radiance, np.float32) for name in "RGB"})
 
 
-def test_panoramas_are_split_as_others_are(tmp_path: Path) -> None:
+def test_panoramas_have_the_split_of_the_other_networks(tmp_path: Path) -> None:
     for k in range(6):
         write(tmp_path / f"{'abcdef'[k]}.exr", k + 1)
     held_out = [k for k, one in enumerate(read_panoramas(tmp_path, 0)) if one.held_out]

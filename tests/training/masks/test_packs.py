@@ -1,4 +1,4 @@
-"""Ingredients survive the way through a file."""
+"""Files of ingredients: what is read equals what was written, and bad files are refused."""
 
 from pathlib import Path
 
@@ -37,15 +37,15 @@ def test_files_are_read_as_they_were_written(tmp_path: Path) -> None:
     assert off.mean() < 2 and off.max() < 20, "the rim, too, keeps its colours"
 
 
-def test_what_holds_no_ingredients_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_other_files_are_refused_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "learned.npz"
     for write in (lambda: None, lambda: path.write_bytes(b"nothing")):
         write()
-        with pytest.raises(InputError, match=r"learned\.npz holds no ingredients"):
+        with pytest.raises(InputError, match=r"learned\.npz contains no ingredients"):
             Ingredients.read([path])
 
 
-def test_a_network_learns_from_two_folders(
+def test_training_uses_two_folders(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folders = [tmp_path / name for name in ("one", "two")]
@@ -70,4 +70,4 @@ def test_a_folder_without_ingredients_is_refused(
     with pytest.raises(SystemExit) as stopped:
         mask_network.main()
     assert stopped.value.code == 2 and not path.exists()
-    assert "learned.npz holds no ingredients" in capsys.readouterr().err
+    assert "learned.npz contains no ingredients" in capsys.readouterr().err
