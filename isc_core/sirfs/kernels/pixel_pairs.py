@@ -92,17 +92,13 @@ def smoothness_block(first, last, block, whitened, photo, pairs, out):
             right, q = offsets[o, 1], i + offsets[o, 0]
             if q >= height:
                 continue
-            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            a, b = _shared_columns(spans, i, q, right)
             n = b - a
             if n <= 0:
                 continue
-            va, vb = weight[i, a:b], weight[q, a + right : b + right]
-            for k in range(n):
-                w[k] = va[k] * vb[k]
+            _multiply(weight[i, a:b], weight[q, a + right : b + right], w)
             for c in range(channels):
-                p_row, q_row, dc = whitened[i, c, a:b], whitened[q, c, a + right : b + right], d[c]
-                for k in range(n):
-                    dc[k] = p_row[k] - q_row[k]
+                _subtract(whitened[i, c, a:b], whitened[q, c, a + right : b + right], d[c])
             part = zero
             if channels == 1:
                 d0 = d[0]
@@ -120,17 +116,7 @@ def smoothness_block(first, last, block, whitened, photo, pairs, out):
                     f[k] = np.sqrt(s[k] * s[k] + soft)
                 for k in range(n):
                     s[k] = w[k] * s[k] / f[k]
-                for k in range(n):
-                    f[k] = (f[k] - low_t) * inv
-                for k in range(n):
-                    cells[k] = np.int32(min(f[k], last_cell))
-                for k in range(n):
-                    f[k] -= t(cells[k])
-                for k in range(n):  # the table look-up keeps this loop from being vectorised
-                    cell = cells[k]
-                    rise = rises[cell]
-                    part += w[k] * (table[cell] + f[k] * rise)
-                    s[k] *= rise
+                part = _tabulated(f[:n], w, pairs, cells, s)
                 for k in range(n):
                     d0[k] *= s[k]
                 for k in range(n):
@@ -139,15 +125,11 @@ def smoothness_block(first, last, block, whitened, photo, pairs, out):
                     d2[k] *= s[k]
             cost += part
             for c in range(channels):
-                dc, g = d[c], gradient[i, c, a:b]
-                for k in range(n):
-                    g[k] += dc[k]
                 if q < last:
-                    g = gradient[q, c, a + right : b + right]
+                    lower = gradient[q, c, a + right : b + right]
                 else:
-                    g = spill[q - last, c, a + right : b + right]
-                for k in range(n):
-                    g[k] -= dc[k]
+                    lower = spill[q - last, c, a + right : b + right]
+                _add_to_pair(d[c], gradient[i, c, a:b], lower)
     out.cost[block] = cost
 
 
@@ -167,12 +149,11 @@ def curvature_block(first, last, block, geometry, photo, pairs, out):
         Output, as in `smoothness_block`, without an axis of channels.
     """
     valid, spans = photo.valid, photo.spans
-    offsets, table, rises = pairs.offsets, pairs.costs, pairs.rises
+    offsets = pairs.offsets
     gradient, spill = out.gradient, out.spill[block]
     t = geometry.dtype.type
-    soft, zero, inv, low_t = t(1e-8), t(0), t(pairs.inverse_step), t(pairs.low)
+    soft, zero = t(1e-8), t(0)
     height, width = valid.shape
-    last_cell = t(len(table) - 2)
     d = np.empty(width, geometry.dtype)
     w = np.empty(width, geometry.dtype)
     f = np.empty(width, geometry.dtype)
@@ -185,40 +166,71 @@ def curvature_block(first, last, block, geometry, photo, pairs, out):
             right, q = offsets[o, 1], i + offsets[o, 0]
             if q >= height:
                 continue
-            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            a, b = _shared_columns(spans, i, q, right)
             n = b - a
             if n <= 0:
                 continue
-            va, vb = valid[i, a:b], valid[q, a + right : b + right]
-            for k in range(n):
-                w[k] = va[k] * vb[k]
-            p_row, q_row = geometry[i, 8, a:b], geometry[q, 8, a + right : b + right]
-            for k in range(n):
-                d[k] = p_row[k] - q_row[k]
-            part = zero
+            _multiply(valid[i, a:b], valid[q, a + right : b + right], w)
+            _subtract(geometry[i, 8, a:b], geometry[q, 8, a + right : b + right], d)
             for k in range(n):
                 f[k] = np.sqrt(d[k] * d[k] + soft)
             for k in range(n):
                 d[k] = w[k] * d[k] / f[k]
-            for k in range(n):
-                f[k] = (f[k] - low_t) * inv
-            for k in range(n):
-                cells[k] = np.int32(min(f[k], last_cell))
-            for k in range(n):
-                f[k] -= t(cells[k])
-            for k in range(n):
-                cell = cells[k]
-                rise = rises[cell]
-                part += w[k] * (table[cell] + f[k] * rise)
-                d[k] *= rise
-            cost += part
-            g = gradient[i, a:b]
-            for k in range(n):
-                g[k] += d[k]
+            cost += _tabulated(f[:n], w, pairs, cells, d)
             if q < last:
-                g = gradient[q, a + right : b + right]
+                lower = gradient[q, a + right : b + right]
             else:
-                g = spill[q - last, a + right : b + right]
-            for k in range(n):
-                g[k] -= d[k]
+                lower = spill[q - last, a + right : b + right]
+            _add_to_pair(d, gradient[i, a:b], lower)
     out.cost[block] = cost
+
+
+@jit(math=REASSOCIATED, inline=True)
+def _shared_columns(spans, i, q, right):
+    """First column, and one past the last, in which pixels of rows i and q form pairs."""
+    return max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+
+
+@jit(math=REASSOCIATED, inline=True)
+def _multiply(upper, lower, out):
+    for k in range(len(upper)):
+        out[k] = upper[k] * lower[k]
+
+
+@jit(math=REASSOCIATED, inline=True)
+def _subtract(upper, lower, out):
+    for k in range(len(upper)):
+        out[k] = upper[k] - lower[k]
+
+
+@jit(math=REASSOCIATED, inline=True)
+def _tabulated(f, weight, pairs, cells, slope):
+    """Return the weighted sum of the potential at f, and multiply `slope` by its derivative.
+
+    `f` and `cells` are overwritten.
+    """
+    t = f.dtype.type
+    table, rises = pairs.costs, pairs.rises
+    inv, low, last_cell = t(pairs.inverse_step), t(pairs.low), t(len(table) - 2)
+    count, cost = len(f), t(0)
+    for k in range(count):
+        f[k] = (f[k] - low) * inv
+    for k in range(count):
+        cells[k] = np.int32(min(f[k], last_cell))
+    for k in range(count):
+        f[k] -= t(cells[k])
+    for k in range(count):  # the table look-up keeps this loop from being vectorised
+        cell = cells[k]
+        rise = rises[cell]
+        cost += weight[k] * (table[cell] + f[k] * rise)
+        slope[k] *= rise
+    return cost
+
+
+@jit(math=REASSOCIATED, inline=True)
+def _add_to_pair(d, upper, lower):
+    """Add the gradient d to the upper pixels of pairs, and subtract it from the lower ones."""
+    for k in range(len(upper)):
+        upper[k] += d[k]
+    for k in range(len(lower)):
+        lower[k] -= d[k]
