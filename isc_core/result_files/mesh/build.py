@@ -32,7 +32,6 @@ from scipy import ndimage
 from ...errors import InputError
 from ...imaging.bounding_box import mask_slices
 from ...imaging.row_blocks import row_blocks
-from ...lobe_fitting.specular_level import SpecularFit
 from ...photo.camera import Camera
 from ...shading.lights import VIEW
 from ...shading.perspective import lifted_points, object_axis, view_directions
@@ -62,7 +61,6 @@ def build_mesh(
     mask: np.ndarray,
     reflectance: np.ndarray,
     options: MeshOptions | None = None,
-    gloss: SpecularFit | None = None,
     camera: Camera | None = None,
     cover: ObjectCover | None = None,
 ) -> MeshResult:
@@ -78,8 +76,6 @@ def build_mesh(
     reflectance : (H, W, 3) ndarray
         Linear, not negative.
     options : MeshOptions, optional
-    gloss : optional
-        Gloss of the surface; the default roughness and no gloss where it is unknown.
     camera : Camera, optional
         Of the maps; orthographic by default.
     cover : ObjectCover, optional
@@ -95,7 +91,7 @@ def build_mesh(
     InputError
         If the mask has no block of 2 x 2 pixels, or a size in the options is not positive.
     """
-    options, gloss = options or MeshOptions(), gloss or SpecularFit()
+    options = options or MeshOptions()
     _check_inputs(height, normal, mask, reflectance, options)
     limited = limit_rim(height, mask, options.rim)
     if options.back is Back.OPEN and cover is None:
@@ -127,9 +123,8 @@ def build_mesh(
         color,
         shape.detail,
         options,
-        gloss,
-        camera,
-        None if camera is None else -middle * size,
+        camera=camera,
+        eye=None if camera is None else -middle * size,
         cover=cover,
     )
 

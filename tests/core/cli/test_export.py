@@ -91,7 +91,6 @@ def test_a_photo_seen_in_perspective_has_a_back_on_its_rays(back: str) -> None:
         mask,
         mask[..., None] * np.ones(3),
         MeshOptions(back=Back(back)),
-        None,
         camera,
     )
     assert built.eye is not None

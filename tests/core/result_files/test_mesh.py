@@ -349,11 +349,15 @@ def glossy(
 ) -> MeshResult:
     """The ball's mesh with a fitted gloss whose level for the base colour is `specular`."""
     d = ball()
-    k = built(d).reflectance_scale
+    bare = built(d)
     gloss = SpecularFit(
-        roughness, specular / k, SpecularSource.FITTED, SpecularSource.FITTED, variation
+        roughness,
+        specular / bare.reflectance_scale,
+        SpecularSource.FITTED,
+        SpecularSource.FITTED,
+        variation,
     )
-    return build_mesh(d.height, d.normal, d.mask, d.reflectance, gloss=gloss)
+    return replace(bare, gloss=gloss)
 
 
 @pytest.mark.parametrize("level", [0.0, 0.4, 1.0, 3.0])
@@ -396,9 +400,7 @@ def test_a_gloss_that_varies_is_a_texture_in_the_alpha_channel() -> None:
 def test_an_unknown_gloss_is_not_shown(source: str) -> None:
     """Without the extension viewers would show plastic."""
     d = ball()
-    result = build_mesh(
-        d.height, d.normal, d.mask, d.reflectance, gloss=SpecularFit(0.3, None, source, source)
-    )
+    result = replace(built(d), gloss=SpecularFit(0.3, None, source, source))
     tree = gltf(result.glb())
     assert tree["extensionsUsed"] == ["KHR_materials_specular"]
     assert tree["materials"][0]["extensions"] == {"KHR_materials_specular": {"specularFactor": 0.0}}

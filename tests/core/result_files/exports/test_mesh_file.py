@@ -2,6 +2,7 @@
 
 import errno
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,7 @@ def glossy(variation: np.ndarray | None = None, triangles: int = 3000) -> MeshRe
     d = ball()
     gloss = SpecularFit(0.3, 0.5, FITTED, FITTED, variation)
     options = MeshOptions(triangles=triangles)
-    return build_mesh(d.height, d.normal, d.mask, d.reflectance, options, gloss)
+    return replace(build_mesh(d.height, d.normal, d.mask, d.reflectance, options), gloss=gloss)
 
 
 def varying() -> np.ndarray:

@@ -2,6 +2,7 @@
 
 import errno
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -28,7 +29,8 @@ FITTED = SpecularSource.FITTED
 def glossy(d: Decomposition, triangles: int = 3000, gloss: SpecularFit | None = None) -> MeshResult:
     given = gloss or SpecularFit(0.3, 0.5, FITTED, FITTED)
     options = MeshOptions(triangles=triangles)
-    return build_mesh(d.height, d.normal, d.mask, d.reflectance, options, given)
+    built = build_mesh(d.height, d.normal, d.mask, d.reflectance, options)
+    return replace(built, gloss=given)
 
 
 def written(target: str, folder: Path, built: MeshResult | None = None) -> Path:
