@@ -23,6 +23,12 @@ from tests.batch.tasks import obedient
 from tests.core.command_line import isc_command, run_isc, through_terminal
 
 
+def one_worker(inputs: Path, output: Path) -> list[object]:
+    """The words of a quick batch with one worker."""
+    quick = ["--model", "retinex", "--workers", "1", "--memory", "0"]
+    return ["batch", inputs, "-o", output, *quick]
+
+
 @pytest.mark.slow
 def test_images_that_hang_or_kill_their_worker_are_reported_and_the_rest_is_done(
     tmp_path: Path,
@@ -47,18 +53,7 @@ def test_images_that_hang_or_kill_their_worker_are_reported_and_the_rest_is_done
 
 @pytest.mark.slow
 def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
-    words = [
-        "batch",
-        photos,
-        "-o",
-        tmp_path / "out",
-        "--model",
-        "retinex",
-        "--workers",
-        "1",
-        "--memory",
-        "0",
-    ]
+    words = one_worker(photos, tmp_path / "out")
     run = subprocess.Popen(
         isc_command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True
     )
@@ -86,18 +81,7 @@ def test_notes_and_progress_share_a_terminal(photos: Path, tmp_path: Path) -> No
 def test_a_worker_that_is_lost_while_it_starts_is_started_again(
     photos: Path, tmp_path: Path
 ) -> None:
-    words = [
-        "batch",
-        photos / "one.png",
-        "-o",
-        tmp_path / "out",
-        "--model",
-        "retinex",
-        "--workers",
-        "1",
-        "--memory",
-        "0",
-    ]
+    words = one_worker(photos / "one.png", tmp_path / "out")
     run = psutil.Popen(
         isc_command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )

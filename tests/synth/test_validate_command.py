@@ -40,6 +40,7 @@ pytestmark = pytest.mark.slow  # they share a run
 
 SCENES = 5
 VOID = {"meta", "img", "rect", "line", "br"}
+SEPARATION_ALONE = ("--stages", "separation", "--bounds", "none", "--renders", "0")
 
 
 @pytest.fixture(scope="module")
@@ -188,21 +189,7 @@ def test_bounds_that_are_kept_and_bounds_that_break(
 def test_two_runs_measure_the_same_and_any_number_of_threads(dataset: Path, tmp_path: Path) -> None:
     found = []
     for name, threads in (("one", "1"), ("two", "2")):
-        assert (
-            validate(
-                dataset,
-                tmp_path / name,
-                "--stages",
-                "separation",
-                "--bounds",
-                "none",
-                "--renders",
-                "0",
-                "--threads",
-                threads,
-            )
-            == 0
-        )
+        assert validate(dataset, tmp_path / name, *SEPARATION_ALONE, "--threads", threads) == 0
         content = json.loads((tmp_path / name / "report.json").read_text(encoding="utf-8"))
         found.append(
             (
@@ -219,20 +206,7 @@ def test_a_split_and_a_drawn_sample(dataset: Path, tmp_path: Path) -> None:
         ("split", ("--split", "train")),
         ("drawn", ("--scenes", "3", "--seed", "4")),
     ):
-        assert (
-            validate(
-                dataset,
-                tmp_path / name,
-                "--stages",
-                "separation",
-                "--bounds",
-                "none",
-                "--renders",
-                "0",
-                *more,
-            )
-            == 0
-        )
+        assert validate(dataset, tmp_path / name, *SEPARATION_ALONE, *more) == 0
         content[name] = json.loads((tmp_path / name / "report.json").read_text(encoding="utf-8"))
     assert {scene["facts"]["split"] for scene in content["split"]["scenes"]} == {"train"}
     assert len(content["drawn"]["scenes"]) == 3

@@ -1,6 +1,5 @@
 """The trainable scene network is the one that the core runs, and it learns."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -29,13 +28,7 @@ from training.world.samples import OBJECT, OUTPUT, Sample
 WIDTHS = (6, 8, 8, 10)
 
 
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    """Layers this small are slower on several."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def module(seed: int, widths: tuple[int, ...] = WIDTHS) -> SceneNetworkModule:

@@ -88,24 +88,19 @@ def test_every_action_writes_its_pictures(
     )
 
 
-def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path: Path) -> None:
-    arguments = [
-        "edit",
-        str(work / "ball"),
-        "recolour",
-        "--hue",
-        "90",
-        "--photo",
-        str(work / "photo.png"),
-        "-o",
-        str(tmp_path / "out"),
-        "--quiet",
-    ]
-    assert main(arguments) == 0
+def before_and_after(work: Path, folder: Path, words: str) -> tuple[np.ndarray, np.ndarray]:
+    """The photo before and after an edit that is composited into it."""
+    photo = work / "photo.png"
+    common = ["--photo", str(photo), "-o", str(folder), "--quiet"]
+    assert main(["edit", str(work / "ball"), *words.split(), *common]) == 0
     before, after = (
-        cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-        for path in (work / "photo.png", tmp_path / "out" / "edited.png")
+        cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (photo, folder / "edited.png")
     )
+    return before, after
+
+
+def test_an_edit_of_the_photo_changes_the_object_only(work: Path, tmp_path: Path) -> None:
+    before, after = before_and_after(work, tmp_path / "out", "recolour --hue 90")
     mask = ball().mask
     assert (
         after.dtype == np.uint16
@@ -116,7 +111,7 @@ def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path:
 
 
 @pytest.mark.slow
-def test_an_edit_of_nothing_is_the_photo(work: Path, tmp_path: Path) -> None:
+def test_an_edit_without_effect_returns_the_photo(work: Path, tmp_path: Path) -> None:
     for words in (
         "dichromatic",
         "recolour --hue 360",
@@ -124,21 +119,7 @@ def test_an_edit_of_nothing_is_the_photo(work: Path, tmp_path: Path) -> None:
         f"relight --light {work}/light.npy",
         "gloss",
     ):
-        arguments = [
-            "edit",
-            str(work / "ball"),
-            *words.split(),
-            "--photo",
-            str(work / "photo.png"),
-            "-o",
-            str(tmp_path / "out"),
-            "--quiet",
-        ]
-        assert main(arguments) == 0
-        before, after = (
-            cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-            for path in (work / "photo.png", tmp_path / "out" / "edited.png")
-        )
+        before, after = before_and_after(work, tmp_path / "out", words)
         assert np.array_equal(before, after), words
 
 

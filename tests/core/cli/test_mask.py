@@ -11,7 +11,7 @@ from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.photo.mask_overlay import mask_overlay
 from tests.core.command_line import write_image
-from tests.core.masking.test_search import ONE, TWO, balls, overlap
+from tests.core.masking.ball_photos import ONE, TWO, balls, overlap
 
 
 def photo(folder: Path, places: tuple[tuple[float, float, float], ...]) -> tuple[Path, np.ndarray]:

@@ -1,7 +1,6 @@
 """Composites, and their masks, hints and counts."""
 
 import copy
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -14,29 +13,13 @@ import torch
 from isc_core.networks.mask_network import SIDE as FRAME
 from isc_core.networks.mask_network import Count, channels_of
 from training.masks.composites import CompositeDraws, Composites, frames
-from training.masks.ingredients import LENGTH, SIDE, cut_out
+from training.masks.ingredients import LENGTH, cut_out
 from training.masks.mask_module import MaskNetworkModule, network_channels
-from training.masks.packs import Ingredients
 from training.masks.scenes import MAX_OBJECTS
 
+from .white_shapes import ingredients
 
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
-
-
-def ingredients() -> Ingredients:
-    """White discs and bars, and black surroundings."""
-    cutouts = np.zeros((2, 4, SIDE, SIDE), np.uint8)
-    y, x = np.mgrid[:SIDE, :SIDE] - SIDE / 2 + 0.5
-    cutouts[0, 3] = 255 * (x**2 + y**2 < (LENGTH / 2) ** 2)
-    cutouts[1, 3] = 255 * ((abs(x) < LENGTH / 2) & (abs(y) < LENGTH / 6))
-    cutouts[:, :3] = 255 * (cutouts[:, 3:] > 0)
-    dark = np.zeros((3, 32, 64, 3), np.float16)
-    return Ingredients(cutouts, dark, np.zeros((2, 16, 16), np.uint8))
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def drawn(count: Count, hinted: float = 0, size: int = 12, side: int = FRAME) -> Composites:

@@ -13,7 +13,7 @@ from training.masks.ingredients import LENGTH, SIDE
 from training.masks.pasting import CutOuts, shadows
 from training.masks.scenes import PastedObjects, draw_scenes
 
-from .test_composites import ingredients
+from .white_shapes import ingredients
 
 FRAME = 96
 DISC, BAR = 0.9, 0.1  # thin cut-outs come first

@@ -19,7 +19,7 @@ from training.masks.variation import (
     varied_objects,
 )
 
-from .test_composites import ingredients
+from .white_shapes import ingredients
 
 
 def test_objects_are_stretched_and_keep_their_place() -> None:

@@ -1,7 +1,6 @@
 """Photos and their truth stay together through turns, mirrors, scales and cameras."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -39,13 +38,7 @@ LAMP = Shares(kinds=(1, 0, 0), lights=(0, 0, 1, 0, 0))
 HALVES = ((0.9, 0.9, 0.9), (0.5, 0.9, 0.8), (0.9, 0.6, 0.5))
 
 
-@pytest.fixture(autouse=True)
-def one_thread() -> Iterator[None]:
-    """Batches this small are slower on several."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 
 def some_views(count: int) -> list[PreparedView]:
