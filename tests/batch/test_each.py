@@ -67,7 +67,7 @@ def test_each_object_has_a_result_a_row_and_a_thumbnail(out: Path) -> None:
         assert (out / "thumbnails" / "each" / "shelf" / f"{number}.jpg").is_file()
 
 
-def test_it_makes_what_isc_decompose_makes(shelf: Path, out: Path, tmp_path: Path) -> None:
+def test_results_equal_those_of_isc_decompose(shelf: Path, out: Path, tmp_path: Path) -> None:
     words = ["decompose", shelf / "shelf.png", "--each", "--model", "retinex", "--engine", "numpy"]
     assert main([str(word) for word in (*words, "-o", tmp_path / "alone", "-q")]) == 0
     for place in ("1", "2"):

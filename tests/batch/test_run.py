@@ -84,9 +84,7 @@ def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_finished_is_skipped_and_what_changed_is_made_again(
-    made: Path, photos: Path
-) -> None:
+def test_complete_results_are_skipped_and_changed_photos_repeated(made: Path, photos: Path) -> None:
     before = {name: (made / name).stat().st_ino for name in ("one", "two", "three")}
     write_image(photos / "two.png", ball_codes(13.0))
     (made / "three" / "mesh.glb").unlink()
@@ -172,7 +170,7 @@ def test_a_bad_manifest_is_refused_before_any_work(photos: Path, tmp_path: Path)
         run_batch(batch(tmp_path / "empty.csv", output=tmp_path / "out"))
 
 
-def test_patterns_folders_of_masks_and_what_is_not_there(photos: Path, tmp_path: Path) -> None:
+def test_patterns_folders_of_masks_and_missing_files(photos: Path, tmp_path: Path) -> None:
     (photos / "bad.png").unlink()
     masks = tmp_path / "masks"
     masks.mkdir()
@@ -258,7 +256,7 @@ def test_a_step_that_checks_the_clock_is_stopped(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_cancelled_run_keeps_what_is_complete(photos: Path, tmp_path: Path) -> None:
+def test_a_cancelled_run_keeps_complete_results(photos: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     asked = Monitor(cancelled=lambda: (output / "one").exists())
     with pytest.raises(Cancelled):

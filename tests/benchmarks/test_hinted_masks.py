@@ -8,7 +8,7 @@ pytest.importorskip("torch", reason="needs the extra `training`")
 from benchmarks.decomposition.hinted_masks import KINDS, MaskScore, drawn_hints, report
 
 
-def test_hints_lie_on_the_thing_and_beside_it() -> None:
+def test_hints_lie_on_the_object_and_beside_it() -> None:
     truth = np.zeros((60, 80), bool)
     truth[20:40, 30:60] = True
     rng = np.random.default_rng(0)

@@ -23,7 +23,7 @@ def answer() -> tuple[Estimate, np.ndarray]:
 
 
 @pytest.mark.slow
-def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
+def test_mirrored_light_keeps_a_layer_of_environment_gloss() -> None:
     plain, mask = answer()
     layer = np.zeros((*mask.shape, 3))
     layer[mask] = environment_gloss(
@@ -46,7 +46,7 @@ def test_the_stated_share_of_light_is_removed(name: str, share: float) -> None:
 
 
 @pytest.mark.parametrize("name", ["blurred 2 %", "blurred 5 %"])
-def test_a_blurred_layer_keeps_what_is_even(name: str) -> None:
+def test_blurring_keeps_a_uniform_layer(name: str) -> None:
     plain, mask = answer()
     even = np.where(mask[..., None], 0.3, 0) * np.ones(3)
     np.testing.assert_allclose(APPROXIMATIONS[name](even, mask, plain)[mask], 0.3, rtol=1e-5)

@@ -382,7 +382,7 @@ def test_a_white_object_in_a_white_environment_loses_no_light_with_bounces(waist
     np.testing.assert_allclose(often.mean(), 1, atol=3e-3)
 
 
-def test_bounced_light_takes_the_colour_of_what_it_met(waisted: Seen) -> None:
+def test_bounced_light_has_the_colour_of_the_surface_it_met(waisted: Seen) -> None:
     red, light = (
         Material(np.full((2, 2, 3), (0.8, 0.0, 0.4)), "blinn_phong", 50.0, 0.0),
         EnvironmentLight(np.ones((8, 16, 3))),

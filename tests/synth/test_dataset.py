@@ -106,7 +106,7 @@ def test_maps_keep_their_identities(made: Path) -> None:
         assert misfit == pytest.approx(truth.light_fit_residual, rel=1e-3)
 
 
-def test_what_is_read_is_what_was_rendered(made: Path) -> None:
+def test_scenes_are_read_as_they_were_rendered(made: Path) -> None:
     scene = plan(RUN)[0]
     _, truth = photograph(scene.recipe)
     found = read_truth(made / scene.split / scene.recipe.name)
@@ -361,7 +361,7 @@ def test_scenes_of_schema_1_are_read_with_the_new_gloss_class(root: Path) -> Non
     assert read_facts(path.parent).gloss_class == "diffuse"
 
 
-def test_reading_refuses_what_is_not_ours(root: Path, tmp_path: Path) -> None:
+def test_reading_refuses_other_folders(root: Path, tmp_path: Path) -> None:
     folder = list_scenes(root)[0]
     with pytest.raises(InputError, match="not a data set"):
         list_scenes(tmp_path / "nowhere")

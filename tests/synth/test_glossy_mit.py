@@ -139,7 +139,7 @@ def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
     np.testing.assert_allclose(gloss, environment_gloss(sky, normal, 50.0), atol=0.02 * gloss.max())
 
 
-def test_the_gloss_is_what_mitsuba_renders(bump: Source) -> None:
+def test_the_gloss_equals_that_of_mitsuba(bump: Source) -> None:
     """A z-test at every pixel and channel, corrected for their number; an empty tracer removes
     shadows.
     """

@@ -89,7 +89,7 @@ def test_a_mesh_that_is_turned_inside_out_is_turned_back(tmp_path: Path) -> None
     assert np.einsum("ij,ij->", a, np.cross(b, c)) > 0
 
 
-def test_a_texture_comes_through_linear_and_the_right_way_up(tmp_path: Path) -> None:
+def test_a_texture_is_read_as_linear_and_upright(tmp_path: Path) -> None:
     Image.fromarray(picture()).save(tmp_path / "skin.png")
     read = read_mesh_file(textured(tmp_path))
     assert read.albedo is not None
@@ -155,7 +155,7 @@ def test_files_beside_the_mesh_that_are_missing_or_elsewhere_are_named(tmp_path:
     refused(obj(folder, "mtllib other.mtl\n" + CUBE, "lone.obj"), "other.mtl, which is missing")
 
 
-def test_a_gltf_file_reads_only_what_lies_beside_it(tmp_path: Path) -> None:
+def test_a_gltf_file_refers_only_to_files_in_its_folder(tmp_path: Path) -> None:
     folder = tmp_path / "mesh"
     folder.mkdir()
     trimesh.creation.icosphere(2).export(tmp_path / "ball.glb")

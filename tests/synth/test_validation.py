@@ -228,7 +228,7 @@ def test_a_plane_is_extended_outside_the_mask_as_a_plane() -> None:
     assert np.allclose(found[5:16, 5:16], plane[5:16, 5:16])
 
 
-def test_sirfs_refuses_what_is_black() -> None:
+def test_sirfs_refuses_a_black_image() -> None:
     truth = sphere()
     black = replace(truth, diffuse=0 * truth.diffuse)
     with pytest.raises(InputError, match="black"):

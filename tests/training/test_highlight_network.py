@@ -61,7 +61,7 @@ def test_bands_and_channels_are_those_of_the_core() -> None:
     np.testing.assert_allclose(channels, channels_of(image, mask), atol=1e-5)
 
 
-def test_the_core_computes_what_was_trained(tmp_path: Path) -> None:
+def test_the_core_and_the_module_compute_the_same(tmp_path: Path) -> None:
     one, (image, mask) = module(0), photo()
     np.savez(tmp_path / "network.npz", **one.arrays())  # type: ignore[arg-type]
     other = module(1)

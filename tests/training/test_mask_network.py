@@ -28,7 +28,7 @@ def module(seed: int) -> MaskNetworkModule:
     return one.eval()
 
 
-def test_the_core_computes_what_was_trained(tmp_path: Path) -> None:
+def test_the_core_and_the_module_compute_the_same(tmp_path: Path) -> None:
     one = module(0)
     path = tmp_path / "network.npz"
     np.savez(path, **one.arrays())  # type: ignore[arg-type]

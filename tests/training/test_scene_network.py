@@ -98,7 +98,7 @@ def test_the_channels_of_both_agree() -> None:
         np.testing.assert_allclose(mine[k].permute(1, 2, 0).numpy(), wanted, atol=1e-5)
 
 
-def test_the_core_computes_what_the_module_does(tmp_path: Path) -> None:
+def test_the_core_and_the_module_compute_the_same(tmp_path: Path) -> None:
     """With weights of 16 bits in both; and without, but for their rounding."""
     one = module(0)
     network = written(one, tmp_path)
@@ -161,7 +161,7 @@ def test_the_loss_is_finite_without_a_known_pixel(training: bool) -> None:
     assert one.loss(sample)[0].isfinite()
 
 
-def test_the_brightness_of_the_truth_does_not_enter_what_is_said_of_its_form() -> None:
+def test_the_brightness_of_the_true_shading_changes_the_level_alone() -> None:
     one, sample = module(5), batch()
     with torch.no_grad():
         before = one.loss(sample)[1]

@@ -160,7 +160,7 @@ def test_what_cannot_be_reproduced_has_a_reason() -> None:
 
 
 @pytest.mark.slow
-def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
+def test_reflectance_models_have_the_properties_in_the_table() -> None:
     found = {name: catalogue.check_constraints(model).obeyed for name, model in catalogue.MODELS}
     assert all(positive for positive, _, _ in found.values())
     reciprocal = {name for name, (_, obeyed, _) in found.items() if obeyed}

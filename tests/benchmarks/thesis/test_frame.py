@@ -170,7 +170,7 @@ def test_a_failing_item_does_not_stop_the_others_and_is_named(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) -> None:
+def test_a_cancelled_run_keeps_complete_items_and_continues(tmp_path: Path) -> None:
     made: list[str] = []
     stop = {"after": 2}
 
@@ -319,7 +319,7 @@ def test_the_other_commands_need_no_matplotlib() -> None:
 
 
 @pytest.mark.slow
-def test_an_interrupt_ends_with_130_and_the_same_command_goes_on(tmp_path: Path) -> None:
+def test_an_interrupt_exits_with_130_and_the_same_command_continues(tmp_path: Path) -> None:
     arguments = ("thesis", "table", "4.2", "--quick", "-o", tmp_path / "out")
     process = subprocess.Popen(
         isc_command(*arguments), cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True

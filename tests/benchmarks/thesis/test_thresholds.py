@@ -115,7 +115,7 @@ def test_uniform_numbers_and_one_orbit_are_distinguished(context: Context) -> No
     assert many[0] < 100 and pseudo[0] < 100
 
 
-def test_statistics_are_what_they_are_called() -> None:
+def test_intervals_and_tests_equal_known_values() -> None:
     assert np.allclose(wilson_interval(50, 50), (0.92866, 1), atol=1e-4)
     assert np.allclose(wilson_interval(5, 10), (0.23659, 0.76341), atol=1e-4)
     assert holm_correction([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])

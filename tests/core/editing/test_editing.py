@@ -54,7 +54,7 @@ def test_edits_at_defaults_return_a_bit_identical_image(scene: Decomposition) ->
 
 
 @pytest.mark.slow
-def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposition) -> None:
+def test_no_edit_changes_the_scene_or_pixels_outside_the_mask(scene: Decomposition) -> None:
     before = scene.image.copy()
     sun = DirectionalLight(toward(-1, 1, 1), ambient=np.full(3, 0.2))
     for edit in (
@@ -154,7 +154,7 @@ def test_a_target_colour_is_reached_at_the_texture_s_luminance(scene: Decomposit
     )
 
 
-def test_no_colour_is_brighter_than_the_paint_was_or_what_the_photo_shows_white(
+def test_no_colour_is_brighter_than_the_original_or_the_white_of_the_photo(
     scene: Decomposition,
 ) -> None:
     seen = scene.reflectance * light_color(scene)

@@ -48,7 +48,7 @@ def test_the_light_of_a_specular_layer_is_found_before_the_camera() -> None:
     assert np.degrees(np.arccos(fit.light.direction @ LIGHT.direction)) < 4
 
 
-def test_a_lobe_in_an_environment_mirrors_what_the_camera_sees() -> None:
+def test_a_lobe_mirrors_the_environment_for_the_perspective_camera() -> None:
     d = bump_before_camera()
     rows = 32
     environment = np.zeros((rows, 2 * rows, 3))

@@ -106,7 +106,7 @@ def test_similarity_counts_inside_the_mask() -> None:
         assert measure(truth, estimate) < 0.9
 
 
-def test_similarity_refuses_what_it_cannot_compare() -> None:
+def test_similarity_refuses_images_of_other_shapes() -> None:
     truth, estimate = pair()
     with pytest.raises(ValueError, match="shapes"):
         ssim(truth, estimate[1:])

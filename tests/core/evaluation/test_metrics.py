@@ -287,7 +287,7 @@ def test_mse_and_psnr() -> None:
     assert mse(truth, estimate, mask) == 1 and psnr(truth, truth) == math.inf
 
 
-def test_image_errors_refuse_what_they_cannot_compare() -> None:
+def test_image_errors_refuse_invalid_pairs() -> None:
     image = np.ones((4, 5, 3))
     with pytest.raises(ValueError, match="shapes"):
         mse(image, image[:3])

@@ -157,7 +157,7 @@ def test_photos_without_anything_in_them_have_an_answer(tmp_path: Path, level: f
         assert np.isfinite(values).all()
 
 
-def test_temperatures_scale_what_the_network_is_unsure_of(tmp_path: Path) -> None:
+def test_temperatures_scale_the_uncertainties(tmp_path: Path) -> None:
     image, mask = photo(np.random.default_rng(5))
     one, two = (
         predict_scene(image, mask, small_network(tmp_path, temperatures=np.array(values)))

@@ -92,7 +92,7 @@ def test_the_ball_of_light_is_a_ball_in_that_light(shown: dict[str, np.ndarray])
     assert np.abs(small - shown["shading"])[inner()].max() < 0.04
 
 
-def test_the_normals_are_the_right_way_round(shown: dict[str, np.ndarray]) -> None:
+def test_normals_are_drawn_with_right_and_up_positive(shown: dict[str, np.ndarray]) -> None:
     coded = shown["normals"]
     assert coded[160, 270, 0] > 2 * coded[160, 50, 0]  # red grows to the right
     assert coded[50, 160, 1] > 2 * coded[270, 160, 1]  # green grows upward

@@ -122,7 +122,7 @@ def test_pixels_and_world_are_related_as_described() -> None:
     assert result.describe()["metres_per_pixel"] == 0.002
 
 
-def test_the_texture_is_the_right_way_round() -> None:
+def test_the_texture_is_not_mirrored() -> None:
     """One coloured corner: it must be found at the mesh's top left, and the file's v must count
     from the top.
     """
@@ -267,7 +267,7 @@ def test_a_large_map_is_simplified_to_the_requested_number_of_faces() -> None:
         assert np.ptp(mesh.vertices[:, 0]) == pytest.approx(0.1, rel=0.25)
 
 
-def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
+def test_the_normal_map_contains_the_detail_that_a_simplified_mesh_lacks() -> None:
     """Fine waves on a ball: mesh and map together give the recovered normals, rebuilt here as glTF
     prescribes; the mesh alone does not.
     """

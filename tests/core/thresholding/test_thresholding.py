@@ -239,7 +239,7 @@ def test_quantise_returns_stored_levels() -> None:
     assert quantise(np.array([-1.0, 2.0]), 1.0).tolist() == [0, 255]
 
 
-def test_refuses_what_it_cannot_use() -> None:
+def test_invalid_input_is_refused() -> None:
     objective = OtsuObjective.of(levels("coins"))
     with pytest.raises(InputError, match="exact, chaotic_clonal"):
         maximise("annealing", objective, 3)

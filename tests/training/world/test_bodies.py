@@ -82,7 +82,7 @@ def test_a_model_is_taken_apart(tmp_path: Path) -> None:
         assert_is_a_body(body.mesh)
 
 
-def test_what_touches_is_one_thing_and_its_small_parts_are_things_too(tmp_path: Path) -> None:
+def test_touching_parts_are_one_object_and_small_parts_are_objects_too(tmp_path: Path) -> None:
     plate = rounded_box(np.array([1, 0.1, 1]), 0.05, 12)
     vase = placed(ball(8), (0, 0.35, 0), 0.26)
     bodies = loaded(catalogue(tmp_path, {"plate": plate, "vase": vase}))
@@ -92,7 +92,7 @@ def test_what_touches_is_one_thing_and_its_small_parts_are_things_too(tmp_path: 
     ]
 
 
-def test_equal_things_come_once_and_six_at_most(tmp_path: Path) -> None:
+def test_equal_models_are_read_once_and_similar_ones_six_times(tmp_path: Path) -> None:
     chairs = {f"chair{k}": a_box(x=float(k)) for k in range(4)}
     assert len(loaded(catalogue(tmp_path, chairs))) == 1
     balls = {f"b{k}": placed(ball(8), (3 * k, 0, 0), (1, 1, 1 - 0.08 * k)) for k in range(9)}

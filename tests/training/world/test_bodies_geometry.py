@@ -90,7 +90,7 @@ def test_a_cube_keeps_its_edges_and_a_ball_is_smooth() -> None:
     assert (np.einsum("ij,ij->i", sphere.normals, sphere.vertices) > 0.999).all()
 
 
-def test_welding_merges_corners_and_drops_what_has_no_area() -> None:
+def test_welding_merges_vertices_and_drops_triangles_without_area() -> None:
     corners = CUBE.corners().reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)
     faces = np.concatenate([faces, faces[:2, ::-1], [[0, 0, 1]]])

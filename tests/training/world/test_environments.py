@@ -73,7 +73,7 @@ def test_a_folder_without_panoramas_or_with_other_pictures_is_refused(tmp_path: 
         read_panoramas(tmp_path, 0)
 
 
-def test_lobes_keep_the_mean_and_what_is_uniform() -> None:
+def test_lobes_keep_the_mean_and_a_uniform_environment() -> None:
     environment, widths = photo(), (0.05, 0.2, 0.6)
     levels = smoothed_levels(environment, widths)
     assert levels.shape == (3, ROWS, 2 * ROWS, 3)

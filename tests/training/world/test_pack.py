@@ -140,7 +140,7 @@ def test_bodies_that_are_packed_come_last() -> None:
 
 
 @pytest.mark.slow
-def test_a_second_pack_holds_what_the_first_has_not(tmp_path: Path) -> None:
+def test_a_second_pack_contains_other_views_than_the_first(tmp_path: Path) -> None:
     world, second = world_folder(tmp_path), tmp_path / "b.isw"
     first = [view for split in Split for view in views_in(world, split)][::2]
     pack_worlds([world], tmp_path / "hdri", second, 10**8, 0, first)

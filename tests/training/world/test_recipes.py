@@ -97,7 +97,7 @@ def test_lamps_are_apart_and_the_first_is_in_front() -> None:
         assert apart.max() < math.cos(math.radians(30)) and towards[:, 2].min() > -0.3
 
 
-def test_painted_views_are_what_the_recipes_say() -> None:
+def test_painted_views_follow_their_recipes() -> None:
     recipes = drawn(5, Shares(), 6)
     views = batch_of([prepared(ellipsoid_view(np.random.default_rng(k))) for k in range(6)])
     numbers = stacked(recipes)
@@ -123,7 +123,7 @@ def test_recipes_without_patterns_at_hand_still_work() -> None:
     assert (one.maps == 0).all()
 
 
-def test_white_lies_on_a_strong_colour_or_the_other_way_round() -> None:
+def test_prints_are_white_on_a_strong_colour_or_the_reverse() -> None:
     def saturation(colour: np.ndarray) -> float:
         return 1 - float(colour.min() / colour.max())
 

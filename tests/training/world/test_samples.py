@@ -217,7 +217,7 @@ def test_a_frame_cuts_photo_and_truth() -> None:
         assert part[:, :, 60, 60].any()
 
 
-def test_the_mean_light_of_what_the_light_is_told_for_is_one() -> None:
+def test_log_shading_is_relative_to_the_mean_of_the_photo() -> None:
     """Brightness of log shading: photo = albedo exp(log shading), over the photo's mean."""
     one = draw(6, replace(HARMONICS, matte=1.0), 3, plain=True)
     clean = {name: 0 * one.cameras[name] for name in ("noise", "floor", "blur", "clips")}
