@@ -113,7 +113,7 @@ def _seen(
     made = BodyReference(name, Source.BUILT, CREDIT, part=kind, number=_FIRST + number)
     bodies = made.load()
     if not bodies:
-        raise InputError("no body passes the screening")
+        raise InputError("no object passes the screening")
     placed = views.in_picture(bodies[0].mesh.rotated(views.random_side(rng)), np.inf)
     view = views.view_of(kind, str(Source.BUILT), placed, np.inf, rng)
     if view is None:

@@ -12,7 +12,7 @@ the predicted one, brightness aside. If the two sources were independent, square
     error of log reflectance = sqrt(f^2 q^2 + g^2 r^2)
 
 The second holds as the diffuse image is reflectance times shading. The five constants are fitted by
-least squares to the errors on held-out bodies, see `CALIBRATION`. The confidence is 2^(-error of
+least squares to the errors on held-out objects, see `CALIBRATION`. The confidence is 2^(-error of
 the normal / 20 degrees).
 
 Citation: calibration of a regression's uncertainty: V. Kuleshov, N. Fenner, S. Ermon, "Accurate
@@ -21,7 +21,7 @@ and normal deviations: see `networks.scene_network`.
 
 Limits: the mean error over many pixels of about the same expectation; a single pixel's error varies
 by as much. Errors of the separation count only as far as they bend shape and shading. Calibrated on
-opaque bodies: for mirrors and glass it is a little low, for hair and cast shadows of other objects
+opaque objects: for mirrors and glass it is a little low, for hair and cast shadows of other objects
 unknown. Measured in docs/methods/expected_error.md.
 """
 
@@ -65,7 +65,7 @@ class Calibration:
 
 
 # python -m benchmarks.decomposition.expected_error WORLD --panoramas HDRI: 60 photos of held-out
-# bodies of the project's world under panoramas that no fit has seen.
+# objects of the project's world under panoramas that no fit has seen.
 CALIBRATION = Calibration(7.337, 0.723, 0.780, 0.660, 1.015)
 
 

@@ -42,7 +42,7 @@ from .task import DecompositionTask
 # photos and .4 to 1 in others.
 _TYPICAL_LEVEL = 0.75
 _BRIGHT = 95.0  # percentile: most highlights are smaller
-_DESATURATION = 0.1  # chosen on held-out bodies; docs/methods/light_colour.md
+_DESATURATION = 0.1  # chosen on held-out objects; docs/methods/light_colour.md
 _LEAST_WEIGHT = 0.05
 
 

@@ -19,7 +19,7 @@ doi:10.1007/978-3-319-24574-4_28. Weights, training images and losses are our ow
 training.networks.highlight_network`.
 
 Limits: measured in docs/methods/highlight_network.md. Specular light without bright details, such
-as broad sheen over the whole body, is not detected. The light is assumed to be white.
+as broad sheen over the whole object, is not detected. The light is assumed to be white.
 """
 
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ and maxima of the coarse feature maps over the object determine the light: mean 
 + F F' of the 27 coefficients of the log shading, the number of lamps, the direction of the
 strongest, and the material of the object. The predictions for the photo and its mirror image are
 averaged. y and the shading have Laplace distributions, the normals and the light Gaussian ones.
-Each scale is multiplied by a factor fitted on held-out bodies.
+Each scale is multiplied by a factor fitted on held-out objects.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; uncertainties: A. Kendall, Y. Gal, "What uncertainties do we need

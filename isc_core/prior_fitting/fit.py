@@ -82,7 +82,7 @@ class FitOptions:
     light : LightFitOptions
     relief, texture : float
         Deviations that are added to those of the differences of curvature (1 / pixel) and of log
-        reflectance: synthetic bodies and paints are smoother than real ones, which would cause a
+        reflectance: synthetic objects and paints are smoother than real ones, which would cause a
         spike of the costs at 0.
     """
 
@@ -102,7 +102,7 @@ class FitOptions:
         return replace(self, light=replace(self.light, natural_contrast=None))
 
 
-# For synthetic bodies and paints. Both values were chosen on held-out bodies.
+# For synthetic objects and paints. Both values were chosen on held-out objects.
 SYNTHETIC = FitOptions(relief=0.003, texture=0.02)
 # As published (Barron & Malik 2015): unscaled lights, no ridge, the table's constant 512. The
 # defaults are ours.

@@ -20,7 +20,7 @@ Relief is multiplied by
     b(p) = (p - .3) / .3, at least 0 and at most 1,
 
 so that nothing is added where paint is clearly more likely, and all of it where relief is. The
-weights are fitted to the validation set of rendered bodies by `benchmarks.detail.relief_rule`.
+weights are fitted to the validation set of rendered objects by `benchmarks.detail.relief_rule`.
 
 Citation: the direction of the light shows in the spectrum of relief: A. Pentland, "Finding the
 illuminant direction", JOSA 72, 1982, doi:10.1364/JOSA.72.000448; M. Chantler et al., "Classifying

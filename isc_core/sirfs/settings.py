@@ -191,7 +191,7 @@ class PredictionWeights:
         return weights, self.loss_tolerance if light else None
 
 
-# Chosen on half of the held-out bodies and reported on the other half (`benchmarks.sirfs.
+# Chosen on half of the held-out objects and reported on the other half (`benchmarks.sirfs.
 # prediction_weights`), with MIT-Berkeley evaluated only afterwards; docs/methods/scene_network.md
 # has both. They are specific to the shipped network. This start and tolerance need a quarter of the
 # evaluations of the default ones, see "Fewer evaluations" in the research log.
@@ -234,7 +234,7 @@ class LightColourWeight:
 
 
 # The deviation comprises errors of white balance and the light's change of colour over the sphere;
-# the weight was chosen on held-out bodies. docs/methods/light_colour.md has both.
+# the weight was chosen on held-out objects. docs/methods/light_colour.md has both.
 BALANCED_LIGHT = LightColourWeight(0.12, 3.0)
 
 

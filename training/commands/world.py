@@ -1,4 +1,4 @@
-"""`isc world build` and `isc world pack`: the training bodies of the networks."""
+"""`isc world build` and `isc world pack`: the training objects of the networks."""
 
 import argparse
 from pathlib import Path
@@ -13,12 +13,12 @@ from ..world.build import build_world
 from ..world.files import WorldSettings
 from ..world.pack import all_views, pack_worlds
 
-SUMMARY = "trace bodies from random sides"
+SUMMARY = "ray trace objects from random sides"
 
 _EXAMPLES = """  isc world build -o WORLD --count 50
   isc world build -o WORLD --furniture SH3F --urdfs URDFS --scans PLY --built 1200 --families 600
 
-An interrupted build continues in the same folder. Each body is traced once: where its surface is,
+An interrupted build continues in the same folder. Each object is traced once: where its surface is,
 and which of 64 directions see past it. Training lights it anew for every photo."""
 
 
@@ -39,17 +39,17 @@ def declare(parser: argparse.ArgumentParser) -> None:
     jobs = parser.add_subparsers(title="jobs", metavar="JOB", required=True)
     _declare_pack(jobs.add_parser("pack", help="put a part of a world into one small file"))
     build = jobs.add_parser("build", help=SUMMARY)
-    describe(build, run, "Trace bodies from random sides, to train on.", examples=_EXAMPLES)
+    describe(build, run, "Ray trace objects from random sides, to train on.", examples=_EXAMPLES)
     add = build.add_argument
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder of the world")
-    add("--count", type=count, metavar="N", help="stop after N entries of the list of bodies")
+    add("--count", type=count, metavar="N", help="stop after N entries of the list of objects")
     add("--furniture", type=Path, metavar="DIR", help="folder of Sweet Home 3D catalogues (.sh3f)")
     add("--urdfs", type=Path, metavar="DIR", help="folder random_urdfs of pybullet_data")
-    add("--scans", type=Path, metavar="DIR", help="folder of scanned bodies (.ply)")
+    add("--scans", type=Path, metavar="DIR", help="folder of scanned objects (.ply)")
     for name, default, what in (
-        ("built", 600, "bodies built with Blender or by formula"),
-        ("families", 300, "bodies of the shape families of isc synth"),
-        ("views", 2, "sides of each body"),
+        ("built", 600, "objects built with Blender or by formula"),
+        ("families", 300, "objects of the shape families of isc synth"),
+        ("views", 2, "sides of each object"),
         ("seed", 0, "seed of the order, the sides and the lights"),
         ("workers", 2, "processes"),
     ):

@@ -1,11 +1,11 @@
-"""Building a world: every body of the list is loaded and traced from a few sides.
+"""Building a world: every object of the list is loaded and traced from a few sides.
 
-Problem: some thousand bodies, each a second or less, on all processors, and resumable.
+Problem: a few thousand objects, each a second or less, on all processors, and resumable.
 
 Equation: the random numbers of reference number k are those of the sequence (seed, k), so that
 neither the order of the work nor an interruption changes a view.
 
-Limits: a body of which one side shows too little loses its reference.
+Limits: an object of which one side shows too little loses its reference.
 """
 
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ def build_world(
     references = body_names(sources, settings.seed, settings.built, settings.families)
     references = references[:count]
     if not references:
-        raise InputError("the list of bodies is empty: name a folder of bodies or a number")
+        raise InputError("the list of objects is empty: name a folder of objects or a number")
     claim_folder(folder, settings)
     paths = [folder / VIEWS / f"{k:05d}.npz" for k in range(len(references))]
     if not (folder / PATTERNS).exists():
@@ -121,7 +121,7 @@ def _build_one(path: Path, reference: BodyReference, settings: WorldSettings, k:
     views: list[View] = []
     try:
         bodies = reference.load()
-        reason = "" if bodies else "no body passes the screening"
+        reason = "" if bodies else "no object passes the screening"
         views = [
             trace_view(body.name, str(body.source), body.mesh, rng)
             for body in bodies
@@ -143,4 +143,4 @@ def _summary(folder: Path, references: list[BodyReference], paths: list[Path]) -
             credits_.append(f"{reference.name}: {reference.credit}")
     with new_file(folder / CREDITS) as temporary:
         temporary.write_text("\n".join(credits_) + "\n", encoding="utf-8")
-    return [f"{folder}: {views} views of {bodies} bodies; {empty} entries of the list have none"]
+    return [f"{folder}: {views} views of {bodies} objects; {empty} entries of the list have none"]

@@ -1,4 +1,4 @@
-"""The folder of a world: one archive of views for each reference of the list of bodies.
+"""The folder of a world: one archive of views for each reference of the list of objects.
 
     DIR/world.json            format, seed, number of views of a body
     DIR/views/NUMBER.npz      the views of one reference, `View` by `View`; or why it has none
@@ -231,7 +231,7 @@ def views_in(folder: Path, split: Split) -> Iterator[View]:
     Yields
     ------
     View
-        In the order of the list of bodies.
+        In the order of the list of objects.
 
     Raises
     ------

@@ -323,7 +323,7 @@ def test_box_goes_there_and_back() -> None:
     assert back.shape == mask.shape and np.array_equal(back[mask], values[mask])
 
 
-def test_refuses_what_it_cannot_use() -> None:
+def test_invalid_input_is_refused() -> None:
     log_image, mask = np.zeros((8, 9, 3)), np.ones((8, 9), bool)
     with pytest.raises(InputError, match="naive, retinex, sfs-tsai-shah, sfs-ikeuchi-horn"):
         baselines.estimate("magic", log_image, mask)

@@ -202,7 +202,7 @@ def test_clipped_highlight_is_filled_from_around() -> None:
     assert error < 0.1 * np.square(specular[clipped]).mean() and not split.confidence[clipped].any()
 
 
-def test_refuses_what_it_cannot_use() -> None:
+def test_invalid_input_is_refused() -> None:
     image, _, mask = glossy_scene()
     with pytest.raises(InputError, match="no colour"):
         separate(np.repeat(image[..., :1], 3, axis=2), mask)

@@ -67,7 +67,7 @@ def triangle(corner: float) -> Mesh:
 def test_an_interrupted_build_ends_with_the_same_bytes(tmp_path: Path) -> None:
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     lines = build.build_world(whole, NOWHERE, SETTINGS, None, 1, Monitor())
-    assert "3 views of 3 bodies; 0 entries" in lines[0]
+    assert "3 views of 3 objects; 0 entries" in lines[0]
     views = [view for split in Split for view in views_in(whole, split)]
     assert len(views) == 3 and (whole / CREDITS).read_text().count("synth.shapes") == 3
 
@@ -92,7 +92,7 @@ def test_an_interrupted_build_ends_with_the_same_bytes(tmp_path: Path) -> None:
 def test_bodies_without_a_view_leave_their_reason(tmp_path: Path) -> None:
     cases = {
         "line": (triangle(0), "no side shows enough"),
-        "none": (None, "no body passes the screening"),
+        "none": (None, "no object passes the screening"),
         "bad": (InputError("bad.ply has no surface: choose another"), "bad.ply has no surface"),
     }
     for name, (content, reason) in cases.items():
@@ -116,10 +116,10 @@ def test_the_number_of_a_reference_alone_decides_its_views(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("words", "match"),
     [
-        (["--built", "0", "--families", "0"], "the list of bodies is empty"),
+        (["--built", "0", "--families", "0"], "the list of objects is empty"),
         (["--views", "0"], "must be at least 1"),
         (["--workers", "0"], "must be at least 1"),
-        (["--count", "0"], "the list of bodies is empty"),
+        (["--count", "0"], "the list of objects is empty"),
     ],
 )
 def test_builds_of_nothing_are_refused(tmp_path: Path, words: list[str], match: str) -> None:
