@@ -606,6 +606,8 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
         with Interrupts() as interrupts:
             signal.raise_signal(signal.SIGINT)
             interrupts.monitor(lambda event: None).report("work", 0.0)
+            assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
 
