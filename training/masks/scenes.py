@@ -139,12 +139,12 @@ def draw_scenes(
     shape = _SHAPES[rng.integers(len(_SHAPES), size=number)]
     level = 0.2 * np.exp(rng.normal(0, 0.5, number))
     count = rng.choice(len(shares), number, p=shares)
-    few, many = _one_or_none(rng, shape, count == Count.ONE), _several(rng, shape)
+    at_most_one, several = _one_or_none(rng, shape, count == Count.ONE), _several(rng, shape)
     crowded = (count == Count.SEVERAL)[:, None]
-    photo, layer = np.nonzero(np.where(crowded, many.present, few.present))
+    photo, layer = np.nonzero(np.where(crowded, several.present, at_most_one.present))
 
     def chosen(name: str) -> np.ndarray:
-        one, other = (getattr(places, name)[photo, layer] for places in (few, many))
+        one, other = (getattr(places, name)[photo, layer] for places in (at_most_one, several))
         which = crowded[photo, 0].reshape(-1, *[1] * (one.ndim - 1))
         return np.where(which, other, one)
 
