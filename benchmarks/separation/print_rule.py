@@ -67,7 +67,7 @@ def regions_of(scene: PrintScene) -> Regions:
     """
     photo, mask, inside = scene.photo, scene.mask, scene.mask[..., None]
     seen = predict_scene(photo, mask)
-    diffuse = separate("isc", photo, mask, scene.clipped).diffuse
+    diffuse = separate("isc", photo, mask, scene.clipped, changes={"odds": 0.0}).diffuse
     residual = detect_residual_highlights(photo, diffuse, mask, seen)
     diffuse = diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale

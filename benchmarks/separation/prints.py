@@ -1,7 +1,8 @@
 """What is not a highlight: light that methods take off painted bodies, matt and glossy.
 
   python -m benchmarks.separation.prints WORLD --panoramas DIR [--part PART] [--count N]
-  [--methods isc,network,joint,marked,chain,joint@ODDS] [--sheet JPG] [--json FILE]
+  [--seed N] [--plain] [--methods isc,network,joint,marked,chain,joint@ODDS] [--sheet JPG]
+  [--json FILE]
   python -m benchmarks.separation.prints WORLD --photos DIR --sheet JPG
 
 WORLD is a folder of `isc world build`; the photos are those of `print_set`. Constants are fitted on
@@ -9,7 +10,7 @@ WORLD is a folder of `isc world build`; the photos are those of `print_set`. Con
 `Part.TEST`. `isc` and `network` are separators, `joint` the layers of `isc decompose` before
 reflectance is continued, `chain` all of `isc decompose` (minutes). `marked` is `joint` with one
 click: at the strongest highlight of a glossy body, as a person sees it; none on a matt one.
-`joint@1` is `joint` with other odds than the default.
+`joint@1` and `isc@0` have other odds than the default.
 
 Matt: share of the light taken off, and its RMS over the photo's. Glossy: squared error of the
 specular light over that of none. 1 is what doing nothing reaches; intervals are of resampled
@@ -38,6 +39,7 @@ from isc_core.separation import separate
 from .print_set import Part, PrintScene, print_scenes
 
 METHODS = ("isc", "network", "joint")
+COLOUR_ALONE = {"odds": 0.0}  # an option of the method isc
 _RESAMPLED = 2000
 _COLUMNS = 10
 _SHEET_SIDE, _PHOTO_COLUMNS = 200, 7
@@ -50,7 +52,7 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
     ----------
     scene : PrintScene
     method : str
-        "chain", "joint", "marked", "joint@ODDS" or a separation method.
+        "chain", "joint", "marked" or a separation method; "joint@ODDS", "isc@ODDS".
 
     Returns
     -------
@@ -63,14 +65,15 @@ def removed_light(scene: PrintScene, method: str) -> np.ndarray:
         return decompose(whole, Settings(threads=1)).specular
     name, _, odds = method.partition("@")
     if name in ("joint", "marked"):
-        colour = separate("isc", photo, mask, scene.clipped)
+        colour = separate("isc", photo, mask, scene.clipped, changes=COLOUR_ALONE)
         marks = strongest_highlight(scene) if name == "marked" else None
         options = JointOptions(odds=float(odds)) if odds else None
         layers = supported_layers(
             photo, colour, mask, options=options, clipped=scene.clipped, marks=marks
         )
         return _taken(layers, photo)
-    return separate(method, photo, mask, scene.clipped).specular
+    changes = {"odds": float(odds)} if odds else None
+    return separate(name, photo, mask, scene.clipped, changes=changes).specular
 
 
 def _taken(layers: SupportedLayers, photo: np.ndarray) -> np.ndarray:
@@ -198,7 +201,7 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
         whole = read_photo(file, whole_frame=file.suffix != ".png")
         photo = whole.resized_to_object(_SHEET_SIDE)
         image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
-        colour = separate("isc", image, mask, photo.clipped)
+        colour = separate("isc", image, mask, photo.clipped, changes=COLOUR_ALONE)
         layers = supported_layers(image, colour, mask, clipped=photo.clipped)
         kept = _taken(layers, image)
         unit = max(float(np.quantile(image[mask], 0.995)), 1e-6)
@@ -261,6 +264,8 @@ def main() -> None:
     add("--panoramas", type=Path, metavar="DIR", help="panoramas")
     add("--part", type=Part, default=Part.TEST, choices=list(Part), help="which bodies")
     add("--count", type=int, default=60, help="photos of each set (default: %(default)s)")
+    add("--seed", type=int, default=0, help="of paint, light and sides (default: %(default)s)")
+    add("--plain", action="store_true", help="bodies of one colour instead of painted ones")
     add("--methods", default=",".join(METHODS), help="default: %(default)s")
     add("--photos", type=Path, metavar="DIR", help="photos to draw instead")
     add("--sheet", type=Path, help="JPEG of the photos and what the last method takes off")
@@ -272,9 +277,10 @@ def main() -> None:
         return
     if given.panoramas is None:
         parser.error("name a folder of panoramas with --panoramas, or photos and a sheet")
+    given_set = given.world, given.panoramas, given.part, given.count
     try:
         matt, glossy = (
-            list(print_scenes(given.world, given.panoramas, given.part, given.count, shiny))
+            list(print_scenes(*given_set, glossy=shiny, seed=given.seed, painted=not given.plain))
             for shiny in (False, True)
         )
     except InputError as error:

@@ -56,6 +56,7 @@ from ..scene.diagnostics import JointOutcome
 from ..separation import HIGHLIGHT_ODDS
 from ..separation.support.clipped_texture import inpaint_clipped
 from ..separation.support.highlight_evidence import classify_highlights
+from ..separation.support.layers import keep_highlights, restore_image
 from ..separation.support.light_tint import limit_tint
 from ..separation.support.ratio_bound import (
     RemovalOptions,
@@ -191,7 +192,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     """
     options = options or JointOptions(odds=task.settings.highlight_odds)
     monitor, working = task.monitor, task.working
-    split, layers = separated_at_both_scales(task)
+    split, layers = separated_at_both_scales(task, by_colour=True)
     task = replace(task, split=None)
     with task.clock.stage("separation"):
         support = supported_layers(
@@ -283,15 +284,10 @@ def supported_layers(
     classified = classify_highlights(image, cleaner, mask, *form, options.odds, marks, clipped)
     hidden = _hidden(classified.kept, clipped, mask)
     kept = classified.kept | hidden
-    split = replace(
-        split,
-        diffuse=_restored(split.diffuse, image, kept, mask),
-        specular=_restricted(split.specular, kept),
-        residual=_restricted(split.residual, kept),
-    )
+    split = keep_highlights(split, image, kept, mask)
     diffuse = split.diffuse
     if residual is not None:
-        diffuse = _restored(cleaner, image, kept, mask, out=cleaner)
+        diffuse = restore_image(cleaner, image, kept, mask, out=cleaner)
     if hidden.any():
         whole = inpaint_clipped(diffuse, image, hidden, mask, prediction.log_shading)
         diffuse = diffuse if residual is not None else diffuse.copy()
@@ -314,33 +310,6 @@ def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> n
     shares = np.asarray(ndimage.mean(kept, labels, np.arange(1, count + 1)))
     belongs = np.concatenate([[False], shares > _MOSTLY])
     return np.asarray(belongs[labels])
-
-
-def _restored(
-    diffuse: np.ndarray,
-    image: np.ndarray,
-    kept: np.ndarray,
-    mask: np.ndarray,
-    out: np.ndarray | None = None,
-) -> np.ndarray:
-    """A diffuse layer (H, W, 3) where highlights are kept, and the image elsewhere on the object;
-    it may take the place of the layer.
-    """
-    found = np.empty_like(diffuse) if out is None else out
-    for block in row_blocks(mask.shape):
-        rows = block.rows
-        inside = np.where(mask[rows][..., None], image[rows], 0).astype(diffuse.dtype)
-        found[rows] = np.where(kept[rows][..., None], diffuse[rows], inside)
-    return found
-
-
-def _restricted(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
-    """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
-    found = np.zeros_like(layer)
-    for block in row_blocks(kept.shape, pixels=1 << 14):
-        if kept[block.rows].any():
-            found[block.rows] = np.where(kept[block.rows][..., None], layer[block.rows], 0)
-    return found
 
 
 def _with_diffuse(split: Separation, diffuse: np.ndarray) -> Separation:

@@ -8,7 +8,7 @@ import numpy as np
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
-from ..separation import separate
+from ..separation import BEST, separate
 from ..shading.spherical_harmonics import (
     light_from_reference,
     light_to_reference,
@@ -23,7 +23,12 @@ _ROWS = 128  # at a time: intermediate doubles take ten times the room of the re
 
 
 def separated(
-    photo: Photo, method: str, monitor: Monitor | None = None, dtype: _Dtype = np.float32
+    photo: Photo,
+    method: str,
+    monitor: Monitor | None = None,
+    dtype: _Dtype = np.float32,
+    *,
+    by_colour: bool = False,
 ) -> Separation:
     """Separate a photo into its layers.
 
@@ -38,6 +43,8 @@ def separated(
     dtype : type, optional
         Precision of the diffuse layer. In float64 it is the image less the specular layer, so that
         it equals an image of that precision where nothing was separated.
+    by_colour : bool, optional
+        Whether the method `separation.BEST` decides by colour alone.
 
     Returns
     -------
@@ -51,20 +58,27 @@ def separated(
     Cancelled
         If the monitor cancels.
     """
-    split = separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
+    changes = {"odds": 0.0} if by_colour and method == BEST else None
+    split = separate(
+        method, photo.image, photo.mask, photo.clipped, changes=changes, monitor=monitor
+    )
     if dtype == np.float32:
         return split
     diffuse = np.maximum(photo.image.astype(dtype) - split.specular - split.residual, 0)
     return replace(split, diffuse=diffuse)
 
 
-def separated_at_both_scales(task: DecompositionTask) -> tuple[Separation, Separation]:
+def separated_at_both_scales(
+    task: DecompositionTask, *, by_colour: bool = False
+) -> tuple[Separation, Separation]:
     """Separate the photo at both scales by the separator of the settings.
 
     Parameters
     ----------
     task : DecompositionTask
         The photo and the settings.
+    by_colour : bool, optional
+        As for `separated`.
 
     Returns
     -------
@@ -82,12 +96,12 @@ def separated_at_both_scales(task: DecompositionTask) -> tuple[Separation, Separ
     monitor.report(f"separating ({method})", 0.03)
     with task.clock.stage("separation"):
         split = (
-            separated(task.maps, method, monitor.part(0.03, 0.06), dtype)
+            separated(task.maps, method, monitor.part(0.03, 0.06), dtype, by_colour=by_colour)
             if task.split is None
             else task.split
         )
         return split, split if task.one_scale else separated(
-            task.working, method, monitor.part(0.06, 0.08), dtype
+            task.working, method, monitor.part(0.06, 0.08), dtype, by_colour=by_colour
         )
 
 

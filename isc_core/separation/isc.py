@@ -1,4 +1,5 @@
-"""The separator of this project: it removes a highlight only where colour shows that it is one.
+"""The separator of this project: it removes a highlight only where colour shows that it is one, and
+form does not speak for print.
 
 Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). By colour alone pale
 reflectance is mistaken for a highlight, with larger errors than those of all highlights. So a
@@ -23,9 +24,14 @@ square blocks: the tables of q and the gains are upsampled, s itself is computed
 photo. Where nothing is proven the pixel stays unchanged, and so does a photo whose whole layer no
 display would show.
 
+White print on strong colour passes these tests, too. Therefore colour and the form that the scene
+network sees decide about each connected region of s together (`highlight_evidence`): where the odds
+of a highlight against print do not exceed `odds`, the photo is restored.
+
 `prior` is the interface for shape and light: the probability of a visible highlight at each pixel.
 It multiplies the odds of the gain there: 0.5 is neutral, 0 forbids a highlight, 1 accepts all of a
-candidate that has any gain. What colour rejects stays rejected.
+candidate that has any gain. What colour rejects stays rejected. It multiplies the odds of a region
+against print, too.
 
 Citation: the cues and their combination are ours; the diffuse ratio is that of H.-L. Shen and Z.-H.
 Zheng (2013), doi:10.1364/AO.52.004483. See also the modules named above.
@@ -48,6 +54,7 @@ from ..imaging.channels import largest, smallest
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian, weighted_gaussian
 from ..imaging.upsampling import enlarged
+from ..networks.scene_network import predict_layers
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .sparse_coding import grouped_specular
@@ -63,8 +70,9 @@ from .support.highlight_cues import (
     roughness,
     steps_of,
 )
+from .support.highlight_evidence import classify_highlights
 from .support.hue_grid import HueGrid, Places, hue_of, quantile
-from .support.layers import white_layers
+from .support.layers import keep_highlights, white_layers
 from .support.saturation_gate import saturation_gate
 
 # Longest side in pixels at which statistics are computed; larger objects are block-averaged.
@@ -133,6 +141,8 @@ class IscOptions:
     filters : bool
         Whether to use the filter statistics too, see `filter_statistics`: fewer false highlights,
         fewer true ones.
+    odds : float
+        Odds of a highlight against print that a region must exceed, >= 0; 0: colour alone decides.
     """
 
     hues: int = 48
@@ -154,6 +164,7 @@ class IscOptions:
     proven: tuple[float, float] = (0.5, 0.95)
     faint: tuple[float, float] = (0.2, 1.0)
     filters: bool = False
+    odds: float = 1.0
 
 
 VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
@@ -288,12 +299,31 @@ def separate(
         specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
+    if options.odds > 0 and split.specular.any():
+        split = _without_print(split, image, mask, options.odds, clipped, prior)
     unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
     likely = _confidence(image, mask, low, _base(low, mask, peak), split.specular[..., 0])
     for layer in (split.diffuse, split.specular, split.residual):
         if layer.any():  # zero pages that are never written need no memory
             layer *= unit
     return replace(split, confidence=np.where(unclipped, likely, 0))
+
+
+def _without_print(
+    split: Separation,
+    image: np.ndarray,
+    mask: np.ndarray,
+    odds: float,
+    clipped: np.ndarray | None,
+    prior: np.ndarray | None,
+) -> Separation:
+    """The layers where a highlight is likelier than print by `odds`, the photo elsewhere."""
+    seen = predict_layers(image, mask)
+    form = seen.log_ratio, seen.ratio_scale
+    found = classify_highlights(
+        image, split.diffuse, mask, *form, odds, clipped=clipped, prior=prior
+    )
+    return keep_highlights(split, image, found.kept, mask)
 
 
 class Abstention(Enum):
@@ -310,12 +340,15 @@ class Abstention(Enum):
     NOT_PROVEN
         There are pale pixels, but they look like reflectance: they have its edges, or run with its
         colours.
+    PRINT
+        The pale pixels are likelier print than highlights.
     """
 
     NO_COLOUR = "no colour"
     NO_CANDIDATE = "no candidate"
     NEAR_GREY = "near grey"
     NOT_PROVEN = "not proven"
+    PRINT = "print"
 
 
 def abstention(
@@ -351,7 +384,8 @@ def abstention(
         return Abstention.NO_CANDIDATE
     if _saturation(photo) <= options.colourful[0]:
         return Abstention.NEAR_GREY
-    return Abstention.NOT_PROVEN
+    by_colour = separate(image, mask, replace(options, odds=0.0), clipped)
+    return Abstention.PRINT if by_colour.specular.any() else Abstention.NOT_PROVEN
 
 
 def _unit(values: np.ndarray) -> np.float32:
@@ -372,6 +406,8 @@ def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> N
             "hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at "
             "least 0"
         )
+    if not 0 <= options.odds < np.inf:
+        raise InputError(f"odds must be finite and at least 0, such as 1, not {options.odds:g}")
     if not (0 <= options.scatter < np.inf and 0 <= options.scatter_here < np.inf):
         raise InputError("scatter and scatter_here must be finite and at least 0")
     for name, ends in vars(options).items():

@@ -186,6 +186,10 @@ def _why_unchanged(method: str, photo: Photo) -> str:
             "the pale areas look like paint: their edges are sharp, or they follow the object's "
             "colours; mark highlights by hand with --prior"
         ),
+        Abstention.PRINT: (
+            "the pale areas are likelier print than highlights; --set odds=0 removes them, or mark "
+            "highlights by hand with --prior"
+        ),
     }
     return reasons[abstention(photo.image, photo.mask, photo.clipped)]
 

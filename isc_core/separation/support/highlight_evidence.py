@@ -34,6 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from scipy.special import logit
 
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
@@ -192,6 +193,7 @@ def classify_highlights(
     odds: float,
     marks: HighlightMarks | None = None,
     clipped: np.ndarray | None = None,
+    prior: np.ndarray | None = None,
 ) -> ClassifiedHighlights:
     """Decide where removed light was a highlight.
 
@@ -212,6 +214,8 @@ def classify_highlights(
         Decide without the odds; paint before highlights.
     clipped : (H, W) ndarray of bool, optional
         Pixels whose true value lies above the recorded one.
+    prior : (H, W) ndarray, optional
+        Probability of a highlight before the evidence, in [0, 1]; its mean over a region counts.
 
     Returns
     -------
@@ -219,6 +223,8 @@ def classify_highlights(
     """
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale, clipped)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
+    if prior is not None and len(seen.numbers):
+        score = score + logit(ndimage.mean(prior, seen.labels, seen.numbers))
     kept = np.isin(seen.labels, seen.numbers[np.exp(score) > odds])
     doubtful = np.isin(seen.labels, seen.numbers[score > 0]) & ~kept
     if marks:

@@ -7,10 +7,12 @@ the mean of the smallest channel over the mask.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from ...imaging.channels import fade_in, mean_channel, saturation, smallest
+from ...imaging.row_blocks import row_blocks
 from ...scene.decomposition import Separation
 from .clipped import explain_clipped
 
@@ -108,6 +110,73 @@ def diffuse_layers(
     kept = np.where(mask[..., None], np.clip(finite, 0, image), 0).astype(np.float32)
     specular = np.where(mask[..., None], np.maximum(image - kept, 0), 0).astype(np.float32)
     return _separation(image, mask, kept, specular, clipped)
+
+
+def keep_highlights(
+    split: Separation, image: np.ndarray, kept: np.ndarray, mask: np.ndarray
+) -> Separation:
+    """Return layers that are separated in some pixels only; elsewhere all light is diffuse.
+
+    Parameters
+    ----------
+    split : Separation
+        Layers of the image.
+    image : (H, W, 3) ndarray
+    kept : (H, W) bool ndarray
+        Where the layers stay as they are.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    Separation
+        With the same confidence.
+    """
+    return replace(
+        split,
+        diffuse=restore_image(split.diffuse, image, kept, mask),
+        specular=_restricted(split.specular, kept),
+        residual=_restricted(split.residual, kept),
+    )
+
+
+def restore_image(
+    diffuse: np.ndarray,
+    image: np.ndarray,
+    kept: np.ndarray,
+    mask: np.ndarray,
+    out: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return a diffuse layer that equals the image outside of some pixels.
+
+    Parameters
+    ----------
+    diffuse, image : (H, W, 3) ndarray
+    kept : (H, W) bool ndarray
+        Where the diffuse layer stays as it is.
+    mask : (H, W) bool ndarray
+        The result is 0 outside.
+    out : (H, W, 3) ndarray, optional
+        Where to write the result; may be `diffuse`.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+    """
+    found = np.empty_like(diffuse) if out is None else out
+    for block in row_blocks(mask.shape):
+        rows = block.rows
+        inside = np.where(mask[rows][..., None], image[rows], 0).astype(diffuse.dtype)
+        found[rows] = np.where(kept[rows][..., None], diffuse[rows], inside)
+    return found
+
+
+def _restricted(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
+    found = np.zeros_like(layer)
+    for block in row_blocks(kept.shape, pixels=1 << 14):
+        if kept[block.rows].any():
+            found[block.rows] = np.where(kept[block.rows][..., None], layer[block.rows], 0)
+    return found
 
 
 def _separation(

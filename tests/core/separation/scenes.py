@@ -9,6 +9,9 @@ from isc_core.imaging.bounding_box import mask_slices
 from isc_core.scene.decomposition import Separation
 
 ALBEDOS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
+RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
+BALL_SIDE = 96
+COLOUR_ALONE = {"odds": 0.0}  # an option of the method isc
 
 
 Scene = tuple[np.ndarray, np.ndarray, np.ndarray]  # image, true diffuse (H, W, 3), mask (H, W)
@@ -63,6 +66,22 @@ def spots(heights: tuple[float, ...] = (0.3, 0.4)) -> Scene:
     )
     diffuse = np.broadcast_to([0.6, 0.3, 0.1], (*y.shape, 3))
     return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
+
+
+def ball(stripe: float = 0.0, gloss: float = 0.0) -> Scene:
+    """Photo, diffuse image and mask of a red ball with a white stripe of a width, and a highlight
+    of a strength.
+    """
+    line = np.linspace(-1.1, 1.1, BALL_SIDE)
+    x, y = np.meshgrid(line, -line)
+    mask = x**2 + y**2 < 1
+    z = np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
+    shading = 0.15 + 0.85 * np.clip(-0.35 * x + 0.45 * y + 0.82 * z, 0, 1)
+    paint = np.where((np.abs(x - 0.2) < stripe / 2)[..., None], WHITE, RED)
+    diffuse = np.where(mask[..., None], paint * shading[..., None], 0)
+    spot = gloss * np.exp(-((x + 0.2) ** 2 + (y - 0.25) ** 2) / 0.012)
+    photo = diffuse + np.where(mask, spot, 0)[..., None]
+    return photo.astype(np.float32), diffuse.astype(np.float32), mask
 
 
 def read(path: Path) -> np.ndarray:

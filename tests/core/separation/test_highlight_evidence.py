@@ -12,26 +12,11 @@ from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
 from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import HIGHLIGHT_ODDS, separate
-from isc_core.separation.support.highlight_evidence import classify_highlights, highlight_evidence
-
-RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
-SIDE = 96
-
-
-def ball(stripe: float = 0.0, gloss: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Photo, diffuse image and mask of a red ball with a white stripe of a width, and a highlight
-    of a strength.
-    """
-    line = np.linspace(-1.1, 1.1, SIDE)
-    x, y = np.meshgrid(line, -line)
-    mask = x**2 + y**2 < 1
-    z = np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
-    shading = 0.15 + 0.85 * np.clip(-0.35 * x + 0.45 * y + 0.82 * z, 0, 1)
-    paint = np.where((np.abs(x - 0.2) < stripe / 2)[..., None], WHITE, RED)
-    diffuse = np.where(mask[..., None], paint * shading[..., None], 0)
-    spot = gloss * np.exp(-((x + 0.2) ** 2 + (y - 0.25) ** 2) / 0.012)
-    photo = diffuse + np.where(mask, spot, 0)[..., None]
-    return photo.astype(np.float32), diffuse.astype(np.float32), mask
+from isc_core.separation.support.highlight_evidence import (
+    classify_highlights,
+    highlight_evidence,
+)
+from tests.core.separation.scenes import BALL_SIDE, COLOUR_ALONE, ball
 
 
 def supported(*evidence: Any, **options: Any) -> np.ndarray:
@@ -76,7 +61,7 @@ def test_likely_highlights_that_stay_are_counted() -> None:
 @pytest.mark.parametrize("stripe", [0.05, 0.12, 0.3])
 def test_a_sharp_white_stripe_on_a_matt_ball_stays_bit_for_bit(stripe: float) -> None:
     photo, _, mask = ball(stripe=stripe)
-    layers = supported_layers(photo, separate("isc", photo, mask), mask)
+    layers = supported_layers(photo, separate("isc", photo, mask, changes=COLOUR_ALONE), mask)
     split = layers.split
     assert layers.residual is None
     np.testing.assert_array_equal(split.diffuse, photo)
@@ -85,14 +70,16 @@ def test_a_sharp_white_stripe_on_a_matt_ball_stays_bit_for_bit(stripe: float) ->
 
 def test_a_true_highlight_on_a_ball_is_still_separated() -> None:
     photo, diffuse, mask = ball(gloss=0.4)
-    found = supported_layers(photo, separate("isc", photo, mask), mask).diffuse
+    found = supported_layers(
+        photo, separate("isc", photo, mask, changes=COLOUR_ALONE), mask
+    ).diffuse
     nothing = np.square((photo - diffuse)[mask]).sum()
     assert np.square((found - diffuse)[mask]).sum() < 0.5 * nothing
 
 
 def test_more_is_asked_for_less_is_kept() -> None:
     photo, _, mask = ball(stripe=0.2, gloss=0.4)
-    start = separate("isc", photo, mask).diffuse
+    start = separate("isc", photo, mask, changes=COLOUR_ALONE).diffuse
     seen = predict_scene(photo, mask)
     answers = [
         supported(photo, start, mask, seen.log_ratio, seen.ratio_scale, odds)
@@ -123,13 +110,13 @@ def test_a_mark_decides_where_the_odds_do_not() -> None:
     photo, diffuse, mask = ball(gloss=0.4)
     ratio, scale = form(photo, diffuse)
     evidence = photo, diffuse, mask, 0.05 * ratio, scale
-    place = (SIDE * 0.41, SIDE * 0.386)  # of the highlight
+    place = (BALL_SIDE * 0.41, BALL_SIDE * 0.386)  # of the highlight
     assert not supported(*evidence, odds=100).any()
     kept = supported(*evidence, odds=100, marks=HighlightMarks((place,)))
     removed = (photo - diffuse).sum(axis=2)
     assert removed[kept].sum() > 0.95 * removed.sum()
     assert not supported(*evidence, odds=1e-9, marks=HighlightMarks((), (place,))).any()
-    far = (SIDE * 0.7, SIDE * 0.7)
+    far = (BALL_SIDE * 0.7, BALL_SIDE * 0.7)
     assert not supported(*evidence, odds=100, marks=HighlightMarks((far,))).any()
 
 
@@ -139,7 +126,7 @@ def test_what_is_marked_as_paint_stays_at_any_size_of_the_maps(size: int) -> Non
         np.kron(one, np.ones((4, 4) + (1,) * (one.ndim - 2))) for one in ball(gloss=0.4)
     )
     given, settings = (photo.astype(np.float32), mask > 0), Settings(max_size=size, detail=0)
-    marks = HighlightMarks((), ((4 * SIDE * 0.41, 4 * SIDE * 0.386),))
+    marks = HighlightMarks((), ((4 * BALL_SIDE * 0.41, 4 * BALL_SIDE * 0.386),))
     without, found = (
         isc_core.decompose(*given, settings=settings, marks=one) for one in (None, marks)
     )
@@ -196,7 +183,7 @@ def slope(photo: np.ndarray, diffuse: np.ndarray, mask: np.ndarray, clipped: np.
 
 
 def test_chroma_stays_under_light_and_falls_under_white_paint() -> None:
-    nowhere = np.zeros((SIDE, SIDE), bool)
+    nowhere = np.zeros((BALL_SIDE, BALL_SIDE), bool)
     photo, diffuse, mask = ball(gloss=0.4)
     assert slope(photo, diffuse, mask, nowhere) > 0
     photo, _, mask = ball(stripe=0.2)
@@ -225,7 +212,7 @@ def test_paint_is_continued_under_a_clipped_highlight_and_beside_it() -> None:
     photo, diffuse, mask = ball(gloss=1.5)
     clipped = (photo >= 1).any(axis=2) & mask
     photo = np.minimum(photo, 1)
-    start = separate("isc", photo, mask, clipped)
+    start = separate("isc", photo, mask, clipped, changes=COLOUR_ALONE)
     found = supported_layers(photo, start, mask, clipped=clipped).diffuse
     bright = (photo - diffuse).sum(axis=2) > 0.6
     assert (bright & ~clipped).any() and (bright & clipped).any()
