@@ -8,6 +8,9 @@ normal map from the Principled BSDF, height and occlusion from the recovered hei
     specular    .5 is plastic, f0 = .08 * specular = .04
     height      0 the lowest point of the object, 1 the highest
 
+All have the size of the base colour. Smaller ones are upsampled cubically, from values that
+continue beyond the object; normals are normalised again.
+
 Packings: `isc_core.result_files.exports.targets`. Limits: as of `texture_set` there.
 """
 
@@ -21,8 +24,10 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.imaging.upsampling import enlarged_cubically
 from isc_core.io.png import encode_png
 from isc_core.result_files.exports.targets import PACKED, TARGETS
+from isc_core.result_files.solids.solid_mesh import continued
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 
 from ..scene.build import BuiltObject
@@ -32,6 +37,7 @@ from ..scene.material_edits import LEVEL_FACTOR, specular_level, surface_node
 FORMATS = ("PNG8", "PNG16", "EXR")
 PLASTIC = 0.5  # of a specular texture, as in Blender and Unreal
 _FLAT = (0.5, 0.5, 1.0)
+_REACH = 2  # pixels of the maps beyond the object that the cubic kernel reads
 
 
 def write_texture_set(
@@ -119,7 +125,7 @@ class _Planes:
         )
         cover = mask[np.ix_(rows.astype(int), columns.astype(int))]
         if (soft := linked_image(self.surface.inputs["Alpha"])) is not None:
-            alpha = _resized(linear_colors(soft)[::-1, :, 0], cover.shape)
+            alpha = enlarged_cubically(linear_colors(soft)[::-1, :, 0], cover.shape).clip(0, 1)
             cover = np.where(alpha < 1, alpha, cover)
         return np.dstack([np.clip(colors, 0, 1), cover])
 
@@ -130,6 +136,10 @@ class _Planes:
         if image is None:
             return np.broadcast_to(np.array(_FLAT), (*self.size, 3)).copy()
         values = linear_colors(image)[::-1].copy()
+        if values.shape[:2] != self.size:
+            vectors = self._fine(2 * values - 1)
+            length = np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9)
+            values = (vectors / length + 1) / 2
         if self.green_down:
             values[..., 1] = 1 - values[..., 1]
         return values
@@ -155,24 +165,38 @@ class _Planes:
         image = linked_image(factor.inputs[0]) if factor is not None else None
         if factor is None or factor.name != LEVEL_FACTOR or image is None:
             return np.full(self.size, min(1.0, PLASTIC * specular_level(self.surface)))
-        share = linear_colors(image)[::-1, :, 0] * PLASTIC * specular_level(self.surface)
-        return np.asarray(np.clip(share, 0, 1))
+        share = self._fine(linear_colors(image)[::-1, :, 0]) * PLASTIC
+        return np.asarray(np.clip(share * specular_level(self.surface), 0, 1))
 
     @property
     def height(self) -> np.ndarray:
         height, mask = self._map("height"), self._map("mask") > 0.5
         low, high = height[mask].min(), height[mask].max()
         share = np.clip((height - low) / max(high - low, 1e-12), 0, 1)
-        return _resized(np.where(mask, share, 0), self.size)
+        return np.clip(self._fine(np.where(mask, share, 0)), 0, 1)
 
     @cached_property
     def ao(self) -> np.ndarray:
         share = ambient_occlusion(self._map("height"), self._map("mask") > 0.5)
-        return _resized(share.astype(float), self.size)
+        return np.clip(self._fine(share.astype(float)), 0, 1)
 
     @property
     def size(self) -> tuple[int, int]:
         return self.basecolor.shape[0], self.basecolor.shape[1]
+
+    def _fine(self, values: np.ndarray) -> np.ndarray:
+        """Values of the maps at the size of the textures."""
+        mask = self._map("mask") > 0.5
+        if values.shape[:2] == mask.shape != self.size:
+            near = mask
+            for _ in range(_REACH):
+                padded = np.pad(near, 1)
+                near = np.logical_or.reduce(
+                    [padded[r : r + len(mask), c : c + mask.shape[1]] for r, c in np.ndindex(3, 3)]
+                )
+            beside = (near & ~mask).reshape(*mask.shape, *(1,) * (values.ndim - 2))
+            values = np.where(beside, continued(values, mask, near), values)
+        return enlarged_cubically(values, self.size)
 
     def _map(self, name: str) -> np.ndarray:
         image = self.built.object.get(f"isc_map_{name}")
@@ -200,22 +224,6 @@ def linked_image(socket: Any) -> bpy.types.Image | None:
 
 def _source(socket: Any) -> Any:
     return socket.links[0].from_node if socket.is_linked else None
-
-
-def _resized(values: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """The values at another resolution, by bilinear interpolation between pixel centres."""
-    for axis, count in enumerate(size):
-        have = values.shape[axis]
-        if have == count:
-            continue
-        place = np.clip((np.arange(count) + 0.5) * have / count - 0.5, 0, have - 1)
-        first = np.minimum(place.astype(int), max(have - 2, 0))
-        second = np.minimum(first + 1, have - 1)
-        weight = (place - first)[:, None] if axis == 0 else place - first
-        values = (1 - weight) * np.take(values, first, axis) + weight * np.take(
-            values, second, axis
-        )
-    return values
 
 
 def _png(values: np.ndarray, deep: bool) -> bytes:

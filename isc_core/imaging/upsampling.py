@@ -1,9 +1,18 @@
-"""Upsampling of block averages: bilinear between the centres of the blocks.
+"""Upsampling of block averages: bilinear or cubic between the centres of the blocks.
 
-Equation: pixel k of a row lies at (k + 1/2) / f - 1/2 of the averages, each f pixels wide; beyond
-the outermost centres their value is repeated.
+Equation: pixel k of a row lies at x = (k + 1/2) / f - 1/2 of the averages, each f pixels wide;
+beyond the outermost centres their value is repeated. With t = x - floor(x), the cubic kernel weighs
+the four nearest centres by
 
-Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (1990), 246-248.
+    (-t + 2 t^2 - t^3) / 2,   (2 - 5 t^2 + 3 t^3) / 2,   (t + 4 t^2 - 3 t^3) / 2,   (t^3 - t^2) / 2,
+
+which passes through the averages and has continuous derivatives.
+
+Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (1990), 246-248;
+R. Keys, "Cubic convolution interpolation for digital image processing", IEEE Transactions on
+Acoustics, Speech, and Signal Processing 29 (1981), 1153-1160, doi:10.1109/TASSP.1981.1163711.
+
+Limits: next to a step, the cubic kernel exceeds the averages by up to 7 % of the step.
 """
 
 import numpy as np
@@ -45,6 +54,49 @@ def enlarged(
         )
         after = np.minimum(first + 1, layer.shape[axis] - 1)
         layer = (1 - beyond) * np.take(layer, first, axis) + beyond * np.take(layer, after, axis)
+    return layer
+
+
+def enlarged_cubically(
+    layer: np.ndarray, shape: tuple[int, ...], rows: slice | None = None
+) -> np.ndarray:
+    """Upsample a map to the size of another one over the same frame, without its creases.
+
+    Parameters
+    ----------
+    layer : (h, w) or (h, w, C) ndarray
+        The averages.
+    shape : tuple of int
+        (H, W) of the whole result.
+    rows : slice, optional
+        Of the result; all by default.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) ndarray
+        `layer` itself, if it has that size.
+    """
+    rows = rows or slice(0, shape[0])
+    for axis, part in enumerate((rows, slice(0, shape[1]))):
+        have, size = layer.shape[axis], shape[axis]
+        if have == size:
+            layer = np.take(layer, np.arange(part.start, part.stop), axis)
+            continue
+        place = (np.arange(part.start, part.stop) + 0.5) * have / size - 0.5
+        first = np.floor(np.clip(place, 0, have - 1)).astype(np.int64)
+        t = np.clip(place - first, 0, 1)
+        weights = (
+            (-t + 2 * t**2 - t**3) / 2,
+            (2 - 5 * t**2 + 3 * t**3) / 2,
+            (t + 4 * t**2 - 3 * t**3) / 2,
+            (t**3 - t**2) / 2,
+        )
+        column = [-1 if k == axis else 1 for k in range(layer.ndim)]
+        layer = sum(
+            weight.astype(np.float32).reshape(column)
+            * np.take(layer, np.clip(first + k, 0, have - 1), axis)
+            for k, weight in enumerate(weights, -1)
+        )
     return layer
 
 

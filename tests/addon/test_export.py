@@ -222,6 +222,33 @@ def test_texture_sets_have_the_edits(built: BuiltObject, tmp_path: Path, file_fo
     assert height[27, 38] > 0.99 and height[0, 0] == 0
 
 
+def test_texture_sets_have_one_size(enabled: Any, bump_folder: Path, tmp_path: Path) -> None:
+    """That of the base colour; the normals between pixels of the maps are unit vectors."""
+    from isc_core.io.decoders import read_raster
+
+    result = read_result(bump_folder)
+    height, width = result.mask.shape
+    tilt = np.linspace(-0.5, 0.5, width)[None, :].repeat(height, 0)
+    normals = np.dstack([np.sin(tilt), 0 * tilt, np.cos(tilt)])
+    fine = replace(
+        result,
+        normal_map=((normals + 1) / 2).astype(np.float32),
+        texture=np.full((4 * height, 4 * width, 3), 128, np.uint8),
+        specular_variation=np.where(result.mask, 0.5, 1.0).astype(np.float32),
+    )
+    build_object(fine, BuildOptions(own_scene=False))
+    bpy.context.view_layer.objects.active = bpy.data.objects["bump"]
+    assert bpy.ops.isc.export_textures(directory=str(tmp_path)) == {"FINISHED"}
+    files = {path.stem[5:]: read_raster(path).values for path in tmp_path.glob("bump/*.png")}
+    assert {values.shape[:2] for values in files.values()} == {(4 * height, 4 * width)}
+    assert files["specular"][np.kron(result.mask, np.ones((4, 4))) > 0].std() < 0.6
+    inside = slice(4 * 2, -4 * 2)
+    place = ((np.arange(4 * width) + 0.5) / 4 - 0.5) / (width - 1) - 0.5
+    found = files["normal"][inside, inside] / 127.5 - 1
+    expected = np.stack([np.sin(place), 0 * place, np.cos(place)], -1)[inside]
+    assert np.abs(found - expected).max() < 0.012
+
+
 def test_packed_textures_have_each_value_in_its_channel(built: BuiltObject, tmp_path: Path) -> None:
     from PIL import Image
 

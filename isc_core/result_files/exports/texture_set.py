@@ -20,7 +20,9 @@ for the mesh (its texture coordinates are those of the photo), with `mesh_normal
     metallic_smoothness   red metallic, alpha 1 - roughness
     mask_map              red metallic, green occlusion, blue detail mask, alpha 1 - roughness
 
-A JSON file records the scales, the conventions and the sources of roughness and specular.
+All have the size of the base colour. Maps that are smaller are upsampled cubically, from unrounded
+values that continue beyond the object; normals are normalised again. A JSON file records the
+scales, the conventions and the sources of roughness and specular.
 
 Sources of the conventions: B. Burley, "Physically based shading at Disney", SIGGRAPH 2012 courses
 (the specular scale, which Unreal and Blender share). Epic Games, Unreal Engine documentation,
@@ -31,7 +33,7 @@ alpha) and "Normal map" (green upward); Unity HDRP manual, "Mask and detail maps
 
 Limits: 8 bits clip base colours above 1 (.5 % of the pixels) and specular levels above that of f0 =
 .08. Unity's metallic materials have no specular level. Metallic is 0. Farther than 16 pixels from
-the object, textures have the mean colour or a flat surface.
+the object, textures have the mean colour or a flat surface. Upsampling adds no detail.
 """
 
 import json
@@ -44,7 +46,8 @@ import numpy as np
 from PIL import Image
 
 from ...errors import InputError
-from ...imaging.upsampling import enlarged
+from ...imaging.row_blocks import row_blocks
+from ...imaging.upsampling import enlarged, enlarged_cubically
 from ...io.atomic import new_folder
 from ...io.exr import write_channels
 from ...lobe_fitting.specular_level import SpecularSource
@@ -117,7 +120,7 @@ def write_texture_set(
             monitor.report(f"writing {texture}", number / len(textures))
             picture = Image.fromarray(getattr(layers, texture))
             picture.save(partial / f"{name}_{texture}.png", compress_level=_COMPRESSION)
-        write_channels(partial / f"{name}_height.exr", {"Y": layers.metres})
+        write_channels(partial / f"{name}_height.exr", {"Y": layers.fine(layers.metres)})
         text = json.dumps(_description(d, layers, target, textures, name), indent=2)
         (partial / f"{name}_textures.json").write_text(text + "\n", encoding="utf-8")
         monitor.report("writing textures", 1.0)
@@ -164,6 +167,16 @@ class _Layers:
     green_down: bool
 
     @property
+    def size(self) -> tuple[int, int]:
+        """Rows and columns of all textures."""
+        width, height = self.built.base_color_size
+        return height, width
+
+    def fine(self, values: np.ndarray) -> np.ndarray:
+        """Values (H, W) of the maps at the size of the textures."""
+        return enlarged_cubically(values, self.size)
+
+    @property
     def basecolor(self) -> np.ndarray:
         codes = self.built.base_color_codes
         cover = enlarged(self.cover, codes.shape[:2], codes.shape[1] / self.cover.shape[1])
@@ -179,24 +192,24 @@ class _Layers:
 
     @property
     def roughness(self) -> np.ndarray:
-        return np.full(self.d.mask.shape, _code(self.roughness_value), np.uint8)
+        return np.full(self.size, _code(self.roughness_value), np.uint8)
 
     @property
     def specular(self) -> np.ndarray:
         level = np.float32(PLASTIC * self.built.specular)
         if self.built.gloss.variation is None:
-            return share_codes(np.full(self.d.mask.shape, level))
-        return share_codes(level * self._continued(self.built.gloss.variation, 1.0))
+            return share_codes(np.full(self.size, level))
+        return share_codes(level * self.fine(self._continued(self.built.gloss.variation, 1.0)))
 
     @property
     def height(self) -> np.ndarray:
-        share = self.metres / max(self.highest, 1e-12)
+        share = self.fine(self.metres) / max(self.highest, 1e-12)
         return np.rint(65535 * np.clip(share, 0, 1)).astype(np.uint16)
 
     @cached_property
     def ao(self) -> np.ndarray:
         share = ambient_occlusion(self.d.height, self.d.mask)
-        return share_codes(self._continued(share, 1.0))
+        return share_codes(self.fine(self._continued(share, 1.0)))
 
     @property
     def orm(self) -> np.ndarray:
@@ -237,7 +250,12 @@ class _Layers:
         return result
 
     def _vectors(self, vectors: np.ndarray) -> np.ndarray:
-        codes = vector_codes(vectors)
+        codes = np.empty((*self.size, 3), np.uint8)
+        for block in row_blocks(self.size):
+            fine = enlarged_cubically(vectors, self.size, block.rows)
+            if vectors.shape[:2] != self.size:
+                fine = fine / np.maximum(np.linalg.norm(fine, axis=-1, keepdims=True), 1e-9)
+            codes[block.rows] = vector_codes(fine)
         if self.green_down:
             codes[..., 1] = 255 - codes[..., 1]
         return codes
@@ -255,13 +273,12 @@ def _description(
     return {
         "target": target,
         "photo": d.provenance.input.get("name", ""),
-        "size": list(d.mask.shape[::-1]),
-        "basecolor_size": list(built.base_color_size),
+        "size": list(built.base_color_size),
         "files": {texture: f"{name}_{texture}.png" for texture in textures}
         | {"height_float": f"{name}_height.exr"},
         "colour_space": {"basecolor": "sRGB", "others": "linear"},
         "normal": "DirectX, green downward" if layers.green_down else "OpenGL, green upward",
-        "metres_per_pixel": built.metres_per_pixel,
+        "metres_per_pixel": built.metres_per_pixel * d.mask.shape[1] / built.base_color_size[0],
         "height": {"metres_at_0": 0.0, "metres_at_65535": layers.highest},
         "reflectance_scale": built.reflectance_scale,
         "basecolor": described["base_color"],

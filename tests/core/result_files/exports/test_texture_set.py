@@ -133,6 +133,34 @@ def test_the_occlusion_is_that_of_the_height_map(generic: Path) -> None:
     assert np.abs(codes(generic / "ball_ao.png") / 255 - expected)[d.mask].max() < 0.003
 
 
+def test_all_textures_have_the_size_of_the_base_color(tmp_path: Path) -> None:
+    """With a base colour of three times the maps, they are those of the ball between its pixels."""
+    d = ball()
+    height, width = (3 * n for n in d.mask.shape)
+    variation = np.where(np.indices(d.mask.shape)[1] > 60, 1.0, 0.5)
+    gloss = SpecularFit(0.3, 0.5, FITTED, FITTED, variation)
+    texture = np.full((height, width, 3), 128, np.uint8)
+    built = replace(glossy(d, gloss=gloss), texture=texture)
+    for target in TARGETS:
+        folder = written(target, tmp_path / target, built)
+        assert {codes(path).shape[:2] for path in folder.glob("*.png")} == {(height, width)}
+    folder = tmp_path / "generic"
+    description = json.loads((folder / "ball_textures.json").read_text())
+    assert description["size"] == [width, height]
+    assert description["metres_per_pixel"] == pytest.approx(built.metres_per_pixel / 3)
+    metres, normal = floats(folder / "ball_height.exr"), codes(folder / "ball_normal.png")
+    assert metres.shape == (height, width)
+    rows, columns = np.indices((height, width))
+    x, y = ((columns + 0.5) / 3 - 0.5 - 66) / 40, (44.5 - (rows + 0.5) / 3) / 40
+    inner = x**2 + y**2 < 0.6**2
+    z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
+    level = (40 * z - d.height[d.mask].min()) * built.metres_per_pixel
+    assert np.abs(metres - level)[inner].max() < 0.01 * built.metres_per_pixel
+    assert np.abs(normal / 127.5 - 1 - np.dstack([x, y, z]))[inner].max() < 0.006
+    detail = codes(folder / "ball_mesh_normal.png") / 127.5 - 1
+    assert np.abs(np.linalg.norm(detail, axis=-1) - 1).max() < 0.01
+
+
 def test_packed_channels(generic: Path, tmp_path: Path) -> None:
     roughness, ao = (codes(generic / f"ball_{name}.png") for name in ("roughness", "ao"))
     orm = codes(written("unreal", tmp_path / "unreal") / "ball_orm.png")
