@@ -146,7 +146,10 @@ class _Planes:
 
     @property
     def roughness(self) -> np.ndarray:
-        return np.full(self.size, self.surface.inputs["Roughness"].default_value)
+        socket = self.surface.inputs["Roughness"]
+        if (image := linked_image(socket)) is not None:  # the user's
+            return np.clip(self._fine(linear_colors(image)[::-1].mean(-1)), 0, 1)
+        return np.full(self.size, socket.default_value)
 
     @property
     def smoothness(self) -> np.ndarray:
