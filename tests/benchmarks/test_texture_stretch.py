@@ -5,10 +5,10 @@ import pytest
 
 pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from benchmarks.blender.texture_stretch import stretched  # noqa: E402
-from isc_core.result_files.solids.back import Back  # noqa: E402
-from isc_core.result_files.solids.rim import Rim  # noqa: E402
-from isc_core.result_files.solids.solid_mesh import make_solid_mesh  # noqa: E402
+from benchmarks.blender.texture_stretch import stretched
+from isc_core.result_files.solids.back import Back
+from isc_core.result_files.solids.rim import Rim
+from isc_core.result_files.solids.solid_mesh import make_solid_mesh
 
 
 @pytest.mark.slow
