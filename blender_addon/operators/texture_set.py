@@ -199,7 +199,7 @@ class _Planes:
                 )
             beside = (near & ~mask).reshape(*mask.shape, *(1,) * (values.ndim - 2))
             values = np.where(beside, continued(values, mask, near), values)
-        return enlarged_cubically(values, self.size)
+        return enlarged_cubically(values.astype(np.float32), self.size)
 
     def _map(self, name: str) -> np.ndarray:
         image = self.built.object.get(f"isc_map_{name}")

@@ -92,11 +92,12 @@ def enlarged_cubically(
             (t**3 - t**2) / 2,
         )
         column = [-1 if k == axis else 1 for k in range(layer.ndim)]
-        layer = sum(
-            weight.astype(np.float32).reshape(column)
-            * np.take(layer, np.clip(first + k, 0, have - 1), axis)
-            for k, weight in enumerate(weights, -1)
-        )
+        lengths = [len(place) if k == axis else n for k, n in enumerate(layer.shape)]
+        total = np.zeros(lengths, np.result_type(layer, np.float32))
+        for k, weight in enumerate(weights, -1):
+            near = np.take(layer, np.clip(first + k, 0, have - 1), axis)
+            total += weight.astype(np.float32).reshape(column) * near
+        layer = total
     return layer
 
 
