@@ -256,6 +256,7 @@ def test_a_painted_roughness_is_exported(built: BuiltObject, tmp_path: Path) -> 
     from isc_core.io.decoders import read_raster
 
     tree, surface = built.material.node_tree, surface_node(built.material)
+    assert surface is not None
     painted = bpy.data.images.new("painted", 2, 1)
     painted.colorspace_settings.name = "Non-Color"
     painted.pixels.foreach_set(np.float32([0.2, 0.2, 0.2, 1, 0.8, 0.8, 0.8, 1]))
