@@ -1,4 +1,4 @@
-"""Results of earlier runs, found again by what they were made of.
+"""Results of earlier runs, and of stages of runs, found again by what they were made of.
 
 A result is kept in a folder whose name is a SHA-256 of everything that it depends on: the content
 of photo and mask, the settings, and the files of `isc_core`. What is built of it in Blender does
@@ -7,6 +7,9 @@ not count, nor do names and places of files: Blender packs them.
 The worker writes a result under its final name complete or not at all. One that cannot be read is
 removed, and made again. When the folder grows above its limit, the results that were not used for
 the longest time go first.
+
+The worker keeps in the same folder what does not depend on model and separator, in files of its own
+(`isc_core.io.stage_cache`). They count toward the limit, and are removed like results.
 
 Citation: FIPS 180-4, Secure Hash Standard, 2015.
 
@@ -23,8 +26,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from isc_core.errors import InputError
+from isc_core.io.source_stamp import source_stamp
 
 from .result_arrays import ARRAYS, ResultArrays, read_result
+
+_STAGE = ".npz"  # suffix of the files of the worker's stages
 
 
 @dataclass(frozen=True)
@@ -34,7 +40,8 @@ class ResultCache:
     Attributes
     ----------
     folder : Path
-        Folder with one folder per result; created when it is first written to.
+        Folder with one folder per result, and files of stages; created when it is first written
+        to.
     limit : int
         Size in bytes above which results are removed.
     """
@@ -108,7 +115,7 @@ class ResultCache:
             raise InputError(f"cannot write {place}: {error.strerror or error}") from error
 
     def trim(self, keep: str) -> None:
-        """Remove the results that were not used for the longest time, until the rest fits.
+        """Remove what was not used for the longest time, until the rest fits.
 
         Parameters
         ----------
@@ -119,11 +126,11 @@ class ResultCache:
             entries = sorted(self.folder.iterdir(), key=lambda entry: -entry.stat().st_mtime)
             room = self.limit - _size(self.place(keep))
             for entry in entries:
-                if entry.name == keep or not entry.is_dir():
+                if entry.name == keep or not (entry.is_dir() or entry.suffix == _STAGE):
                     continue
                 room -= _size(entry)
                 if room < 0:
-                    shutil.rmtree(entry, ignore_errors=True)
+                    _remove(entry)
 
 
 def content_key(files: Sequence[Path | None], settings: Iterable[object], core: Path) -> str:
@@ -151,11 +158,7 @@ def content_key(files: Sequence[Path | None], settings: Iterable[object], core: 
     digest = hashlib.sha256(repr(tuple(settings)).encode())
     for file in files:
         digest.update(b"\0none" if file is None else _file_digest(file))
-    for path in sorted(core.rglob("*")):
-        if path.is_file() and "__pycache__" not in path.parts:
-            status = path.stat()
-            entry = (str(path.relative_to(core)), status.st_size, status.st_mtime_ns)
-            digest.update(repr(entry).encode())
+    digest.update(source_stamp(core))
     return digest.hexdigest()
 
 
@@ -164,5 +167,13 @@ def _file_digest(path: Path) -> bytes:
         return hashlib.file_digest(stream, "sha256").digest()
 
 
-def _size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+def _size(entry: Path) -> int:
+    files = entry.rglob("*") if entry.is_dir() else (entry,)
+    return sum(path.stat().st_size for path in files if path.is_file())
+
+
+def _remove(entry: Path) -> None:
+    if entry.is_dir():
+        shutil.rmtree(entry, ignore_errors=True)
+    else:
+        entry.unlink(missing_ok=True)

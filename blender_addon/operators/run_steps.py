@@ -135,6 +135,7 @@ def decompose_steps(
         each=place.build.each,
         refine=method.refine,
         light_colour=method.light_colour if method.model in SIRFS_MODELS else "balanced",
+        cache=None if place.cache is None else place.cache.folder,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
     if job.each:
@@ -237,7 +238,7 @@ def _cached_result(
 
 def _job_key(job: DecomposeJob, environment: WorkerEnvironment) -> str:
     """The key of a job in the cache; "" if there can be none."""
-    settings = astuple(replace(job, photo=Path(), output=Path(), mask=None, threads=0))
+    settings = astuple(replace(job, photo=Path(), output=Path(), mask=None, threads=0, cache=None))
     with suppress(OSError):
         job_files = (job.photo, job.mask)
         return content_key(job_files, map(str, settings), environment.search[0] / "isc_core")

@@ -80,6 +80,8 @@ class DecomposeJob:
         Whether the gloss is refined.
     light_colour : str
         Value of `--light-colour`.
+    cache : Path or None
+        Value of `--cache`; does not change the result.
     """
 
     photo: Path
@@ -99,6 +101,7 @@ class DecomposeJob:
     each: bool = False
     refine: bool = False
     light_colour: str = "balanced"
+    cache: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -177,6 +180,8 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
     if job.mask is not None:
         words += ["--mask", _absolute(job.mask)]
+    if job.cache is not None:
+        words += ["--cache", _absolute(job.cache)]
     words += ["--each"] * job.each + ["--refine"] * job.refine
     words += [f"--highlight={x},{y}" for x, y in job.highlights]
     words += [f"--not-highlight={x},{y}" for x, y in job.not_highlights]

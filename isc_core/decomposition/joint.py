@@ -477,7 +477,7 @@ def _split(
             photo.image,
             start,
             photo.mask,
-            predict_layers(photo.image, photo.mask, task.options.scene_network),
+            predict_layers(photo.image, photo.mask, task.options.scene_network, task.kept),
             options,
             photo.clipped,
             photo.marks,

@@ -26,7 +26,7 @@ import numpy as np
 from ..illuminant.illuminant import Illuminant, estimate_illuminant, tinted, whitened
 from ..photo import Photo
 from ..scene.decomposition import Separation
-from ..scene.diagnostics import LightColourDiagnostics
+from ..scene.diagnostics import IlluminantOutcome, LightColourDiagnostics
 from ..scene.lobe_fit import Interval, LobeFit
 from .layers import scale_confidence, scaled_light
 from .settings import SEPARATING_MODELS, LightColour
@@ -78,8 +78,24 @@ def solve_under_estimated_light(
 
 
 def _estimated(task: DecompositionTask) -> Illuminant:
+    photo, kept = task.working, task.kept
+    inputs = photo.image, photo.mask, photo.clipped
     with task.clock.stage("estimate light colour"):
-        return estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
+        if kept is None:
+            return estimate_illuminant(*inputs)
+        found = kept.arrays(
+            "light colour", inputs, lambda: _as_arrays(estimate_illuminant(*inputs))
+        )
+    outcome = IlluminantOutcome(str(found["outcome"]))
+    return Illuminant(found["colour"], float(found["confidence"]), outcome)
+
+
+def _as_arrays(light: Illuminant) -> dict[str, np.ndarray]:
+    return {
+        "colour": light.colour,
+        "confidence": np.array(light.confidence),
+        "outcome": np.array(str(light.outcome)),
+    }
 
 
 def solve_under_given_light(

@@ -17,6 +17,7 @@ from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
 from ..imaging.row_blocks import row_blocks
 from ..io.memory import LARGE_PHOTO, enough_memory, release_memory, require_memory
+from ..io.stage_cache import StageCache
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
@@ -60,6 +61,7 @@ def decompose(
     name: str = "",
     memory: int | None = None,
     monitor: Monitor | None = None,
+    kept: StageCache | None = None,
 ) -> Decomposition:
     """Decompose a photo into its intrinsic scene characteristics.
 
@@ -79,6 +81,9 @@ def decompose(
         Bytes that the work may need at most; by default what is free.
     monitor : Monitor, optional
         Receives progress; can cancel.
+    kept : StageCache, optional
+        Results of stages of earlier runs, to which those of this one are added. They change the
+        time only.
 
     Returns
     -------
@@ -114,10 +119,11 @@ def decompose(
                 "the mask has no block of 2 x 2 pixels to build a shape from: mark a larger region "
                 "or use a larger photo"
             )
+    task = DecompositionTask(
+        working, maps, settings, constraints, prior_set, monitor, clock, kept=kept
+    )
     with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
-        estimate = solve(
-            DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
-        )
+        estimate = solve(task)
     monitor.report("maps", 0.98)
     provenance = Provenance(
         _settings_json(settings),

@@ -45,7 +45,7 @@ def with_predictions(task: DecompositionTask) -> DecompositionTask:
         photo = task.working
         with task.clock.stage("predict scene"):
             image = photo.image.astype(np.float32, copy=False)
-            seen = predict_scene(image, photo.mask, options.scene_network)
+            seen = predict_scene(image, photo.mask, options.scene_network, task.kept)
     return replace(
         task,
         prediction=seen,

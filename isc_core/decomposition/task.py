@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..io.stage_cache import StageCache
 from ..networks.scene_network import SceneNetwork, ScenePrediction
 from ..photo import Photo
 from ..progress import Monitor
@@ -133,6 +134,8 @@ class DecompositionTask:
         Outline of the object in `working`; None where it is the working photo's mask.
     options : SolveOptions
         What a protocol changes in the pipeline.
+    kept : StageCache or None
+        Results of stages of earlier runs, to which those of this one are added.
     """
 
     working: Photo
@@ -149,6 +152,7 @@ class DecompositionTask:
     light_coefficients: LightCoefficientsEstimate | None = None
     silhouette: np.ndarray | None = None
     options: SolveOptions = field(default_factory=SolveOptions)
+    kept: StageCache | None = None
 
     @property
     def one_scale(self) -> bool:

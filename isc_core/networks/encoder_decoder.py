@@ -190,6 +190,16 @@ class PhotoNetwork(EncoderDecoder):
             s[1:] for s in shapes
         ]
 
+    def parameters(self) -> tuple[np.ndarray, ...]:
+        """Return all arrays of the network, in a fixed order.
+
+        Returns
+        -------
+        tuple of ndarray
+            Those that its predictions depend on.
+        """
+        return *self.weights, *self.biases, *self.dense, *self.offsets, self.calibration
+
     def predict_global(self, features: list[np.ndarray]) -> np.ndarray:
         """Compute the global prediction.
 

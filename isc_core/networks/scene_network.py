@@ -32,6 +32,7 @@ from enum import StrEnum
 import numpy as np
 
 from ..imaging.blocks import block_means
+from ..io.stage_cache import StageCache
 from ..scene.light_coefficients_estimate import LightCoefficientsEstimate
 from ..scene.light_estimate import LightEstimate, mirrored_places
 from ..scene.normal_estimate import NormalEstimate
@@ -236,7 +237,10 @@ class ScenePrediction:
 
 
 def predict_scene(
-    image: np.ndarray, mask: np.ndarray, network: SceneNetwork | None = None
+    image: np.ndarray,
+    mask: np.ndarray,
+    network: SceneNetwork | None = None,
+    kept: StageCache | None = None,
 ) -> ScenePrediction:
     """Predict shape, layers, shading and light of a photo.
 
@@ -247,6 +251,8 @@ def predict_scene(
     mask : (H, W) bool ndarray
     network : SceneNetwork, optional
         By default the shipped one.
+    kept : StageCache, optional
+        Keeps the network's output for the next run.
 
     Returns
     -------
@@ -254,7 +260,7 @@ def predict_scene(
     """
     network = network or SceneNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    small, direct, mirrored = _run(frame, network)
+    small, direct, mirrored = _run(frame, network, kept)
     factors = dict(zip(TEMPERATURES, network.temperatures, strict=True))
     full = at_full_size(small, frame, mask)
     part = {head: full[..., place] for head, place in HEADS.items()}
@@ -273,7 +279,10 @@ def predict_scene(
 
 
 def predict_layers(
-    image: np.ndarray, mask: np.ndarray, network: SceneNetwork | None = None
+    image: np.ndarray,
+    mask: np.ndarray,
+    network: SceneNetwork | None = None,
+    kept: StageCache | None = None,
 ) -> LayerPrediction:
     """Predict the layers and the shading of a photo, with half of the memory of `predict_scene`.
 
@@ -284,6 +293,8 @@ def predict_layers(
     mask : (H, W) bool ndarray
     network : SceneNetwork, optional
         By default the shipped one.
+    kept : StageCache, optional
+        As of `predict_scene`.
 
     Returns
     -------
@@ -291,7 +302,7 @@ def predict_layers(
     """
     network = network or SceneNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    small, _, _ = _run(frame, network)
+    small, _, _ = _run(frame, network, kept)
     factor = network.temperatures[TEMPERATURES.index("ratio")]
     ratio, log_scale, shading = (
         at_full_size(small[..., HEADS[head]], frame, mask)
@@ -300,8 +311,26 @@ def predict_layers(
     return LayerPrediction(ratio, _scale(log_scale, mask, factor), shading)
 
 
-def _run(frame: NetworkFrame, network: SceneNetwork) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _run(
+    frame: NetworkFrame, network: SceneNetwork, kept: StageCache | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The mean maps (SIDE, SIDE, CHANNELS), and the vectors for the photo and its mirror image."""
+    if kept is None:
+        return _computed(frame, network)
+    names = "maps", "direct", "mirrored"
+    found = kept.arrays(
+        "scene network",
+        (frame.image, frame.mask, *network.parameters()),
+        lambda: dict(zip(names, _computed(frame, network), strict=True)),
+    )
+    maps, direct, mirrored = (found[name] for name in names)
+    return maps, direct, mirrored
+
+
+def _computed(
+    frame: NetworkFrame, network: SceneNetwork
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What `_run` returns."""
     direct = network(frame.image, frame.mask)
     mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
     maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED

@@ -72,6 +72,17 @@ def test_what_was_not_used_for_the_longest_time_goes_first(tmp_path: Path) -> No
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["new", "oldest"]
 
 
+def test_stages_of_the_worker_count_and_go_like_results(tmp_path: Path) -> None:
+    cache = ResultCache(tmp_path, 250)
+    for age, name in enumerate(("new/arrays.npz", "used.npz", "old/arrays.npz", "oldest.npz")):
+        entry = tmp_path / file(tmp_path / name, 100 * "x").relative_to(tmp_path).parts[0]
+        os.utime(entry, (1e9 - age, 1e9 - age))
+    file(tmp_path / "notes.txt", 100 * "x")
+    cache.trim("new")
+    left = sorted(entry.name for entry in tmp_path.iterdir())
+    assert left == ["new", "notes.txt", "used.npz"]
+
+
 class Done:
     """A worker that has written its result."""
 
@@ -107,6 +118,7 @@ def test_a_second_run_starts_no_worker(
     assert all(output.prepared for output in outputs)
     assert outputs[1].path == (tmp_path / "1" / "result" if keep else outputs[0].path)
     assert not keep or (outputs[1].path / "decomposition.json").is_file()
+    assert jobs[0].cache == cache.folder, "what the separator does not change is kept there, too"
     run(2, MethodSettings(separator="none"))
     assert len(jobs) == 2, "another separator is another result"
     run(3, MethodSettings(separator="none", refine=True))

@@ -339,6 +339,7 @@ def test_the_job_reaches_the_command_line(
         not_highlights=((3, 4),),
         refine=True,
         light_colour="0.9,0.5,0.2",
+        cache=Path("kept"),
     )
     *words, last = ended(start_decompose(asked, environment)).message.split("\n")
     assert last == "--cancel-at-eof"
@@ -360,6 +361,7 @@ def test_the_job_reaches_the_command_line(
         "--texture-size": "2048",
         "--highlight-odds": "1",
         "--light-colour": "0.9,0.5,0.2",
+        "--cache": os.path.abspath("kept"),
         "--mask": str(here / "m.png"),
         "--progress": "json",
     }

@@ -11,6 +11,7 @@ from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError
 from ...imaging.bounding_box import mask_box
+from ...io.stage_cache import StageCache
 from ...masking.finder import MaskSearch, read_each_object
 from ...photo import Photo, read_photo
 from ...progress import Monitor
@@ -117,6 +118,13 @@ def declare(parser: argparse.ArgumentParser) -> None:
         metavar="SIZE",
         help="memory limit, such as 2GB; a photo that needs more is refused with the amount that "
         "it needs (default: the free memory)",
+    )
+    computing.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        help="keep in DIR what does not depend on model and separator, about 1 MB per photo: the "
+        "next run on the photo takes less time, and gives the same result",
     )
 
 
@@ -237,6 +245,7 @@ def _decompose_photo(
         prior_set=prior_set,
         name="standard input" if path == STDIN else path.name,
         memory=options.memory,
+        kept=None if options.cache is None else StageCache(options.cache),
         monitor=monitor.part(0.0, 0.7 if options.refine else 0.8),
     )
     refined = list[str]()

@@ -7,6 +7,7 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
+from isc_core.io.stage_cache import StageCache
 from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.scene_network import (
     CHANNELS,
@@ -15,6 +16,7 @@ from isc_core.networks.scene_network import (
     INPUTS,
     SceneNetwork,
     ScenePrediction,
+    predict_layers,
     predict_scene,
 )
 from isc_core.scene.light_estimate import mirrored_places
@@ -138,6 +140,28 @@ def test_neither_the_background_nor_the_threads_change_a_bit(tmp_path: Path) -> 
             np.testing.assert_array_equal(values[13:-4, 3:-21], maps_of(seen)[name])
         for name, values in numbers_of(again).items():
             np.testing.assert_array_equal(values, numbers_of(seen)[name])
+
+
+def test_a_kept_answer_is_that_of_the_photo_and_of_the_network(tmp_path: Path) -> None:
+    network, (image, mask) = small_network(tmp_path), photo(np.random.default_rng(6))
+    other = small_network(tmp_path, temperatures=np.array([1.0, 1, 1, 2]))
+    kept = StageCache(tmp_path / "kept")
+
+    def same(one: ScenePrediction, two: ScenePrediction) -> bool:
+        first, second = (maps_of(seen) | numbers_of(seen) for seen in (one, two))
+        return all(np.array_equal(first[name], second[name]) for name in first)
+
+    wanted = predict_scene(image, mask, network)
+    for _ in range(2):
+        assert same(predict_scene(image, mask, network, kept), wanted)
+        layers = predict_layers(image, mask, network, kept)
+        assert np.array_equal(layers.log_ratio, wanted.log_ratio)
+        assert len(list(kept.folder.iterdir())) == 1
+    assert same(predict_scene(image, mask, other, kept), predict_scene(image, mask, other))
+    assert not same(predict_scene(image, mask, other, kept), wanted)
+    less = mask.copy()
+    less[np.nonzero(mask)[0][0]] = False
+    assert same(predict_scene(image, less, network, kept), predict_scene(image, less, network))
 
 
 @pytest.mark.parametrize("size", [(1, 200), (200, 1), (1, 1), (2, 3), (130, 400)])
