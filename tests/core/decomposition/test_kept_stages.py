@@ -35,6 +35,7 @@ def few_steps() -> Iterator[None]:
         yield
 
 
+@pytest.mark.slow
 def test_kept_stages_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     photo, kept = photo_of(ALBEDOS, LIGHT, size=64), StageCache(tmp_path)
     first, second = (
