@@ -123,7 +123,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--cache",
         type=Path,
         metavar="DIR",
-        help="keep in DIR what does not depend on model and separator, about 1 MB per photo: the "
+        help="keep in DIR what does not depend on model and separator, 1 to 2 MB per photo: the "
         "next run on the photo takes less time, and gives the same result",
     )
 
