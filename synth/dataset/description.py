@@ -20,7 +20,7 @@ from ..scene.camera import Camera
 from ..scene.lights import EnvironmentLight, Light
 from ..scene.materials import Material
 from ..scene.scene import Scene
-from ..scene.variant import has_llvm, load_mitsuba
+from ..scene.variant import is_vectorised, load_mitsuba
 
 SCHEMA_VERSION = 2  # 2: the gloss class "matt" is called "diffuse"
 KIND = "isc synth scene"
@@ -167,7 +167,7 @@ def versions() -> dict[str, str]:
 
 def _render(recipe: Recipe) -> dict[str, Any]:
     options = recipe.render_options()
-    kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and has_llvm())
+    kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and is_vectorised())
     return {
         "samples": options.samples,
         "seed": options.seed,

@@ -23,7 +23,7 @@ from isc_core.progress import Monitor, ProgressEvent
 
 from ..capture.recipe import Recipe, photograph
 from ..rendering.bsdfs import load_drjit
-from ..scene.variant import has_llvm, load_mitsuba
+from ..scene.variant import is_vectorised, load_mitsuba
 from .card import card
 from .description import describe_picture
 from .reading import MANIFEST, read_description, read_object, require_intact
@@ -145,7 +145,7 @@ def _tidy(index: int) -> None:
     every kernel that it compiled.
     """
     gc.collect()
-    if index % KERNELS_KEPT == KERNELS_KEPT - 1 and has_llvm():
+    if index % KERNELS_KEPT == KERNELS_KEPT - 1 and is_vectorised():
         drjit = load_drjit()
         drjit.flush_kernel_cache()
         drjit.flush_malloc_cache()

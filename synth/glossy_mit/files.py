@@ -223,7 +223,7 @@ def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
     )
 
 
-def write_object(root: Path, picture: Exposed, level: float) -> None:
+def write_object(root: Path, picture: Exposed, level: float, variant: str | None = None) -> None:
     """Write natural/OBJECT and then laboratory/OBJECT, each completely or not at all.
 
     Parameters
@@ -234,6 +234,8 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
         The object.
     level : float
         Specular share, per cent.
+    variant : str, optional
+        Of Mitsuba, for the record, if it traced the shadows.
 
     Raises
     ------
@@ -262,7 +264,8 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
             folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")}
         )
         files = {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}
-        record = asdict(object_record(picture, level, codes)) | {"files": files}
+        record = asdict(object_record(picture, level, codes))
+        record |= {"variant": variant, "files": files}
         (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
@@ -292,7 +295,7 @@ def is_written(root: Path, name: str) -> bool:
 
 @dataclass(frozen=True)
 class ObjectRecord:
-    """The content of `object.json`, except for the checksums.
+    """The content of `object.json`, except for the checksums and the variant of Mitsuba.
 
     Attributes
     ----------

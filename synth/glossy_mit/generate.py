@@ -20,6 +20,7 @@ from isc_core.progress import Monitor
 from ..dataset.description import versions
 from ..dataset.reading import read_object
 from ..scene.tracing import Tracer
+from ..scene.variant import load_mitsuba
 from ..shapes.height_field import mesh_of_height
 from .card import card, command, index
 from .files import RECORD, exposed, is_written, write_object
@@ -117,13 +118,14 @@ def _make_object(
     for step, prefix in enumerate(missing):
         part = monitor.part(step / len(missing), (step + 1) / len(missing))
         tracer = Tracer(mesh_of_height(source.height)) if prefix else None
+        variant = str(load_mitsuba().variant()) if tracer else None
         for number, (light, layers) in enumerate(
             make_layers(source, settings, part.part(0.0, 0.5), tracer).items()
         ):
             part.report(f"{name}: files of {light}", 0.5 + 0.5 * number / len(LIGHTS))
             picture = exposed(source, layers, max(settings.levels))
             for level in settings.levels:
-                write_object(out / prefix / root_name(level, light), picture, level)
+                write_object(out / prefix / root_name(level, light), picture, level, variant)
     return True
 
 

@@ -22,6 +22,7 @@ from isc_core.shading.environment_map import environment_from_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
 from ..capture.truth import fit_light
+from ..scene.variant import load_mitsuba
 from .held_out import BLOCK, EVERY, explains_better
 from .light_field import LightField
 from .light_objective import LightObjective, shading_of
@@ -135,7 +136,13 @@ def refine(
         terms, blocks, gain * d.shading[d.mask].astype(float), gain * shading
     )
     result = _refined(d, transport, radiance, shading) if kept else d
-    note = {"kept": kept, "before": before, "after": after, **options.__dict__}
+    note = {
+        "kept": kept,
+        "before": before,
+        "after": after,
+        "variant": str(load_mitsuba().variant()),
+        **options.__dict__,
+    }
     return Refinement(_noted(result, note), kept, before, after)
 
 

@@ -1,7 +1,7 @@
 """Light reflected by a surface, its diffuse and specular lobes separate but from the same samples,
 by Mitsuba's kernels or by NumPy.
 
-`mitsuba_lobes` runs in Mitsuba's LLVM variants; `array_lobes` runs everywhere, on
+`mitsuba_lobes` runs in Mitsuba's CUDA and LLVM variants; `array_lobes` runs everywhere, on
 `isc_core.shading.brdf`, and needs Mitsuba only to trace rays. Both estimate the same integral, so
 each tests the other.
 """
@@ -18,7 +18,7 @@ from ..scene.lights import Light
 from ..scene.materials import Material
 from ..scene.surface import Surface
 from ..scene.tracing import Tracer
-from ..scene.variant import has_llvm
+from ..scene.variant import is_vectorised
 
 Renderer = Literal["auto", "mitsuba", "arrays"]
 
@@ -36,7 +36,7 @@ class RenderOptions:
     bounces : int
         Interreflections on the object, 0 to 8.
     renderer : str
-        "mitsuba", "arrays", or "auto": Mitsuba's kernels if libLLVM is available.
+        "mitsuba", "arrays", or "auto": Mitsuba's kernels if a CUDA or LLVM variant is available.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def light_surface(
         If the user cancels.
     """
     monitor = monitor or Monitor()
-    kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and has_llvm())
+    kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and is_vectorised())
     if kernels:
         from . import mitsuba_lobes
 

@@ -11,8 +11,8 @@ these flags evaluates one lobe alone.
 
 Citation: W. Jakob et al., Mitsuba 3 renderer, 2022, https://mitsuba-renderer.org.
 
-Limits: LLVM variants; a scalar one evaluates it ray by ray through Python, for tiny images only.
-One-sided.
+Limits: CUDA and LLVM variants; a scalar one evaluates it ray by ray through Python, for tiny images
+only. One-sided.
 """
 
 from typing import Any

@@ -22,8 +22,8 @@ rendering", SIGGRAPH 1995, doi:10.1145/218380.218498. B. P. Welford, "Note on a 
 calculating corrected sums of squares and products", Technometrics 4(3), 419-420 (1962),
 doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
 
-Limits: LLVM variants only; float32. If no sample hits a rare shadow or glint, both mean and
-variance are wrong: compare renders with similar numbers of samples, or take many.
+Limits: CUDA and LLVM variants only; float32. If no sample hits a rare shadow or glint, both mean
+and variance are wrong: compare renders with similar numbers of samples, or take many.
 """
 
 import math
@@ -39,7 +39,7 @@ from ..scene.lights import Light
 from ..scene.materials import Material, SurfaceReflectance
 from ..scene.surface import Surface
 from ..scene.tracing import Tracer
-from ..scene.variant import has_llvm, load_mitsuba
+from ..scene.variant import is_vectorised, load_mitsuba
 from . import Lit, RenderOptions
 from .bsdfs import Lanes, load_drjit, lobes_of, rows_of
 from .mitsuba_bounces import World, bounced_light
@@ -84,14 +84,14 @@ def light_surface(
     Raises
     ------
     InputError
-        If no LLVM variant is available.
+        If Mitsuba runs in a scalar variant.
     Cancelled
         If the user cancels.
     """
-    if not has_llvm():
+    if not is_vectorised():
         raise InputError(
-            "Mitsuba's kernels need libLLVM 19 or later: install it (Debian: libllvm19), or use "
-            "the renderer 'arrays'"
+            "Mitsuba's kernels need a graphics card with CUDA and OptiX, or libLLVM 19 or later: "
+            "install it (Debian: libllvm19), or use the renderer 'arrays'"
         )
     random = np.random.default_rng(options.seed)
     world = World(

@@ -1,7 +1,7 @@
 """Intersections of rays with one mesh, in any variant of Mitsuba: nearest hits and occlusion.
 
-The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one, at some
-millions per second.
+The CUDA and LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one,
+at some millions per second.
 
 Limits: positions are computed in float32, to about 1e-6 of the object. Rays that start on the
 surface are lifted off it by `LIFT`.
@@ -170,10 +170,10 @@ def _parts(values: np.ndarray) -> list[object]:
 
 
 def lanes(values: np.ndarray) -> Any:
-    """Convert numbers to a Dr.Jit array, in an LLVM variant.
+    """Convert numbers to a Dr.Jit array, in a CUDA or LLVM variant.
 
-    Dr.Jit reads the numbers in place, and its kernels depend on whether their address is a multiple
-    of the vector length: here it always is, so that no kernel is compiled twice.
+    An LLVM variant reads the numbers in place, and its kernels depend on whether their address is a
+    multiple of the vector length: here it always is, so that no kernel is compiled twice.
 
     Parameters
     ----------

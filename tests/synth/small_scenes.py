@@ -1,5 +1,7 @@
 """Small scenes with known results, for the tests of the renderers."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +31,18 @@ class Seen:
 
     surface: Surface
     tracer: Tracer
+
+
+@contextmanager
+def variant(name: str) -> Iterator[None]:
+    """Mitsuba temporarily in another variant."""
+    mi = load_mitsuba()
+    usual = mi.variant()
+    mi.set_variant(name)
+    try:
+        yield
+    finally:
+        mi.set_variant(usual)
 
 
 def ball(rows: int = 121, radius: float = 1.0) -> Mesh:

@@ -15,7 +15,7 @@ from isc_core.shading.brdf.lambert import Lambert
 from isc_core.shading.brdf.model import Model
 from isc_core.shading.brdf.oren_nayar import OrenNayar
 from synth.rendering.bsdf_plugin import register
-from synth.scene.variant import has_llvm, load_mitsuba
+from synth.scene.variant import is_vectorised, load_mitsuba
 from tests.synth.small_scenes import mitsuba_camera
 
 SIZE, HALF = 24, 1.1
@@ -139,8 +139,8 @@ def test_the_plugin_evaluates_either_lobe_alone_and_they_add_up() -> None:
 
 @pytest.mark.parametrize("name", ["blinn_phong 8", "ggx .6"])
 def test_under_a_white_environment_mitsuba_sees_the_energy_of_the_lobe(name: str) -> None:
-    if not has_llvm():
-        pytest.skip("thousands of paths through Python need an LLVM variant")
+    if not is_vectorised():
+        pytest.skip("thousands of paths through Python need CUDA or libLLVM 19 or later")
     parameters, model = LOBES[name]
     picture = rendered(
         {"type": register(), **parameters},

@@ -11,7 +11,7 @@ from isc_core.shading.brdf.blinn_phong import BlinnPhong
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.brdf.lambert import Lambert
 from synth.rendering.bsdf_plugin import register
-from synth.scene.variant import has_llvm, load_mitsuba
+from synth.scene.variant import is_vectorised, load_mitsuba
 from tests.synth.small_scenes import mitsuba_camera
 
 SIZE = 16
@@ -21,8 +21,8 @@ VIEW = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module", autouse=True)
 def _gradients() -> None:
-    if not has_llvm():
-        pytest.skip("scalar variants carry no gradients: needs libLLVM 19 or later")
+    if not is_vectorised():
+        pytest.skip("scalar variants carry no gradients: needs CUDA or libLLVM 19 or later")
 
 
 def pixels() -> tuple[np.ndarray, np.ndarray]:

@@ -30,6 +30,7 @@ from synth.glossy_mit.layers import make_layers, surface_of
 from synth.glossy_mit.settings import LIGHTS, GlossySettings, root_name, root_names
 from synth.glossy_mit.source import Source, load_source
 from synth.scene.lights import lights_as_environment, panel_toward_origin
+from synth.scene.variant import load_mitsuba
 
 pytestmark = pytest.mark.slow  # they share a run
 
@@ -381,6 +382,7 @@ def test_the_physical_variant_is_separate_and_has_shadows(small: Path, tmp_path:
     )
     record = scene["objects"]["bump"]
     assert scene["physical"] and record["gloss_noise"] > 0
+    assert record["variant"] == load_mitsuba().variant()
     assert record["specular_share"] == pytest.approx(0.25, rel=1e-6)
     exact, shadowed = (
         load_object(tmp_path / "out" / p / "level-25_natural", "bump", "laboratory", "original")

@@ -36,7 +36,7 @@ from synth.scene.materials import Material
 from synth.scene.meshes import Mesh, swept
 from synth.scene.surface import Surface, find_surface
 from synth.scene.tracing import Tracer
-from synth.scene.variant import has_llvm
+from synth.scene.variant import is_vectorised
 from synth.validation.checks.pixel_test import PixelTestOptions, pixel_test
 
 WHITE = np.ones((1, 1, 3))
@@ -57,8 +57,8 @@ PANEL = panel_toward_origin((1.2, 1.4, 1.8), (1.0, 0.6), (8.0, 6.0, 4.0))
 
 
 def kernels_or_skip() -> None:
-    if not has_llvm():
-        pytest.skip("Mitsuba's kernels need an LLVM variant: libLLVM 19 or later")
+    if not is_vectorised():
+        pytest.skip("Mitsuba's kernels need CUDA or libLLVM 19 or later")
 
 
 def ball(rows: int = 97, bumps: float = 0.0) -> Mesh:
@@ -444,7 +444,7 @@ def test_a_panel_without_shadows_is_its_quadrature_also_where_the_horizon_cuts_i
 
 def test_without_llvm_the_message_names_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
     surface, tracer = seen(ball(rows=9), Material(WHITE, "lambert"), 8)
-    monkeypatch.setattr("synth.rendering.mitsuba_lobes.has_llvm", lambda: False)
+    monkeypatch.setattr("synth.rendering.mitsuba_lobes.is_vectorised", lambda: False)
     with pytest.raises(InputError, match="libllvm19"):
         light_surface(
             surface, Material(WHITE, "lambert"), (SUN,), tracer, RenderOptions(renderer="mitsuba")

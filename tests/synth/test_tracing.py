@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from synth.scene.tracing import LIFT, Tracer
-from synth.scene.variant import has_llvm, load_mitsuba
+from synth.scene.variant import is_vectorised, load_mitsuba
 from tests.synth.small_scenes import ball, skittle
 
 
@@ -17,7 +17,7 @@ def sphere(request: pytest.FixtureRequest) -> Iterator[Tracer]:
     mi = load_mitsuba()
     usual = mi.variant()
     if request.param == "scalar":
-        if not has_llvm():
+        if not is_vectorised():
             pytest.skip("the usual variant is the scalar one here")
         mi.set_variant("scalar_rgb")
     yield Tracer(ball(181))

@@ -1,10 +1,6 @@
-"""The two renderers share no code for light and material, and Mitsuba's variants none for rays:
-each tests the other.
-"""
+"""The two renderers share no code for light and material: each tests the other."""
 
 import dataclasses
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +10,7 @@ pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from synth.rendering import Lit, Renderer, RenderOptions, light_surface
 from synth.scene.surface import Surface
-from synth.scene.variant import has_llvm, load_mitsuba
+from synth.scene.variant import is_vectorised
 from synth.validation.checks.pixel_test import (
     PixelTestOptions,
     PixelTestResult,
@@ -28,26 +24,15 @@ SAMPLES = 256
 # that are sampled.
 TOLERANCE = 2e-5
 
-needs_llvm = pytest.mark.skipif(
-    not has_llvm(), reason="only the scalar variant runs here: libLLVM 19 or later is missing"
+needs_kernels = pytest.mark.skipif(
+    not is_vectorised(),
+    reason="only the scalar variant runs here: CUDA or libLLVM 19 or later is missing",
 )
 
 
 @pytest.fixture(scope="module")
 def waisted() -> Seen:
     return seen(skittle(), size=32)
-
-
-@contextmanager
-def variant(name: str) -> Iterator[None]:
-    """Mitsuba temporarily in another variant."""
-    mi = load_mitsuba()
-    usual = mi.variant()
-    mi.set_variant(name)
-    try:
-        yield
-    finally:
-        mi.set_variant(usual)
 
 
 def render(
@@ -75,7 +60,7 @@ def compared(
 
 
 @pytest.mark.slow
-@needs_llvm
+@needs_kernels
 @pytest.mark.parametrize("light", lights())
 @pytest.mark.parametrize("material", materials())
 def test_arrays_and_kernels_agree(waisted: Seen, material: str, light: str, tmp_path: Path) -> None:
@@ -91,7 +76,7 @@ def test_arrays_and_kernels_agree(waisted: Seen, material: str, light: str, tmp_
 
 
 @pytest.mark.slow
-@needs_llvm
+@needs_kernels
 @pytest.mark.parametrize("light", ["directional", "environment"])
 def test_arrays_and_kernels_agree_on_light_that_bounces(waisted: Seen, light: str) -> None:
     one, other = (
@@ -105,7 +90,7 @@ def test_arrays_and_kernels_agree_on_light_that_bounces(waisted: Seen, light: st
         assert not compared(waisted.surface, one, direct, layer)[2].accepted
 
 
-@needs_llvm
+@needs_kernels
 def test_the_comparison_finds_two_per_cent(waisted: Seen) -> None:
     """The sensitivity of the test above."""
     one, other = (
@@ -115,29 +100,3 @@ def test_the_comparison_finds_two_per_cent(waisted: Seen) -> None:
     for layer in ("shading", "specular"):
         brighter = dataclasses.replace(other, **{layer: getattr(other, layer) * 1.02})
         assert not compared(waisted.surface, one, brighter, layer)[2].accepted
-
-
-@needs_llvm
-def test_variants_see_the_same_surface() -> None:
-    usual = seen(skittle(), size=32)
-    with variant("scalar_rgb"):
-        plain = seen(skittle(), size=32)
-    np.testing.assert_array_equal(plain.surface.mask, usual.surface.mask)
-    for name in ("position", "normal", "view", "uv"):
-        np.testing.assert_allclose(
-            getattr(plain.surface, name), getattr(usual.surface, name), atol=2e-5
-        )
-
-
-@needs_llvm
-def test_variants_give_the_arrays_the_same_light() -> None:
-    """The same random numbers, so that only rays that graze an edge may differ."""
-    usual = render(seen(skittle()), "blinn_phong", "panel", "arrays", 1, samples=16)
-    with variant("scalar_rgb"):
-        plain = render(seen(skittle()), "blinn_phong", "panel", "arrays", 1, samples=16)
-    for layer in ("shading", "specular"):
-        left = (
-            np.abs(getattr(plain, layer) - getattr(usual, layer)).max(1)
-            / getattr(usual, layer).max()
-        )
-        assert (left > 1e-4).mean() < 0.01
