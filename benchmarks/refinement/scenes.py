@@ -144,6 +144,27 @@ def rendered(number: int, size: int, names: Sequence[str] = _MAPS) -> dict[str, 
     dict of str to ndarray
         The maps by name, and `light`, the kind of light.
     """
+    kind, scene = posed(number, size)
+    _, truth = exposed(scene, render_truth(scene, RenderOptions(_SAMPLES, number)), _LEVEL)
+    return {name: getattr(truth, name) for name in names} | {"light": np.array(kind)}
+
+
+def posed(number: int, size: int) -> tuple[str, Scene]:
+    """Make a scene, not yet exposed.
+
+    Parameters
+    ----------
+    number : int
+        Number of the scene.
+    size : int
+        Side of the image in pixels.
+
+    Returns
+    -------
+    light : str
+        Its kind.
+    scene : Scene
+    """
     rng = np.random.default_rng([SEED, number])
     kind = SMOOTH if number % 3 == 2 else LAMPS[(number // 3 + number % 3) % len(LAMPS)]
     mesh = centred(make_shape(_SHAPES[number % len(_SHAPES)], rng))
@@ -151,10 +172,7 @@ def rendered(number: int, size: int, names: Sequence[str] = _MAPS) -> dict[str, 
     strength = float(rng.uniform(0.6, 1.5))
     albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)
     material = Material(albedo, "ggx", alpha, strength)
-    scene = Scene(mesh, material, _lights(kind, rng), camera_around(mesh, size, 0.88))
-    options = RenderOptions(_SAMPLES, number)
-    _, truth = exposed(scene, render_truth(scene, options), _LEVEL)
-    return {name: getattr(truth, name) for name in names} | {"light": np.array(kind)}
+    return kind, Scene(mesh, material, _lights(kind, rng), camera_around(mesh, size, 0.88))
 
 
 def _lights(kind: str, rng: np.random.Generator) -> tuple[Light, ...]:
