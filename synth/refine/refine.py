@@ -109,41 +109,85 @@ def refine(
     options, monitor = options or RefineOptions(), monitor or Monitor()
     _check(d)
     transport = light_transport(d, options.rows, monitor.part(0, 0.3))
+    fit = fit_environment(d, transport, options, monitor.part(0.3, 1.0))
+    kept = fit.after < fit.before and fit.explains_better
+    note = {
+        "kept": kept,
+        "before": fit.before,
+        "after": fit.after,
+        "variant": str(load_mitsuba().variant()),
+        **options.__dict__,
+    }
+    result = _refined(d, transport, fit.radiance, fit.shading) if kept else d
+    return Refinement(_noted(result, note), kept, fit.before, fit.after)
+
+
+@dataclass(frozen=True)
+class EnvironmentFit:
+    """An environment that was fitted to a result.
+
+    Attributes
+    ----------
+    radiance : (J, 3) ndarray
+    shading : (N, 3) ndarray
+        Of the mask's pixels.
+    before, after : float
+        The objective.
+    explains_better : bool
+        Whether it explains held-out pixels better than the start.
+    """
+
+    radiance: np.ndarray
+    shading: np.ndarray
+    before: float
+    after: float
+    explains_better: bool
+
+
+def fit_environment(
+    d: Decomposition, transport: Transport, options: RefineOptions, monitor: Monitor
+) -> EnvironmentFit:
+    """Fit an environment to the reflectance terms, better than the start or not.
+
+    Parameters
+    ----------
+    d : Decomposition
+    transport : Transport
+        Of its shape.
+    options : RefineOptions
+    monitor : Monitor
+
+    Returns
+    -------
+    EnvironmentFit
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
     start = environment_from_shading(d.illumination, options.rows, viewer=d.viewer)
     field = LightField.around(np.maximum(start, 1e-4 * start.mean()))
     terms, gain = terms_of(d)
     blocks = held_out_blocks(d.shading.mean(axis=2), BLOCK, EVERY, options.seed, d.mask)
     weight = (d.mask & ~pixels_of(blocks, BLOCK, d.mask.shape)).astype(float)
-    objective = LightObjective(
-        terms,
-        field,
-        gain * transport.shadowed,
-        weight,
-        options.strictness,
-    )
-    x = np.zeros(field.size)
-    before = terms.cost(gain * d.shading[d.mask].astype(float), weight)[0]
-    fitting = monitor.part(0.3, 1.0)
+    objective = LightObjective(terms, field, gain * transport.shadowed, weight, options.strictness)
+    x, old = np.zeros(field.size), gain * d.shading[d.mask].astype(float)
 
     def each(step: int, loss: float) -> None:
-        fitting.report("fitting the light", min(step / options.steps, 1.0), f"loss {loss:.3f}")
+        monitor.report("fitting the light", min(step / options.steps, 1.0), f"loss {loss:.3f}")
 
     limits = LbfgsOptions(iterations=options.steps, loss_tolerance=1e-4)
     after = minimise(objective, x, limits, NumpyAlgebra(), each).loss
     radiance = field.radiance(x)
     shading = shading_of(transport.shadowed, radiance)
-    kept = after < before and explains_better(
-        terms, blocks, gain * d.shading[d.mask].astype(float), gain * shading
+    return EnvironmentFit(
+        radiance,
+        shading,
+        terms.cost(old, weight)[0],
+        after,
+        explains_better(terms, blocks, old, gain * shading),
     )
-    result = _refined(d, transport, radiance, shading) if kept else d
-    note = {
-        "kept": kept,
-        "before": before,
-        "after": after,
-        "variant": str(load_mitsuba().variant()),
-        **options.__dict__,
-    }
-    return Refinement(_noted(result, note), kept, before, after)
 
 
 def _check(d: Decomposition) -> None:
