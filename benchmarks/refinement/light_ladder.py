@@ -155,13 +155,13 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
 
 
 def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:
-    """Return the environment whose shading is nearest to a given one, relative to it.
+    """Return the environment whose shading is nearest to a given one, in the mean square.
 
     Parameters
     ----------
     transport : Transport
     shading : (N, 3) ndarray
-        Its colour is the same everywhere; pixels darker than a tenth of the mean count as these.
+        Its colour is the same everywhere.
 
     Returns
     -------
@@ -169,8 +169,7 @@ def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:
     """
     grey = shading.mean(axis=1)
     some = np.random.default_rng(0).choice(len(grey), min(_POINTS, len(grey)), replace=False)
-    weight = 1 / np.maximum(grey[some], 0.1 * grey.mean())
-    found, _ = nnls(transport.shadowed[some] * weight[:, None].astype(float), grey[some] * weight)
+    found, _ = nnls(transport.shadowed[some].astype(float), grey[some])
     return np.asarray(found[:, None] * shading.mean(axis=0) / grey.mean())
 
 

@@ -103,11 +103,17 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         lines.append(
             f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
             if done.kept
-            else "the light was not refined: held-out pixels are not explained better"
+            else f"the light was not refined: {_reason(done.before, done.after)}"
         )
     cover = read_cover(options.result / MASK)
     save(result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))
     return [*lines, *hints(options, f"wrote {options.output}")]
+
+
+def _reason(before: float, after: float) -> str:
+    if after < before:
+        return "held-out pixels are not explained better"
+    return f"the objective did not fall ({before:.3f} -> {after:.3f})"
 
 
 def _require_same(photo: Path, start: Decomposition) -> None:

@@ -25,6 +25,7 @@ from synth.refine.light_field import LightField
 from synth.refine.light_objective import LightObjective
 from synth.refine.refine import RefineOptions, refine
 from synth.refine.transport import light_transport
+from synth.scene.variant import load_mitsuba
 
 LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
@@ -140,12 +141,16 @@ def test_a_refined_result_keeps_every_identity_and_its_files(tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_the_start_is_kept_if_it_is_optimal() -> None:
+def test_the_start_is_kept_if_it_is_optimal(tmp_path: Path) -> None:
     start = dome(96)
     done = refine(start)
     assert not done.kept
     assert np.array_equal(done.result.shading, start.shading)
     assert done.result.visibility is None
+    save(start, tmp_path / "start")
+    line = command([str(tmp_path / "start"), "--light", "-o", str(tmp_path / "out")])[1]
+    reason = "the objective did not fall" if done.after >= done.before else "held-out pixels"
+    assert line.startswith(f"the light was not refined: {reason}")
 
 
 @pytest.mark.slow
@@ -158,6 +163,8 @@ def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
     for file in ("maps.exr", "environment.exr", "decomposition.json"):
         first, second = ((tmp_path / name / file).read_bytes() for name in ("first", "second"))
         assert first == second
+    note = load(tmp_path / "first").provenance.settings["refine"]
+    assert note["variant"] == load_mitsuba().variant()
     kept = [(tmp_path / name / "mask.png").read_bytes() for name in ("start", "first")]
     assert kept[0] == kept[1], "the soft mask goes along"
 
