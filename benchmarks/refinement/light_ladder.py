@@ -5,6 +5,7 @@ after the other.
 
 Steps, each with the light of a distant environment and with cast shadows:
 
+- "shape": the true shape under the new lights alone; what else is the start's;
 - "truth": the true shape and light;
 - "a": the true shape, and the environment that is nearest to the true shading (so that the albedo
   is known), by non-negative least squares;
@@ -141,7 +142,9 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
     of_truth, of_start = (light_transport(d, _ROWS) for d in (true_shape, start))
     recovered = environment_from_shading(start.illumination, _ROWS, viewer=start.viewer)
     old = start.shading[mask].astype(float)
-    yield Step("start", old, recovered.reshape(-1, 3).astype(float), of_start, diffuse)
+    first = Step("start", old, recovered.reshape(-1, 3).astype(float), of_start, diffuse)
+    yield first
+    yield replace(first, name="shape", transport=of_truth)
     yield _under("truth", light, of_truth, true_diffuse)
     yield _under("a", nearest(of_truth, wanted), of_truth, true_diffuse)
     fit = fit_environment(true_shape, of_truth, options, Monitor())
