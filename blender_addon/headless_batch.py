@@ -98,18 +98,18 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
         register()
     report = BatchReport()
     with ExitStack() as stack:
-        results = options.results or Path(
+        parent: Path = options.results or Path(
             stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-"))
         )
         previous: Path | None = None
         for number, plan in enumerate(plans):
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
             try:
-                folder, problem = _make_result(plan.source, results, options, part.part(0.0, 0.9))
+                folder, problem = _make_result(plan.source, parent, options, part.part(0.0, 0.9))
                 if problem:
                     report.failures.append(f"{plan.source.path}: {problem}")
-                results = object_folders(folder) if _each(plan.source, options) else [folder]
-                lines = [note for result in results for note in result_notes(result)]
+                folders = object_folders(folder) if _each(plan.source, options) else [folder]
+                lines = [note for result in folders for note in result_notes(result)]
                 if notes := join_notes(dict.fromkeys(lines)):
                     report.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
@@ -155,7 +155,7 @@ def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
 
 
 def _make_result(
-    source: Source, results: Path, options: argparse.Namespace, monitor: Monitor
+    source: Source, parent: Path, options: argparse.Namespace, monitor: Monitor
 ) -> tuple[Path, str]:
     """The result folder of a source, with arrays; and what failed if some of its objects did."""
     environment = worker_environment(read_preferences(bpy.context))
@@ -163,7 +163,7 @@ def _make_result(
         if not (source.path / ARRAYS).is_file():
             _wait(start_arrays(source.path.resolve(), environment), monitor)
         return source.path, ""
-    folder = results / source.name
+    folder = parent / source.name
     job = DecomposeJob(
         photo=source.path.resolve(),
         output=folder.resolve(),

@@ -147,6 +147,16 @@ def test_a_folder_becomes_one_file_with_several_scenes_or_several_files(
 
 
 @pytest.mark.slow
+def test_several_photos_become_several_scenes_of_one_file(tmp_path: Path) -> None:
+    for name in ("cup", "jug"):
+        photo(tmp_path / "photos", f"{name}.png")
+    words = ["--model", "retinex", "--max-size", "32", "--threads", "1"]
+    done = run(tmp_path / "photos", "-o", tmp_path / "all.blend", *words)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert set(scenes_of(tmp_path / "all.blend")[0]) == {"cup", "jug"}
+
+
+@pytest.mark.slow
 def test_each_thing_of_a_photo_becomes_an_object_of_one_scene(tmp_path: Path) -> None:
     single = cv2.imread(str(photo(tmp_path)), cv2.IMREAD_UNCHANGED)
     cv2.imwrite(str(tmp_path / "pair.png"), np.concatenate([single, single], axis=1))
