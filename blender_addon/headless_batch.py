@@ -20,7 +20,7 @@ from isc_core.result_files.object_folders import object_folders
 from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
-from .operators.messages import join_notes
+from .operators.messages import join_notes, reason_line
 from .operators.request import DecomposeRequest, MethodSettings
 from .operators.result import build_as_undo_step
 from .operators.run_steps import result_notes
@@ -307,7 +307,7 @@ def save_blend(path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(path.resolve()), check_existing=False)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"cannot write {path}: {_last_line(error)}") from error
+        raise InputError(f"cannot write {path}: {reason_line(error)}") from error
 
 
 def render_scene(scene: Any, path: Path) -> None:
@@ -334,10 +334,6 @@ def render_scene(scene: Any, path: Path) -> None:
         try:
             bpy.ops.render.render(write_still=True, scene=scene.name)
         except RuntimeError as error:
-            raise InputError(f"cannot render {path}: {_last_line(error)}") from error
+            raise InputError(f"cannot render {path}: {reason_line(error)}") from error
         if not partial.is_file():
             raise InputError(f"cannot render {path}: Blender wrote no file")
-
-
-def _last_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[-1]

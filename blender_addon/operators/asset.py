@@ -11,8 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..scene.asset import save_asset
-from ..scene.build import find_built
-from .edit import poll_built
+from .edit import poll_built, require_built
 from .messages import sentence
 
 
@@ -102,10 +101,8 @@ class ISC_OT_save_asset(bpy.types.Operator):
         set of str
             {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
         """
-        built = find_built(context.object)
         try:
-            if built is None:
-                raise InputError("no object created by ISC is active: select one")
+            built = require_built(context)
             path = save_asset(built, library_folder(context, self.library), self.overwrite)
         except InputError as error:
             self.report({"ERROR"}, sentence(str(error)))

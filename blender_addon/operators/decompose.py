@@ -13,13 +13,12 @@ from isc_core.result_files.object_folders import object_folders
 
 from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS
-from ..scene.build import find_built
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .edit import poll_built
+from .edit import poll_built, require_built
 from .messages import sentence
-from .modal import WorkerOperator
+from .modal import WorkerOperator, poll_photo
 from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
 from .result import build_in_steps
 from .run_steps import ResultPlace, decompose_steps
@@ -270,10 +269,7 @@ class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        if context.scene.isc.image is None:
-            cls.poll_message_set("Open a photo first")
-            return False
-        return poll_idle(cls)
+        return poll_photo(cls, context)
 
     def request(self, context: Any) -> DecomposeRequest:
         """Return the request of the scene's panel; see `_Overwrites`.
@@ -302,14 +298,14 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
     bl_idname = "isc.redo"
     bl_label = "Update Object"
     bl_description = (
-        "Create the active object again from its photo, at another size, color edits are kept"
+        "Create the active object again from its photo, at another size; color edits are kept"
     )
     bl_options = {"REGISTER"}
 
     max_size: IntProperty(
         name="Size",
         description=(
-            "Longer side of the object in its textures, in pixels, 0 keeps the photo's resolution"
+            "Longer side of the object in its maps, in pixels (0 keeps the photo's resolution)"
         ),
         default=512,
         min=0,
@@ -350,9 +346,7 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
         InputError
             If no ISC object is active, the active one is a copy, or it stores no request.
         """
-        built = find_built(context.object)
-        if built is None:
-            raise InputError("no object created by ISC is active: select one")
+        built = require_built(context)
         if is_copy(built.object):
             original = find_original(built.object)
             instead = "press Create Object" if original is None else f"select {original.name}"

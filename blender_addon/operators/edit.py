@@ -56,6 +56,30 @@ def poll_built(operator: Any, context: Any) -> bool:
     return not reason
 
 
+def require_built(context: Any) -> BuiltObject:
+    """Return what belongs to the active object.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    BuiltObject
+        As `find_built`.
+
+    Raises
+    ------
+    InputError
+        If no object, camera or sun of ISC is active.
+    """
+    built = find_built(context.object)
+    if built is None:
+        raise InputError("no object created by ISC is active: select one")
+    return built
+
+
 class EditOperator:
     """Mixin for operators that change what ISC has built, as one undo step.
 
@@ -94,10 +118,8 @@ class EditOperator:
         set of str
             {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
         """
-        built = find_built(context.object)
         try:
-            if built is None:
-                raise InputError("no object created by ISC is active: select one")
+            built = require_built(context)
             self.edit(built)
             settle_edits(find_material(built.object) or built.material)
         except InputError as error:
@@ -121,7 +143,47 @@ class EditOperator:
         raise NotImplementedError
 
 
-class ISC_OT_recolour(EditOperator, bpy.types.Operator):
+class _NodeEdit(EditOperator):
+    """Mixin for operators that change values of the node "ISC Dichromatic".
+
+    From a button or a menu they start with the current values, which `read` takes over.
+    """
+
+    def invoke(self, context: Any, event: Any) -> set[str]:
+        """Start with the object's current values.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            The event that started the operator; not used.
+
+        Returns
+        -------
+        set of str
+            As `execute`.
+        """
+        del event
+        try:
+            self.read(dichromatic_inputs(require_built(context)))
+        except InputError as error:
+            self.report({"ERROR"}, sentence(str(error)))
+            return {"CANCELLED"}
+        return self.execute(context)
+
+    def read(self, inputs: Any) -> None:
+        """Take over the current values.
+
+        Parameters
+        ----------
+        inputs : bpy.types.NodeInputs
+            Of the node "ISC Dichromatic".
+        """
+        raise NotImplementedError
+
+
+class ISC_OT_recolour(_NodeEdit, bpy.types.Operator):
     """Change the reflectance under the same light and highlights."""
 
     bl_idname = "isc.recolour"
@@ -150,32 +212,17 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
         max=2,
     )
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start with the object's current values.
+    def read(self, inputs: Any) -> None:
+        """Take over the current values; see `_NodeEdit`.
 
         Parameters
         ----------
-        context : bpy.types.Context
-            Blender's context.
-        event : bpy.types.Event
-            The event that started the operator; not used.
-
-        Returns
-        -------
-        set of str
-            Blender's result, as `execute`.
-
-        Raises
-        ------
-        InputError
-            As `dichromatic_inputs`.
+        inputs : bpy.types.NodeInputs
+            Of the node "ISC Dichromatic".
         """
-        del event
-        inputs = dichromatic_inputs(find_built(context.object))
         self.hue, self.saturation, self.value = (
             inputs[name].default_value for name in ("Hue", "Saturation", "Value")
         )
-        return self.execute(context)
 
     def edit(self, built: BuiltObject) -> None:
         """Set the node's inputs; see `EditOperator`.
@@ -196,7 +243,7 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
         inputs["Value"].default_value = self.value
 
 
-class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
+class ISC_OT_dichromatic(_NodeEdit, bpy.types.Operator):
     """Change the proportion of diffuse and specular light."""
 
     bl_idname = "isc.dichromatic"
@@ -218,31 +265,16 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
         max=10,
     )
 
-    def invoke(self, context: Any, event: Any) -> set[str]:
-        """Start with the object's current values.
+    def read(self, inputs: Any) -> None:
+        """Take over the current values; see `_NodeEdit`.
 
         Parameters
         ----------
-        context : bpy.types.Context
-            Blender's context.
-        event : bpy.types.Event
-            The event that started the operator; not used.
-
-        Returns
-        -------
-        set of str
-            Blender's result, as `execute`.
-
-        Raises
-        ------
-        InputError
-            As `dichromatic_inputs`.
+        inputs : bpy.types.NodeInputs
+            Of the node "ISC Dichromatic".
         """
-        del event
-        inputs = dichromatic_inputs(find_built(context.object))
         self.diffuse_gain = inputs["Diffuse Gain"].default_value
         self.specular_gain = inputs["Specular Gain"].default_value
-        return self.execute(context)
 
     def edit(self, built: BuiltObject) -> None:
         """Set the nodes' inputs, of the lobe and of the photo's highlights; see `EditOperator`.
@@ -385,12 +417,12 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
         set_sun_mix(built.world, self.ambient * ambient, True)
 
 
-def dichromatic_inputs(built: BuiltObject | None) -> Any:
+def dichromatic_inputs(built: BuiltObject) -> Any:
     """Return the inputs of the material's node "ISC Dichromatic".
 
     Parameters
     ----------
-    built : BuiltObject or None
+    built : BuiltObject
         The object.
 
     Returns
@@ -403,7 +435,8 @@ def dichromatic_inputs(built: BuiltObject | None) -> Any:
     InputError
         If the node is missing, or the material is linked from another file.
     """
-    if built is None or (node := dichromatic_node(built.material)) is None:
+    node = dichromatic_node(built.material)
+    if node is None:
         raise InputError("the material has no node group ISC Dichromatic: create the object again")
     if built.material.library is not None:
         raise InputError(

@@ -21,13 +21,13 @@ from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
 from ..datablocks.provenance import KEY, ROLE
-from ..scene.build import BuiltObject, find_built
+from ..scene.build import BuiltObject
 from ..scene.copies import is_copy
 from ..scene.material_edits import specular_level, surface_node
-from .edit import poll_built
+from .edit import poll_built, require_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
-from .messages import sentence
+from .messages import reason_line, sentence
 from .texture_set import PLASTIC, linked_image, write_texture_set
 
 _EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
@@ -155,10 +155,10 @@ class _FolderOperator:
         set of str
             {"FINISHED"}, or {"CANCELLED"} after an error has been reported.
         """
-        built = find_built(context.object)
         try:
-            if built is None or not self.directory:
-                raise InputError("nothing to export: select an object created by ISC, and a folder")
+            built = require_built(context)
+            if not self.directory:
+                raise InputError("no folder is selected: choose one")
             names = self.write(built, Path(bpy.path.abspath(self.directory)))
         except InputError as error:
             self.report({"ERROR"}, sentence(str(error)))
@@ -372,10 +372,9 @@ def _export_mesh(built: BuiltObject, folder: Path, file_format: str) -> str:
                 stack.enter_context(_level_as_blenders(built.material))
             export(path)
         except (RuntimeError, AttributeError) as error:
-            reason = str(error).strip().splitlines()[-1]
             raise InputError(
-                f"Blender's exporter for {file_format} failed ({reason}): enable it in the "
-                "preferences, or choose another format"
+                f"Blender's exporter for {file_format} failed ({reason_line(error)}): enable it in "
+                "the preferences, or choose another format"
             ) from error
         finally:
             for obj in selected:

@@ -18,8 +18,8 @@ from isc_core.errors import InputError
 from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
-from .messages import sentence
-from .modal import WorkerOperator
+from .messages import error_line, sentence
+from .modal import WorkerOperator, poll_photo
 from .photo_canvas import DragOnPhoto, PhotoCanvas
 from .request import find_by_full_name, require_photo
 from .run_steps import mask_steps
@@ -28,7 +28,6 @@ from .worker_run import (
     RunOutput,
     RunSteps,
     WorkerRun,
-    poll_idle,
     remove_folder,
     require_no_active_run,
 )
@@ -58,7 +57,7 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        return can_cut(cls, context)
+        return poll_photo(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run; see `WorkerOperator`.
@@ -348,7 +347,7 @@ def load_mask(path: Path, image: str, scene: str) -> None:
     try:
         bpy.ops.isc.take_mask("EXEC_DEFAULT", True, filepath=str(path), image=image, scene=scene)
     except RuntimeError as error:
-        raise InputError(str(error).strip().removeprefix("Error: ")) from error
+        raise InputError(error_line(error)) from error
 
 
 def _replace_mask(mask: Any, name: str) -> None:
@@ -365,23 +364,3 @@ def _replace_mask(mask: Any, name: str) -> None:
         old.user_remap(mask)
         bpy.data.images.remove(old)
     mask.name, mask[_MASK_OF] = name, name
-
-
-def can_cut(operator: Any, context: Any) -> bool:
-    """Return whether there is a photo and no run is active; else say why not in the tooltip.
-
-    Parameters
-    ----------
-    operator : type
-        Of the button.
-    context : bpy.types.Context
-        Blender's context.
-
-    Returns
-    -------
-    bool
-    """
-    if context.scene.isc.image is None:
-        operator.poll_message_set("Select a photo first")
-        return False
-    return poll_idle(operator)

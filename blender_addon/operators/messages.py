@@ -116,6 +116,22 @@ def error_line(error: RuntimeError) -> str:
     return str(error).strip().splitlines()[0].removeprefix("Error: ")
 
 
+def reason_line(error: Exception) -> str:
+    """Return why an exporter, a renderer or the system failed, from a text of several lines.
+
+    Parameters
+    ----------
+    error : Exception
+        As Blender or Python raises it.
+
+    Returns
+    -------
+    str
+        Its last line: those before say where.
+    """
+    return str(error).strip().splitlines()[-1]
+
+
 def is_about_mask(message: str) -> bool:
     """Return whether a message advises to make a mask.
 

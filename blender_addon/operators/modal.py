@@ -15,11 +15,38 @@ import bpy
 from isc_core.errors import InputError
 
 from .messages import progress_message, sentence, stage_text, write_report
-from .worker_run import RunState, WorkerRun, active_run, begin_run, cancel_active_run
+from .worker_run import (
+    RunState,
+    WorkerRun,
+    active_run,
+    begin_run,
+    cancel_active_run,
+    poll_idle,
+)
 
 POLL_SECONDS = 0.1
 _IMPORT_PAUSE = 0.01  # between two parts of an import
 _PANEL_EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}
+
+
+def poll_photo(operator: Any, context: Any) -> bool:
+    """Return whether there is a photo and no run is active; else the tooltip says what to do.
+
+    Parameters
+    ----------
+    operator : type
+        Of the button.
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    bool
+    """
+    if context.scene.isc.image is None:
+        operator.poll_message_set("Open a photo first")
+        return False
+    return poll_idle(operator)
 
 
 class WorkerOperator:

@@ -20,7 +20,7 @@ import gpu  # type: ignore[import-not-found]
 import numpy as np
 from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
-from .worker_run import active_run
+from .worker_run import poll_idle
 
 _FILL = 0.9  # of the region, along the side that limits the photo
 _EDITORS = {"VIEW_3D": "SpaceView3D", "IMAGE_EDITOR": "SpaceImageEditor"}
@@ -259,12 +259,12 @@ class PhotoOperator:
         Returns
         -------
         bool
-            Where False for want of a photo, the tooltip gives the reason.
+            Where False, the tooltip gives the reason.
         """
         if shown_photo(context) is None:
             cls.poll_message_set("Open a photo first")
             return False
-        return active_run() is None
+        return poll_idle(cls)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Wait for the mouse.

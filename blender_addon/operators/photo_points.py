@@ -8,8 +8,8 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
-from .mask import can_cut, mask_run
-from .modal import WorkerOperator
+from .mask import mask_run
+from .modal import WorkerOperator, poll_photo
 from .photo_canvas import ClickOnPhoto, StrokeOnPhoto, add_point
 from .request import parse_points, require_photo
 from .run_steps import auto_mask_steps
@@ -37,7 +37,7 @@ class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        return can_cut(cls, context)
+        return poll_photo(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run; see `WorkerOperator`.

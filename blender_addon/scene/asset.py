@@ -16,7 +16,7 @@ from mathutils import Matrix, Vector
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
 
-from ..datablocks.provenance import require_local
+from ..datablocks.provenance import KEY, require_local
 from .build import BuiltObject
 from .collection import use_standard_view
 
@@ -55,7 +55,7 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
         If the library cannot be written to, or a part is linked from another file; nothing is
         marked then.
     """
-    require_local(built.object["isc_key"])
+    require_local(built.object[KEY])
     path = _free_file(library, built.object.name, overwrite)
     try:
         for file in (path, library / _CATALOGS):

@@ -1,7 +1,7 @@
 """Where a new object stands in a scene that is not its own: on the 3D cursor, and seen.
 
-The middle of its base is at the cursor. If another object would swallow it, such as the cube of a
-new file, it stands beside that one instead, to the right, with a gap of a tenth of its own width.
+The middle of its base is at the cursor. If another object would enclose it, as the cube of a new
+file would, it stands beside that one instead, to the right, with a gap of a tenth of its own width.
 
 Equation: a surface surrounds a place p by its winding number, with the solid angle of a triangle
 whose corners are a, b and c from p,
@@ -9,7 +9,7 @@ whose corners are a, b and c from p,
     w = sum 2 atan2(a.(b x c), |a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|) / (4 pi).
 
 It is 1 in a closed body, 0 outside, and -1 in a room, whose normals point inward; above one half,
-the object swallows the place. Of a large mesh, 1000 faces from all over it stand for the others:
+the object encloses the place. Of a large mesh, 1000 faces from all over it stand for the others:
 Blender's ray casts first sort all of them, a tenth of a second for 100,000, while the window waits.
 
 Citations: A. Van Oosterom, J. Strackee 1983, doi:10.1109/TBME.1983.325207 (solid angle);
@@ -63,10 +63,10 @@ def free_place(
     place = scene.cursor.location - Vector((middle.x, middle.y, low.z))
     others = [other for other in scene.objects if other != obj and _is_solid(other)]
     for _ in range(_MOST_STEPS):
-        swallower = next((other for other in others if _swallows(other, place + middle)), None)
-        if swallower is None:
+        enclosing = next((other for other in others if _encloses(other, place + middle)), None)
+        if enclosing is None:
             break
-        place.x = _world_bounds(swallower)[1].x - low.x + _GAP * (high.x - low.x)
+        place.x = _world_bounds(enclosing)[1].x - low.x + _GAP * (high.x - low.x)
     return place
 
 
@@ -84,7 +84,7 @@ def _is_solid(obj: bpy.types.Object) -> bool:
     return obj.type == "MESH" and obj.display_type in _SOLID and bool(obj.visible_get())
 
 
-def _swallows(obj: bpy.types.Object, place: Vector) -> bool:
+def _encloses(obj: bpy.types.Object, place: Vector) -> bool:
     """Whether a place is inside the closed surface of an object."""
     low, high = _world_bounds(obj)
     if not all(a <= x <= b for a, x, b in zip(low, place, high, strict=True)):

@@ -11,8 +11,9 @@ from isc_core.errors import InputError
 from .process import WorkerProcess
 
 Box = tuple[int, int, int, int]
-Points = Sequence[tuple[int, int]]
 """Left, top, width and height in pixels, from the photo's upper left corner."""
+Points = Sequence[tuple[int, int]]
+"""Columns and rows in pixels, from the same corner."""
 CERTAIN = "4"
 """The core's default of `--highlight-odds`; its module is not among those that Blender loads."""
 
@@ -186,37 +187,6 @@ def start_decompose(job: DecomposeJob, environment: WorkerEnvironment) -> Worker
     words += [f"--highlight={x},{y}" for x, y in job.highlights]
     words += [f"--not-highlight={x},{y}" for x, y in job.not_highlights]
     return _start(words, job.output, environment, job.threads)
-
-
-def start_edit(
-    result: Path, arguments: Sequence[str], environment: WorkerEnvironment
-) -> WorkerProcess:
-    """Start editing a result.
-
-    Parameters
-    ----------
-    result : Path
-        Result folder.
-    arguments : sequence of str
-        Arguments of `isc edit` after RESULT: the action, its options, and `-o DIR` with an
-        absolute path.
-    environment : WorkerEnvironment
-        What the worker runs with.
-
-    Returns
-    -------
-    WorkerProcess
-        The running worker.
-
-    Raises
-    ------
-    InputError
-        If the worker cannot be started, or `-o` is missing.
-    """
-    if "-o" not in arguments[:-1]:
-        raise InputError("the edit has no output folder: add -o DIR")
-    output = Path(arguments[arguments.index("-o") + 1])
-    return _start(["edit", _absolute(result), *arguments], output, environment)
 
 
 def start_arrays(result: Path, environment: WorkerEnvironment) -> WorkerProcess:

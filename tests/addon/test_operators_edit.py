@@ -4,6 +4,7 @@ import colorsys
 import json
 import struct
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -104,6 +105,7 @@ def test_an_edit_starts_with_the_current_values(addon: Any, built: BuiltObject) 
         (ISC_OT_dichromatic, {"diffuse_gain": 0.3, "specular_gain": 0.4}),
     ):
         operator = SimpleNamespace(execute=lambda context: {"FINISHED"})
+        operator.read = partial(kind.read, operator)
         assert kind.invoke(operator, addon.context, None) == {"FINISHED"}
         assert {name: getattr(operator, name) for name in wanted} == pytest.approx(wanted)
 
@@ -168,6 +170,10 @@ def test_other_objects_are_not_edited(addon: Any, built: BuiltObject) -> None:
 def test_a_missing_node_group_is_reported(addon: Any, built: BuiltObject) -> None:
     built.material.node_tree.nodes.clear()
     assert "has no node group ISC Dichromatic" in error_of(addon.ops.isc.recolour, hue=0.1)
+    reported = []
+    button = SimpleNamespace(read=None, report=lambda kind, message: reported.append(message))
+    assert ISC_OT_recolour.invoke(button, addon.context, None) == {"CANCELLED"}
+    assert "has no node group ISC Dichromatic" in reported[0]
 
 
 def test_an_object_without_a_request_is_not_decomposed_again(
@@ -463,7 +469,7 @@ def test_a_folder_that_cannot_be_written_is_reported(
     assert "choose another folder" in error_of(
         addon.ops.isc.export, directory=str(tmp_path / "file")
     )
-    assert "and a folder" in error_of(addon.ops.isc.export, directory="")
+    assert "No folder is selected" in error_of(addon.ops.isc.export, directory="")
 
 
 def test_linked_objects_are_not_changed(addon: Any, built: BuiltObject, tmp_path: Path) -> None:

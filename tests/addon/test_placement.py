@@ -55,7 +55,7 @@ def test_an_object_that_is_updated_stays_where_it_is(result: ResultArrays) -> No
 
 
 @pytest.mark.parametrize("size", [0.1, 1.0])
-def test_the_cube_of_a_new_file_does_not_swallow_it(result: ResultArrays, size: float) -> None:
+def test_the_cube_of_a_new_file_does_not_enclose_it(result: ResultArrays, size: float) -> None:
     blocks = [cube(2, (0, 0, 0)), cube(2, (2, 0, 0))]
     obj = build_object(result, BuildOptions(own_scene=False, size_metres=size)).object
     low, high = bounds(obj)

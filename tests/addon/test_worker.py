@@ -22,7 +22,6 @@ from blender_addon.worker.commands import (
     start_arrays,
     start_box_mask,
     start_decompose,
-    start_edit,
 )
 from blender_addon.worker.process import WorkerProcess, WorkerUpdate
 from isc_core.errors import InputError
@@ -173,9 +172,7 @@ def test_invalid_input_is_reported_in_one_line(tmp_path: Path, real: WorkerEnvir
 
 
 @pytest.mark.slow
-def test_masks_edits_and_arrays_are_made_by_workers_too(
-    tmp_path: Path, real: WorkerEnvironment
-) -> None:
+def test_masks_and_arrays_are_made_by_workers_too(tmp_path: Path, real: WorkerEnvironment) -> None:
     d = ball((60, 70), 24.0, (30, 35))
     np.save(
         tmp_path / "photo.npy",
@@ -192,14 +189,6 @@ def test_masks_edits_and_arrays_are_made_by_workers_too(
     assert final.state == "failed" and "-4" in final.message
     assert ended(start_arrays(tmp_path / "result", real)).state == "done"
     assert (tmp_path / "result" / "arrays.npz").is_file()
-    final = ended(
-        start_edit(
-            tmp_path / "result", ["recolour", "--hue", "120", "-o", str(tmp_path / "edit")], real
-        )
-    )
-    assert final.state == "done" and (tmp_path / "edit" / "edit.json").is_file(), final
-    with pytest.raises(InputError, match="-o DIR"):
-        start_edit(tmp_path / "result", ["recolour", "-o"], real)
 
 
 @pytest.mark.slow
