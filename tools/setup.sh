@@ -18,8 +18,10 @@ suitable() {
     "$1" -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))' >/dev/null 2>&1
 }
 
+candidates=${PYTHON:-python3.11 python3.13 python3.12 python3.14 python3}
+
 find_python() {
-    for name in ${PYTHON:-python3.11 python3.13 python3.12 python3.14 python3}; do
+    for name in $candidates; do
         if suitable "$name"; then
             printf '%s\n' "$name"
             return
@@ -48,7 +50,7 @@ if [ -z "$python" ]; then
     system_packages "the virtual environment" python3 python3-venv || true
     python=$(find_python)
 fi
-[ -n "$python" ] || fail "no Python 3.11 to 3.14 on PATH: install one (Debian: apt-get install python3 python3-venv; macOS: brew install python@3.11)"
+[ -n "$python" ] || fail "no Python 3.11 to 3.14 (looked for: $candidates): install one (Debian: apt-get install python3 python3-venv; macOS: brew install python@3.11)"
 
 if ! { [ -x "$venv/bin/python" ] && suitable "$venv/bin/python" && "$venv/bin/python" -m pip --version >/dev/null 2>&1; }; then
     if ! "$python" -c 'import ensurepip, venv' >/dev/null 2>&1; then

@@ -13,7 +13,7 @@ from .export import ISC_OT_export, ISC_OT_export_textures
 from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
 from .modal import ISC_OT_cancel
 from .notes import ISC_OT_show_notes
-from .photo_import import HANDLERS, ISC_OT_photo_as_object
+from .photo_import import ISC_FH_photo, ISC_OT_photo_as_object
 from .photo_points import (
     ISC_OT_auto_mask,
     ISC_OT_clear_highlights,
@@ -30,7 +30,7 @@ from .result import (
 
 CLASSES = (
     ISC_OT_photo_as_object,
-    *HANDLERS,
+    ISC_FH_photo,
     ISC_OT_decompose,
     ISC_OT_redo,
     ISC_OT_confirm_overwrite,

@@ -177,7 +177,7 @@ def _show_panel(area: Any) -> None:
             sidebar.active_panel_category = _CATEGORY
 
 
-class _PhotoHandler:
+class ISC_FH_photo(bpy.types.FileHandler):
     """Drag and drop of a photo onto the 3D view or the image editor."""
 
     bl_idname = "ISC_FH_photo"
@@ -199,10 +199,3 @@ class _PhotoHandler:
         bool
         """
         return context.area is not None and context.area.type in _EDITORS
-
-
-HANDLERS: tuple[Any, ...] = (
-    (type("ISC_FH_photo", (_PhotoHandler, bpy.types.FileHandler), {}),)
-    if hasattr(bpy.types, "FileHandler")
-    else ()
-)

@@ -93,8 +93,8 @@ def test_own_shadows_are_on_in_shared_scenes_only(result: ResultArrays) -> None:
     from blender_addon.scene import BuildOptions, build_object
 
     def shadows(**options: Any) -> tuple[bool, bool]:
-        thing = build_object(result, BuildOptions(**options)).object
-        return thing.visible_shadow, thing.visible_diffuse
+        obj = build_object(result, BuildOptions(**options)).object
+        return obj.visible_shadow, obj.visible_diffuse
 
     assert shadows(name="alone") == (False, False)
     assert shadows(name="alone", own_shadows=True) == (True, True)

@@ -44,10 +44,10 @@ def built(enabled: Any, bump_folder: Path) -> BuiltObject:
     """The bump, glossy."""
     result = replace(read_result(bump_folder), specular_level=0.8, roughness=0.35)
     options = BuildOptions(own_scene=False, set_camera=True, set_world=True, set_resolution=True)
-    thing = build_object(result, options)
-    thing.object.select_set(True)
-    bpy.context.view_layer.objects.active = thing.object
-    return thing
+    made = build_object(result, options)
+    made.object.select_set(True)
+    bpy.context.view_layer.objects.active = made.object
+    return made
 
 
 def edit(built: BuiltObject, values: dict[str, float]) -> None:
@@ -135,13 +135,13 @@ def test_the_layer_of_highlights_is_not_exported_as_light(
     import trimesh
 
     result = replace(read_result(bump_folder), specular_level=0.8, roughness=0.35)
-    thing = build_object(result, BuildOptions(own_scene=False, specular_from="image"))
-    thing.object.select_set(True)
+    made = build_object(result, BuildOptions(own_scene=False, specular_from="image"))
+    made.object.select_set(True)
     standard_export("GLB", tmp_path / "a.glb")
     material = trimesh.load(tmp_path / "a.glb", force="mesh").visual.material
     assert material.emissiveTexture is None and material.emissiveFactor is None
-    assert material.baseColorTexture.size == thing.object["isc_map_mask"].size[:]
-    assert shows_highlights(thing.material), "it is there again"
+    assert material.baseColorTexture.size == made.object["isc_map_mask"].size[:]
+    assert shows_highlights(made.material), "it is there again"
 
 
 def test_usd_has_a_preview_surface_with_the_index_of_the_level(

@@ -157,7 +157,7 @@ def test_several_photos_become_several_scenes_of_one_file(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
-def test_each_thing_of_a_photo_becomes_an_object_of_one_scene(tmp_path: Path) -> None:
+def test_each_object_of_a_photo_is_built_in_one_scene(tmp_path: Path) -> None:
     single = cv2.imread(str(photo(tmp_path)), cv2.IMREAD_UNCHANGED)
     cv2.imwrite(str(tmp_path / "pair.png"), np.concatenate([single, single], axis=1))
     blend, kept = tmp_path / "pair.blend", tmp_path / "kept"
@@ -171,7 +171,7 @@ def test_each_thing_of_a_photo_becomes_an_object_of_one_scene(tmp_path: Path) ->
 
 
 @pytest.mark.slow
-def test_a_thing_that_fails_leaves_the_others(tmp_path: Path) -> None:
+def test_an_object_that_fails_leaves_the_others(tmp_path: Path) -> None:
     single = cv2.imread(str(photo(tmp_path)), cv2.IMREAD_UNCHANGED)
     cv2.imwrite(str(tmp_path / "pair.png"), np.concatenate([single, single], axis=1))
     blend, kept = tmp_path / "pair.blend", tmp_path / "kept"

@@ -242,9 +242,9 @@ def test_a_request_is_kept_as_text() -> None:
 def test_objects_of_two_photos_have_different_keys(addon: Any, tmp_path: Path) -> None:
     first, second = photo("cup.png"), photo("cup.jpg")
     assert requests.object_key(first) == requests.object_key(second) == "cup"
-    thing = addon.data.objects.new("cup", None)
-    thing["isc_key"] = "cup"
-    requests.store_request(thing, requests.DecomposeRequest(image="cup.png"))
+    obj = addon.data.objects.new("cup", None)
+    obj["isc_key"] = "cup"
+    requests.store_request(obj, requests.DecomposeRequest(image="cup.png"))
     assert (requests.object_key(first), requests.object_key(second)) == ("cup", "cup.jpg")
 
 
@@ -435,7 +435,7 @@ def test_shadows_are_as_chosen(
     settings = addon.context.scene.isc
     settings.shadows, settings.own_scene = chosen, own
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
-    made = next(thing for thing in addon.data.objects if thing.type == "MESH" and find_built(thing))
+    made = next(obj for obj in addon.data.objects if obj.type == "MESH" and find_built(obj))
     assert (made.visible_shadow, made.visible_diffuse) == (cast, cast)
 
 
@@ -536,10 +536,10 @@ def test_photos_of_one_name_become_separate_objects(
     assert second != first and (first["isc_key"], second["isc_key"]) == ("bump", "bump-2")
     assert first["isc_photo_sha256"] == 64 * "0" and second["isc_photo_sha256"] == 64 * "1"
     assert json.loads(second["isc_request"])["build"]["name"] == "bump-2"
-    for folder, thing in ((bump_folder, first), (tmp_path / "bump", second)):
+    for folder, obj in ((bump_folder, first), (tmp_path / "bump", second)):
         addon.ops.isc.import_result(directory=str(folder))
-        assert addon.context.object == thing
-    assert sum(thing.type == "MESH" for thing in addon.data.objects) == 2
+        assert addon.context.object == obj
+    assert sum(obj.type == "MESH" for obj in addon.data.objects) == 2
 
 
 @pytest.mark.slow
@@ -552,12 +552,12 @@ def test_the_request_is_appended_with_the_object(addon: Any, tmp_path: Path) -> 
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon.ops.wm.append(directory=str(tmp_path / "a.blend" / "Object"), filename="cup")
-    thing = addon.data.objects["cup"]
-    again = requests.stored_request(thing, addon.context.scene, 99)
+    obj = addon.data.objects["cup"]
+    again = requests.stored_request(obj, addon.context.scene, 99)
     assert again.image == "cup.png" and again.method.max_size == 99
     addon.data.images.remove(addon.data.images["cup.png"])
     with pytest.raises(InputError, match="the photo of cup is not in this file"):
-        requests.stored_request(thing, addon.context.scene, 99)
+        requests.stored_request(obj, addon.context.scene, 99)
 
 
 # --- messages -------------------------------------------------------------------------------------

@@ -55,7 +55,7 @@ def error_of(operator: Any, **options: Any) -> str:
 
 
 def sun_of(built: BuiltObject) -> Any:
-    return next((thing for thing in built.collection.objects if thing.type == "LIGHT"), None)
+    return next((obj for obj in built.collection.objects if obj.type == "LIGHT"), None)
 
 
 def test_recolouring_changes_the_reflectance_only(
@@ -197,8 +197,8 @@ def copied(bpy: Any, built: BuiltObject, linked: bool = False) -> BuiltObject:
     return copy
 
 
-def hue(thing: Any) -> float:
-    found = find_built(thing)
+def hue(obj: Any) -> float:
+    found = find_built(obj)
     assert found is not None
     return sockets(found)["Hue"]
 
@@ -216,11 +216,10 @@ def test_an_edit_changes_the_active_object_alone(
     assert addon.ops.isc.recolour(hue=0.2, saturation=0.5, value=1.0) == {"FINISHED"}
     assert addon.ops.isc.dichromatic(diffuse_gain=0.5, specular_gain=2.0) == {"FINISHED"}
     values = {
-        thing: sockets(find_built(thing))["Diffuse Gain"]
-        for thing in (built.object, copy.object, other)
+        obj: sockets(find_built(obj))["Diffuse Gain"] for obj in (built.object, copy.object, other)
     }  # type: ignore[arg-type]
-    assert values == {thing: 0.5 if thing == edited else 1.0 for thing in values}
-    assert hue(edited) == pytest.approx(0.2) and sum(hue(thing) == 0.5 for thing in values) == 2
+    assert values == {obj: 0.5 if obj == edited else 1.0 for obj in values}
+    assert hue(edited) == pytest.approx(0.2) and sum(hue(obj) == 0.5 for obj in values) == 2
     shown = render(built.scene, tmp_path)["Diffuse Color"]
     assert np.isfinite(shown).all()
 
@@ -394,9 +393,9 @@ def test_the_fitted_level_is_exported_unless_highlights_are_off(
 ) -> None:
     """The photo's highlights, that Blender may show instead, do not fit into the file."""
     fitted = replace(read_result(bump_folder), specular_level=0.6, roughness=0.35)
-    thing = build_object(fitted, BuildOptions(specular_from=source, own_scene=False))
-    set_specular_gain(thing.material, 0.5)
-    export_object(thing, tmp_path)
+    made = build_object(fitted, BuildOptions(specular_from=source, own_scene=False))
+    set_specular_gain(made.material, 0.5)
+    export_object(made, tmp_path)
     path = tmp_path / "bump" / "bump.glb"
     assert exported_level(path) == pytest.approx(level, rel=0.01)
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
@@ -480,6 +479,6 @@ def test_linked_objects_are_not_changed(addon: Any, built: BuiltObject, tmp_path
         filename="bump",
         instance_collections=False,
     )
-    thing = next(thing for thing in addon.data.objects if thing.type == "MESH")
-    addon.context.view_layer.objects.active = thing
-    assert thing.library is not None and not addon.ops.isc.recolour.poll()
+    obj = next(obj for obj in addon.data.objects if obj.type == "MESH")
+    addon.context.view_layer.objects.active = obj
+    assert obj.library is not None and not addon.ops.isc.recolour.poll()

@@ -35,8 +35,8 @@ def test_the_bar_moves_while_a_stage_reports_nothing() -> None:
     assert shares[-1] < pace.at(WorkerUpdate("x", 0.736), 64.0).fraction, "never past the stage"
 
 
-def test_of_several_things_the_share_is_that_of_all() -> None:
-    """A worker that takes 20 s to find three things and for each of them."""
+def test_of_several_objects_the_share_is_that_of_all() -> None:
+    """A worker that takes 20 s to find three objects and for each of them."""
     pace, told = Pace(512, several=True), []
     for step in range(161):
         elapsed, left = step / 2, 80 - step / 2

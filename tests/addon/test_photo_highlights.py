@@ -26,17 +26,17 @@ def built(addon: Any, bump_folder: Path) -> BuiltObject:
     """The bump, glossy, with the photo's highlights and one lamp, seen once."""
     result = replace(read_result(bump_folder), specular_level=0.8, roughness=0.3)
     options = BuildOptions(own_scene=False, set_camera=True, set_world=True, specular_from="image")
-    thing = build_object(result, options)
+    made = build_object(result, options)
     lamp = addon.data.objects.new("lamp", addon.data.lights.new("lamp", "SUN"))
-    thing.scene.collection.objects.link(lamp)
-    addon.context.view_layer.objects.active = thing.object
+    made.scene.collection.objects.link(lamp)
+    addon.context.view_layer.objects.active = made.object
     addon.context.view_layer.update()
-    assert shows_highlights(thing.material)
-    return thing
+    assert shows_highlights(made.material)
+    return made
 
 
-def turn(thing: Any) -> None:
-    thing.rotation_euler = (0.1, 0.2, 0.3)
+def turn(obj: Any) -> None:
+    obj.rotation_euler = (0.1, 0.2, 0.3)
 
 
 def world_value(built: BuiltObject) -> None:
@@ -112,10 +112,10 @@ def test_with_the_layer_the_object_looks_as_in_the_photo(
 ) -> None:
     """The specular layer takes nothing from the diffuse light while it is replaced."""
     result = replace(read_result(bump_folder), specular_level=1.0, roughness=0.3)
-    thing = build_object(result, BuildOptions(specular_from="image"))
-    addon.context.window.scene = thing.scene
+    made = build_object(result, BuildOptions(specular_from="image"))
+    addon.context.window.scene = made.scene
     addon.context.view_layer.update()
-    seen = render(thing.scene, tmp_path, samples=16)["Combined"]
+    seen = render(made.scene, tmp_path, samples=16)["Combined"]
     mask = result.mask & (seen[..., 3] > 0.99)
     assert psnr(result.image, seen[..., :3], mask, peak=float(result.image.max())) > 30
 

@@ -96,9 +96,8 @@ def test_the_entries_are_in_blenders_menus(addon: Any) -> None:
         assert draw in getattr(bpy.types, name)._dyn_ui_initialize(), name
 
 
-@pytest.mark.skipif(not hasattr(bpy.types, "FileHandler"), reason="Blender without file handlers")
 def test_photos_can_be_dropped_on_two_editors(addon: Any) -> None:
-    (handler,) = photo_import.HANDLERS
+    handler = photo_import.ISC_FH_photo
     assert handler.bl_import_operator == "isc.photo_as_object"
     assert {".jpg", ".png", ".tif"} <= set(handler.bl_file_extensions.split(";"))
     areas = {kind: SimpleNamespace(type=kind) for kind in ("VIEW_3D", "IMAGE_EDITOR", "OUTLINER")}

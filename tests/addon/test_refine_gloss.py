@@ -58,8 +58,8 @@ def test_a_refined_object_has_lamps_and_the_message_says_so(addon: Any) -> None:
     assert line.startswith("gloss refined: 1 lamp explains ") and line in shown.notes
     lamps = [o for o in bpy.data.objects if o.get("isc_role") == "lamp1"]
     assert len(lamps) == 1 and lamps[0].type == "LIGHT"
-    thing = addon.context.object
-    assert stored_request(thing, addon.context.scene, 64).method.refine, "Update refines again"
+    obj = addon.context.object
+    assert stored_request(obj, addon.context.scene, 64).method.refine, "Update refines again"
 
 
 @pytest.mark.slow

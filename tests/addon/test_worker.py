@@ -389,8 +389,8 @@ def test_an_unresponsive_worker_is_killed_with_its_children(
 def test_a_killed_worker_leaves_the_things_that_are_done(tmp_path: Path, fake_core: Maker) -> None:
     out = tmp_path / "out"
     (out / ".3.11111111.partial").mkdir(parents=True)
-    things = "(output / '1').mkdir()\n(output / '.2.0a1b2c3d.partial').mkdir()\n"
-    worker = start_decompose(job(tmp_path / "a.png", out), fake_core(things + STUBBORN))
+    folders = "(output / '1').mkdir()\n(output / '.2.0a1b2c3d.partial').mkdir()\n"
+    worker = start_decompose(job(tmp_path / "a.png", out), fake_core(folders + STUBBORN))
     at_stage(worker, "asleep")
     assert (out / ".2.0a1b2c3d.partial").is_dir()
     worker.kill()

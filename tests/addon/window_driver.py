@@ -1,7 +1,7 @@
 """Drives a real Blender window with a real mouse and keyboard, as an artist would: a photo, its
 automatic mask if it has no transparency, the object at the cursor, orbit, a lamp, another color,
 glTF and USD, a second run, undo, redo, an asset, a box, Esc, the Cancel button, save, load during a
-run, a new scene, two things of one photo, a furry ball, a refined result with its lamps, the asset
+run, a new scene, two objects of one photo, a furry ball, a refined result with its lamps, the asset
 dragged into another file.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
@@ -206,7 +206,7 @@ def new_scene(acc: Any, measured: list[str]) -> Iterator[float]:
 
 
 def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
-    """The two things of a photo: progress of both, Esc in the second one, one undo step."""
+    """The two objects of a photo: progress of both, Esc in the second one, one undo step."""
     settings, before = bpy.context.scene.isc, objects()
     settings.image, settings.mask_source = picture(acc, "pair", balls()), "ALPHA"
     settings.each, settings.max_size, settings.own_scene = True, 256, False
@@ -216,10 +216,10 @@ def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
 
     def told_of_second() -> bool:
         told.append((shown().fraction, shown().stage))
-        return at_thing(2)
+        return at_object(2)
 
     yield from until(told_of_second, 300)
-    acc.check(at_thing(2), f"the second thing is at work: {shown().stage}, {shown().message}")
+    acc.check(at_object(2), f"the second object is at work: {shown().stage}, {shown().message}")
     yield acc.shot("16_each_running")
     shares, stages = [share for share, _ in told], [stage for _, stage in told]
     acc.check(shares == sorted(shares) and shares[-1] < 0.9, f"progress of both: {shares[-1]:.2f}")
@@ -230,7 +230,7 @@ def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
     began = time.monotonic()
     yield from begin(acc)
     yield from ended(400)
-    note(acc, measured, f"two things in {time.monotonic() - began:.0f} s")
+    note(acc, measured, f"two objects in {time.monotonic() - began:.0f} s")
     acc.check(set(objects()) == {*before, "pair 1", "pair 2"}, f"both: {shown().message}")
     yield _SHADERS
     yield acc.shot("16_each_created")
@@ -241,8 +241,8 @@ def each_object(acc: Any, measured: list[str]) -> Iterator[float]:
     bpy.context.scene.isc.each = False
 
 
-def at_thing(number: int) -> bool:
-    """Whether this thing of two is at work, or the run is over."""
+def at_object(number: int) -> bool:
+    """Whether this object of two is at work, or the run is over."""
     return f"{number}/2: " in shown().stage or shown().state != "running"
 
 
@@ -279,7 +279,7 @@ def refined(acc: Any, measured: list[str]) -> Iterator[float]:
         bpy.ops.isc.read_result("INVOKE_DEFAULT", directory=str(folder))
     yield from ended(100)
     note(acc, measured, "refined")
-    roles = {str(thing.get("isc_role", "")): thing for thing in bpy.context.scene.objects}
+    roles = {str(obj.get("isc_role", "")): obj for obj in bpy.context.scene.objects}
     lamps = sorted(role for role in roles if role.startswith("lamp"))
     acc.check(bpy.context.scene.name != home, f"a refined result: {shown().message}")
     acc.check(lamps, f"its lamps are there: {lamps}")
@@ -563,7 +563,7 @@ def shown() -> Any:
 
 def objects() -> list[str]:
     """Meshes that the extension made."""
-    return [thing.name for thing in bpy.data.objects if thing.type == "MESH" and "isc_key" in thing]
+    return [obj.name for obj in bpy.data.objects if obj.type == "MESH" and "isc_key" in obj]
 
 
 def material_inputs() -> Any:

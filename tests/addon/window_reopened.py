@@ -67,8 +67,8 @@ def usd_file(acc: Any, folder: str) -> str:
     path = f"{folder}/photo.usdc"
     if not os.path.isfile(path):
         path = f"{acc.out}/photo.usdc"
-        for thing in bpy.context.scene.objects:
-            thing.select_set(thing.type == "MESH" and "isc_key" in thing)
+        for obj in bpy.context.scene.objects:
+            obj.select_set(obj.type == "MESH" and "isc_key" in obj)
         bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True)
     return path
 
@@ -76,44 +76,42 @@ def usd_file(acc: Any, folder: str) -> str:
 def only_object(name: str) -> Any:
     """The object of the photo; everything else is removed but its parents."""
     found = next(
-        thing for thing in bpy.data.objects if thing.type == "MESH" and thing.name.startswith(name)
+        obj for obj in bpy.data.objects if obj.type == "MESH" and obj.name.startswith(name)
     )
     kept = {found}
     while found.parent is not None and found.parent not in kept:
         kept.add(found.parent)
-    for thing in list(bpy.data.objects):
-        if thing.type == "MESH" and thing not in kept:
-            bpy.data.objects.remove(thing)
+    for obj in list(bpy.data.objects):
+        if obj.type == "MESH" and obj not in kept:
+            bpy.data.objects.remove(obj)
     return found
 
 
 def light_and_camera() -> dict[str, list[str]]:
     """Names of the lamp, of the photo's camera, which becomes the scene's, and of the world."""
     scene = bpy.context.scene
-    camera = next(
-        thing for thing in bpy.data.objects if thing.type == "CAMERA" and "isc_key" in thing
-    )
-    for thing in list(bpy.data.objects):
-        if thing.type == "LIGHT" and "isc_key" in thing:  # of a collection that is not shown
-            bpy.data.objects.remove(thing)
+    camera = next(obj for obj in bpy.data.objects if obj.type == "CAMERA" and "isc_key" in obj)
+    for obj in list(bpy.data.objects):
+        if obj.type == "LIGHT" and "isc_key" in obj:  # of a collection that is not shown
+            bpy.data.objects.remove(obj)
     scene.camera = camera
     return {"objects": [camera.name, "Light"], "worlds": [scene.world.name]}
 
 
 def light(path: str, names: dict[str, list[str]], moved: Matrix) -> None:
     """Replace lamps, camera and world by those of a file, at the place of the object."""
-    for thing in list(bpy.data.objects):
-        if thing.type in {"LIGHT", "CAMERA"}:
-            bpy.data.objects.remove(thing)
+    for obj in list(bpy.data.objects):
+        if obj.type in {"LIGHT", "CAMERA"}:
+            bpy.data.objects.remove(obj)
     with bpy.data.libraries.load(path) as (_, wanted):
         for kind, values in names.items():
             setattr(wanted, kind, list(values))
     scene = bpy.context.scene
-    for thing in wanted.objects:
-        scene.collection.objects.link(thing)
+    for obj in wanted.objects:
+        scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
-    for thing in wanted.objects:
-        thing.matrix_world = moved @ thing.matrix_world
+    for obj in wanted.objects:
+        obj.matrix_world = moved @ obj.matrix_world
     scene.camera, scene.world = wanted.objects[0], wanted.worlds[0]
 
 
@@ -121,8 +119,8 @@ def append(path: str) -> None:
     """Append the asset of a library file."""
     with bpy.data.libraries.load(path, assets_only=True) as (stored, wanted):
         wanted.objects = stored.objects
-    for thing in wanted.objects:
-        bpy.context.scene.collection.objects.link(thing)
+    for obj in wanted.objects:
+        bpy.context.scene.collection.objects.link(obj)
     bpy.context.view_layer.update()
 
 
