@@ -23,12 +23,12 @@ from isc_core.result_files.exports.targets import TARGETS
 from ..datablocks.provenance import KEY, ROLE
 from ..scene.build import BuiltObject
 from ..scene.copies import is_copy
-from ..scene.material_edits import specular_level, surface_node
+from ..scene.material_edits import PLASTIC, specular_level, surface_node
 from .edit import poll_built, require_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
 from .messages import reason_line, sentence
-from .texture_set import PLASTIC, linked_image, write_texture_set
+from .texture_set import linked_image, write_texture_set
 
 _EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
 # Names of the recovered maps in files, where they differ from the role.

@@ -28,7 +28,7 @@ from ..datablocks.nodes import node_tree
 from ..datablocks.provenance import SPECULAR_LEVEL
 from ..scene.color_bake import linear_colors, recolour_reflectance
 from ..scene.material import shows_highlights
-from ..scene.material_edits import dichromatic_node
+from ..scene.material_edits import PLASTIC, dichromatic_node
 
 
 @contextmanager
@@ -117,9 +117,8 @@ def _fill(plain: bpy.types.Material, obj: bpy.types.Object, material: bpy.types.
     if level == 0 and shows_highlights(material):
         level = float(obj.get(SPECULAR_LEVEL, 0.0))
     surface.inputs["Roughness"].default_value = given["Roughness"].default_value
-    # Blender's level of plastic is 0.5.
     surface.inputs["Specular IOR Level"].default_value = (
-        0.5 * level * given["Specular Gain"].default_value
+        PLASTIC * level * given["Specular Gain"].default_value
     )
     gain = given["Value"].default_value * given["Diffuse Gain"].default_value
     edits = (given["Hue"].default_value, given["Saturation"].default_value, gain)

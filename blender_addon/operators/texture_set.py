@@ -32,10 +32,8 @@ from isc_core.shading.ambient_occlusion import ambient_occlusion
 
 from ..scene.build import BuiltObject
 from ..scene.color_bake import linear_colors
-from ..scene.material_edits import LEVEL_FACTOR, specular_level, surface_node
+from ..scene.material_edits import LEVEL_FACTOR, PLASTIC, specular_level, surface_node
 
-FORMATS = ("PNG8", "PNG16", "EXR")
-PLASTIC = 0.5  # of a specular texture, as in Blender and Unreal
 _FLAT = (0.5, 0.5, 1.0)
 _REACH = 2  # pixels of the maps beyond the object that the cubic kernel reads
 
@@ -56,7 +54,7 @@ def write_texture_set(
     target : str
         One of `TARGETS`.
     file_format : str
-        One of `FORMATS`.
+        "PNG8", "PNG16" or "EXR".
     green_down : bool
         Whether normal maps are DirectX's.
 

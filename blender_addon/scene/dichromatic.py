@@ -64,7 +64,6 @@ class GroupInput:
     factor: bool = False
 
 
-WHITE, BLACK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0)
 _SPECULAR_GAIN = GroupInput(
     "Specular Gain",
     "Float",
@@ -140,7 +139,7 @@ HIGHLIGHTS_INPUTS = (
     GroupInput(
         "Specular Image",
         "Color",
-        BLACK,
+        (0.0, 0.0, 0.0, 1.0),
         0,
         1,
         "Linear highlights of the photo, visible to the camera and without emitting light",

@@ -47,8 +47,8 @@ SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
     "Edited Base Color",
     "Specular Level",
 )
-# Blender's own level of the BSDF: .5 is plastic. With exactly .5, its glTF exporter leaves out the
-# index of refraction.
+PLASTIC = 0.5  # Blender's own level of the BSDF for plastic
+# With exactly .5, its glTF exporter leaves out the index of refraction.
 OWN_LEVEL = 0.499
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
 _UNDER_LAYER, _PLAIN = "isc_base_color", "isc_plain_base_color"
@@ -380,7 +380,7 @@ def specular_level(surface: Any) -> float:
     index = surface.inputs["IOR"].default_value
     level = surface.inputs["Specular IOR Level"]
     factor = OWN_LEVEL if level.is_linked else level.default_value
-    return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / 0.5)
+    return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / PLASTIC)
 
 
 def _choose_base_color(material: bpy.types.Material, group: bpy.types.Node) -> None:

@@ -27,13 +27,13 @@ def why_unused(settings: Any, name: str) -> str:
     if name in (*_MARKS, "highlight_odds") and settings.model != "joint":
         return "Requires the Joint model"
     if name in _MARKS and settings.each:
-        return "No marks with Each Object"
+        return "Not used with Each Object"
     if name in ("separator", "refine") and settings.model not in SEPARATING_MODELS:
         return f"{model} keeps highlights"
     if name in ("illumination", "light_color") and settings.model not in SIRFS_MODELS:
-        return f"{model} finds no light"
+        return f"{model} recovers no light"
     if name in ("back", "triangles") and settings.displacement:
         return "Not used with Displacement"
     if name == "samples" and not settings.own_scene:
-        return "Samples are for a new scene"
+        return "Used with New Scene only"
     return ""

@@ -89,20 +89,20 @@ def test_the_models_of_the_panels_are_those_of_the_core() -> None:
             {"back", "triangles"},
             ["Not used with Displacement"],
         ),
-        (panels._Method, {}, {"samples"}, ["Samples are for a new scene"]),
+        (panels._Method, {}, {"samples"}, ["Used with New Scene only"]),
         (panels._Method, {"own_scene": True}, set(), []),
         (
             panels._Method,
             {"own_scene": True, "model": "naive", "light_color": "custom"},
             {"separator", "illumination", "light_color"},
-            ["Naive keeps highlights", "Naive finds no light"],
+            ["Naive keeps highlights", "Naive recovers no light"],
         ),
         (panels._Highlights, {}, set(), []),
         (
             panels._Highlights,
             {"each": True},
             {"isc.mark_highlight", "Mark as Print", "highlights", "not_highlights"},
-            ["No marks with Each Object"],
+            ["Not used with Each Object"],
         ),
         (
             panels._Highlights,
