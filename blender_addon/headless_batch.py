@@ -25,7 +25,7 @@ from .operators.request import DecomposeRequest, MethodSettings
 from .operators.result import build_as_undo_step
 from .operators.run_steps import result_notes
 from .operators.worker_run import RunOutput
-from .registration import register
+from .registration import register, unregister
 from .scene.copies import OBJECT
 from .scene.preparation import BuildOptions
 from .settings.preferences import read_preferences, worker_environment
@@ -94,10 +94,12 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
         If the user cancels.
     """
     plans = plan_outputs(options)
-    if not hasattr(bpy.types.Scene, "isc"):  # not an enabled extension
-        register()
     report = BatchReport()
     with ExitStack() as stack:
+        if not hasattr(bpy.types.Scene, "isc"):  # not an enabled extension
+            register()
+            # The bpy module of Blender 4.5 does not exit while classes are registered.
+            stack.callback(unregister)
         parent: Path = options.results or Path(
             stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-"))
         )

@@ -21,6 +21,8 @@ from isc_core.errors import InputError
 
 from .image_source import ImageSource, suffix_of
 
+_ROUNDED = 1e-4  # Blender 4.5 converts linear Rec.709 to itself with an error of 5e-6
+
 T = TypeVar("T")
 Steps = Generator[None, None, T]
 """Each `next()` is one step of a few milliseconds."""
@@ -161,7 +163,7 @@ def to_linear(source: ImageSource, pixels: np.ndarray) -> np.ndarray:
     alpha = pixels[..., 3:4] if source.channels == 4 else np.ones_like(pixels[..., :1])
     if source.associated:
         color = color / np.where(alpha > 0, alpha, 1)
-    if source.to_rec709 is not None and not np.allclose(source.to_rec709, np.eye(3), atol=1e-6):
+    if source.to_rec709 is not None and not np.allclose(source.to_rec709, np.eye(3), atol=_ROUNDED):
         color = color @ source.to_rec709.T
     if source.uses_alpha and (alpha < 1).any():
         return np.concatenate([color, alpha], axis=2).astype(np.float32)

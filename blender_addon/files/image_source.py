@@ -204,11 +204,9 @@ def working_to_rec709() -> np.ndarray:
     Returns
     -------
     (3, 3) ndarray of float32
-        The identity before Blender 5.0, whose working space is linear Rec.709.
+        Up to rounding the identity where the working space is linear Rec.709, Blender's default.
     """
     axes = [mathutils.Color(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-    if not hasattr(axes[0], "from_scene_linear_to_rec709_linear"):  # before 5.0
-        return np.eye(3, dtype=np.float32)
     return np.array(
         [tuple(axis.from_scene_linear_to_rec709_linear()) for axis in axes], np.float32
     ).T

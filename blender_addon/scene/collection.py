@@ -93,6 +93,8 @@ def ensure_optional_part(
         collection.children.link(part)
     if is_new or shown:
         for layer in scene.view_layers:
+            if layer.layer_collection is None:  # of a scene that was never shown (Blender 5.3)
+                layer.update()
             entry = find_layer_collection(layer.layer_collection, part)
             if entry is not None:
                 entry.exclude = not shown

@@ -497,9 +497,14 @@ def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
         ),
     )
     code = f"""
-import sys, time
+import atexit, sys, time
 from pathlib import Path
 import bpy, blender_addon
+from blender_addon import registration
+def unregister_classes():
+    for kind in reversed(registration._CLASSES):
+        bpy.utils.unregister_class(kind)
+atexit.register(unregister_classes)  # last: Blender 4.5 does not exit while classes are registered
 blender_addon.register()
 from blender_addon.operators.worker_run import RunOutput, WorkerRun, begin_run
 from blender_addon.operators.request import MethodSettings
