@@ -98,7 +98,7 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
     with ExitStack() as stack:
         if not hasattr(bpy.types.Scene, "isc"):  # not an enabled extension
             register()
-            # The bpy module of Blender 4.5 does not exit while classes are registered.
+            # The bpy module of Blender 4.5 does not exit while an add-on is registered.
             stack.callback(unregister)
         parent: Path = options.results or Path(
             stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-"))

@@ -500,11 +500,10 @@ def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
 import atexit, sys, time
 from pathlib import Path
 import bpy, blender_addon
-from blender_addon import registration
-def unregister_classes():
-    for kind in reversed(registration._CLASSES):
-        bpy.utils.unregister_class(kind)
-atexit.register(unregister_classes)  # last: Blender 4.5 does not exit while classes are registered
+def unregister_last():
+    print("ended:", run.ended, flush=True)
+    blender_addon.unregister()  # Blender 4.5 does not exit while an add-on is registered
+atexit.register(unregister_last)
 blender_addon.register()
 from blender_addon.operators.worker_run import RunOutput, WorkerRun, begin_run
 from blender_addon.operators.request import MethodSettings
@@ -533,5 +532,6 @@ while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exist
         timeout=120,
     )
     assert done.returncode == 0, done.stderr
+    assert "ended: True" in done.stdout
     assert not (tmp_path / "run").exists()
     until(lambda: has_ended((tmp_path / "pid").read_text()), 60.0)
