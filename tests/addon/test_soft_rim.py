@@ -138,13 +138,30 @@ def test_exporters_keep_the_opacity(
         bpy.ops.export_scene.gltf(filepath=path, use_selection=True)
     else:
         bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True)
+        texture = bpy.data.images.load(str(usd_opacity(tmp_path / "a.usdc")))
+        texture.colorspace_settings.name = "Non-Color"
+        np.testing.assert_allclose(grey(texture, 0), wanted, atol=0.003)
+        return
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    (bpy.ops.import_scene.gltf if kind == "gltf" else bpy.ops.wm.usd_import)(filepath=path)
+    bpy.ops.import_scene.gltf(filepath=path)
     (material,) = bpy.data.materials
     socket = opacity(material)
     assert material.surface_render_method == "BLENDED" and socket.is_linked
-    found = grey(image_behind(socket), 3 if kind == "gltf" else 0)
-    np.testing.assert_allclose(found, wanted, atol=0.003)
+    np.testing.assert_allclose(grey(image_behind(socket), 3), wanted, atol=0.003)
+
+
+def usd_opacity(path: Path) -> Path:
+    """The texture of the opacity in a USD file; Blender 5.3's own importer does not link it."""
+    pytest.importorskip("pxr", reason="needs the extra `usd`")
+    from pxr import Usd, UsdShade
+
+    stage = Usd.Stage.Open(str(path))
+    shaders = [UsdShade.Shader(prim) for prim in stage.Traverse()]
+    (surface,) = (one for one in shaders if one and one.GetShaderId() == "UsdPreviewSurface")
+    source, output, _ = surface.GetInput("opacity").GetConnectedSource()
+    assert output == "r"
+    texture = UsdShade.Shader(source.GetPrim()).GetInput("file").Get()
+    return path.parent / str(texture.path)
 
 
 @pytest.mark.slow
