@@ -151,7 +151,7 @@ def test_exporters_keep_the_opacity(
 
 
 def usd_opacity(path: Path) -> Path:
-    """The texture of the opacity in a USD file; the importers of Blender 5.1 and 5.3 do not."""
+    """The texture of the opacity in a USD file; Blender 5.1 and 5.3 do not import it."""
     pytest.importorskip("pxr", reason="needs the extra `usd`")
     from pxr import Usd, UsdShade
 
