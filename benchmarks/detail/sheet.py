@@ -8,6 +8,7 @@ crop lies where the true fine normals are strongest.
 """
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +25,38 @@ from ..decomposition.prediction_sheets import coloured, toned
 from .measure import fine_normals
 from .sets import PHOTO, Truth, read_truth
 
+QUALITY = 85  # of JPEG
 _SIDE, _GAP = 200, 4
+
+
+def side_by_side(pictures: Sequence[np.ndarray]) -> np.ndarray:
+    """Put pictures beside each other, with white gaps.
+
+    Parameters
+    ----------
+    pictures : sequence of (H, W, 3) uint8 ndarray
+
+    Returns
+    -------
+    (H, ..., 3) uint8 ndarray
+    """
+    gap = np.full((len(pictures[0]), _GAP, 3), 255, np.uint8)
+    return np.hstack([part for picture in pictures for part in (picture, gap)][:-1])
+
+
+def stacked(rows: Sequence[np.ndarray]) -> np.ndarray:
+    """Put rows below each other, with white gaps.
+
+    Parameters
+    ----------
+    rows : sequence of (H, W, 3) uint8 ndarray
+
+    Returns
+    -------
+    (..., W, 3) uint8 ndarray
+    """
+    gap = np.full((_GAP, rows[0].shape[1], 3), 255, np.uint8)
+    return np.vstack([part for row in rows for part in (row, gap)][:-1])
 
 
 def row_of(body: Path, side: int) -> np.ndarray:
@@ -52,8 +84,7 @@ def row_of(body: Path, side: int) -> np.ndarray:
     pictures += [coloured(d.normal[crop], mask) for d in (without, with_relief)]
     pictures += [_reflectance(d, crop) for d in (without, with_relief)]
     pictures.append(coloured(truth.normal[crop], mask))
-    gap = np.full((side, _GAP, 3), 255, np.uint8)
-    return np.hstack([part for picture in pictures for part in (picture, gap)][:-1])
+    return side_by_side(pictures)
 
 
 def _reflectance(d: Decomposition, crop: tuple[slice, slice]) -> np.ndarray:
@@ -84,10 +115,8 @@ def main() -> None:
     given = parser.parse_args()
     try:
         rows = [row_of(given.folder / name, given.side) for name in given.bodies]
-        gap = np.full((_GAP, rows[0].shape[1], 3), 255, np.uint8)
-        sheet = np.vstack([part for row in rows for part in (row, gap)][:-1])
         with new_file(given.output) as partial:
-            Image.fromarray(sheet).save(partial, "JPEG", quality=85)
+            Image.fromarray(stacked(rows)).save(partial, "JPEG", quality=QUALITY)
     except InputError as error:
         parser.error(str(error))
 
