@@ -47,6 +47,8 @@ class NetworkOptions(RemovalOptions):
     ----------
     log_odds_margin : float
         Subtracted from the log odds of a highlight; not negative.
+    stands_out, tint : float
+        See `RemovalOptions`.
     """
 
     log_odds_margin: float = 0.0

@@ -29,7 +29,7 @@ def _one_prediction() -> Iterator[None]:
             known[key].cover.setflags(write=False)
         return known[key]
 
-    with mock.patch("isc_core.masking.frames.predict_mask", predict):
+    with mock.patch("isc_core.masking.crops.predict_mask", predict):
         yield
 
 

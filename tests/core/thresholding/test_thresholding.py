@@ -56,7 +56,8 @@ def test_exact_optima_of_nine_images(name: str) -> None:
     for count in (3, 4, 5):
         thresholds, value = OPTIMA[name][2 * (count - 3) : 2 * (count - 2)]
         found = exact(objective, count)
-        assert found.value == pytest.approx(value, abs=1e-3)
+        # rgb2gray has halves in the grey astronaut, which processors round differently
+        assert found.value == pytest.approx(value, abs=1e-2 if name == "astronaut" else 1e-3)
         assert ",".join(map(str, found.thresholds)) == thresholds
 
 
