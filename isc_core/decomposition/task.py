@@ -121,7 +121,8 @@ class DecompositionTask:
     clock : Clock
         Receives the duration of each stage.
     split : Separation or None
-        Layers of `maps` by the separator of the settings, where already computed.
+        Layers of `maps` by the separator of the settings, where already computed; for the joint
+        model by colour alone.
     prediction : ScenePrediction or None
         The scene network's prediction for the working photo, where already computed.
     normal_estimate : NormalEstimate or None

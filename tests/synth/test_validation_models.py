@@ -189,7 +189,9 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     assert energies[0] == pytest.approx(energies[1], rel=1e-6)
 
 
-def test_the_photo_is_separated_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_photo_is_separated_once_and_by_colour_for_the_joint_model(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     calls: list[str] = []
 
     def counted(method: str, *given: Any, **more: Any) -> Separation:
@@ -200,14 +202,13 @@ def test_the_photo_is_separated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layers, "separate", counted)
     stages = (SEPARATION, models_stage(EVERY.models))
     found = measure_scene(facts("s"), sphere(), stages, EVERY, Monitor())
-    assert not found.refused and [method for method in calls if method != "none"] == [
-        EVERY.separator
-    ]
+    separators = [EVERY.separator] * 2
+    assert not found.refused and [method for method in calls if method != "none"] == separators
     calls.clear()
     assert not measure_scene(
         facts("s"), sphere(), stages[1:], EVERY, Monitor()
     ).refused  # without the stage before it, too
-    assert [method for method in calls if method != "none"] == [EVERY.separator]
+    assert [method for method in calls if method != "none"] == separators
 
 
 def test_a_perfect_separation_makes_mdr_the_true_diffuse_layer_s_equal() -> None:

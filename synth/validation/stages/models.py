@@ -79,7 +79,7 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
     Parameters
     ----------
     inputs : StageInputs
-        The photo with its true diffuse layer; `split` is used if known.
+        The photo with its true diffuse layer; `split` is used if known, but for the joint model.
     options : StageOptions
         Models, separator, light prior and threads.
     monitor : Monitor
@@ -108,12 +108,15 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
     usual = Settings(
         "sirfs", options.separator, options.illumination, detail=0, threads=options.threads
     )
-    seen = with_predictions(DecompositionTask(photo, photo, usual, monitor=monitor, split=split))
+    seen = with_predictions(DecompositionTask(photo, photo, usual, monitor=monitor))
 
     def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
         known = SceneConstraints() if start is None else SceneConstraints(start.height, start.light)
         settings = replace(usual, model=model)
-        return solve(replace(seen, working=image, maps=image, settings=settings, known=known))
+        layers = None if model == "joint" else split  # it separates by colour alone
+        return solve(
+            replace(seen, working=image, maps=image, settings=settings, known=known, split=layers)
+        )
 
     answers = {PLAIN: solved("sirfs", photo)}
     for name in (name for name in SEPARATING_MODELS if name in options.models):
