@@ -5,6 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+pytest.importorskip("torch")
+pytest.importorskip("mitsuba")
+
 from benchmarks.detail.photo_sheet import Crop, added, row_of
 from isc_core.errors import InputError
 
