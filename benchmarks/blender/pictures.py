@@ -325,6 +325,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (InputError, OSError) as error:
         print(error, file=sys.stderr)
         return 2
+    options.output.mkdir(parents=True, exist_ok=True)
     for name, picture in made.items():
         picture.save(options.output / f"{name}.jpg", quality=_QUALITY, optimize=True)
     return 0
