@@ -190,6 +190,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     settings.check()
     if options.texture_size is not None and not options.arrays:
         raise InputError("--texture-size applies to the arrays: add --arrays, or leave it out")
+    if options.cache is not None and options.cache.exists() and not options.cache.is_dir():
+        raise InputError(f"--cache {options.cache} is a file: name a folder")
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     marked = bool(marks_of(options))
     if marked and (options.each or len(options.photo) > 1):

@@ -201,6 +201,12 @@ def test_a_file_instead_of_a_folder(tmp_path: Path, capfd: pytest.CaptureFixture
     assert photo.read_bytes() == before
 
 
+def test_a_file_instead_of_a_cache(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    photo, output = ball_photo(tmp_path), tmp_path / "out"
+    text = refused(capfd, "decompose", photo, "--cache", photo, "-o", output)
+    assert "is a file: name a folder" in text and not output.exists()
+
+
 def test_a_foreign_folder(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "letters").mkdir()
     letter = tmp_path / "letters" / "letter.txt"
