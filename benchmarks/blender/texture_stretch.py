@@ -47,12 +47,13 @@ def stretched(body: SolidMesh) -> dict[str, tuple[float, float, float]]:
     texels = body.texture[body.faces]
     edges = np.stack([points[:, 1] - points[:, 0], points[:, 2] - points[:, 0]], -1)
     steps = np.stack([texels[:, 1] - texels[:, 0], texels[:, 2] - texels[:, 0]], -1)
-    areas = np.linalg.norm(np.cross(edges[..., 0], edges[..., 1]), axis=1)
+    normals = np.cross(edges[..., 0], edges[..., 1])
+    areas = np.linalg.norm(normals, axis=1)
     stretch = np.full(len(areas), np.inf)
     spread = np.abs(np.linalg.det(steps)) > 1e-9  # others show a line of the texture
     scales = np.linalg.svd(edges[spread] @ np.linalg.inv(steps[spread]), compute_uv=False)
     stretch[spread] = scales[:, 0] / np.maximum(scales[:, 1], 1e-12)
-    seen = np.cross(edges[..., 0], edges[..., 1])[:, 2] > 0
+    seen = normals[:, 2] > 0
     return {
         name: _summary(stretch[side], areas[side])
         for name, side in (("front", seen), ("back", ~seen))

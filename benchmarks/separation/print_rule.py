@@ -22,7 +22,7 @@ from scipy import ndimage
 from isc_core.decomposition.joint import detect_residual_highlights
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
-from isc_core.separation import separate
+from isc_core.separation import COLOUR_ALONE, separate
 from isc_core.separation.support.highlight_evidence import highlight_evidence
 
 from .print_set import Part, PrintScene, print_scenes
@@ -67,7 +67,7 @@ def regions_of(scene: PrintScene) -> Regions:
     """
     photo, mask, inside = scene.photo, scene.mask, scene.mask[..., None]
     seen = predict_scene(photo, mask)
-    diffuse = separate("isc", photo, mask, scene.clipped, changes={"odds": 0.0}).diffuse
+    diffuse = separate("isc", photo, mask, scene.clipped, changes=COLOUR_ALONE).diffuse
     residual = detect_residual_highlights(photo, diffuse, mask, seen)
     diffuse = diffuse if residual is None else residual.diffuse
     form = seen.log_ratio, seen.ratio_scale

@@ -34,12 +34,11 @@ from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.photo import Photo, PhotoSource, read_photo
 from isc_core.photo.highlight_marks import HighlightMarks
-from isc_core.separation import separate
+from isc_core.separation import COLOUR_ALONE, separate
 
 from .print_set import Part, PrintScene, print_scenes
 
 METHODS = ("isc", "network", "joint")
-COLOUR_ALONE = {"odds": 0.0}  # an option of the method isc
 _RESAMPLED = 2000
 _COLUMNS = 10
 _SHEET_SIDE, _PHOTO_COLUMNS = 200, 7

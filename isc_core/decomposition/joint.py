@@ -192,7 +192,7 @@ def joint(task: DecompositionTask, options: JointOptions | None = None) -> Scene
     """
     options = options or JointOptions(odds=task.settings.highlight_odds)
     monitor, working = task.monitor, task.working
-    split, layers = separated_at_both_scales(task, by_colour=True)
+    split, layers = separated_at_both_scales(task)
     task = replace(task, split=None)
     with task.clock.stage("separation"):
         support = supported_layers(

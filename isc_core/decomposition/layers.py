@@ -8,7 +8,7 @@ import numpy as np
 from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
-from ..separation import BEST, separate
+from ..separation import BEST, COLOUR_ALONE, separate
 from ..shading.spherical_harmonics import (
     light_from_reference,
     light_to_reference,
@@ -58,7 +58,7 @@ def separated(
     Cancelled
         If the monitor cancels.
     """
-    changes = {"odds": 0.0} if by_colour and method == BEST else None
+    changes = COLOUR_ALONE if by_colour and method == BEST else None
     split = separate(
         method, photo.image, photo.mask, photo.clipped, changes=changes, monitor=monitor
     )
@@ -68,17 +68,13 @@ def separated(
     return replace(split, diffuse=diffuse)
 
 
-def separated_at_both_scales(
-    task: DecompositionTask, *, by_colour: bool = False
-) -> tuple[Separation, Separation]:
+def separated_at_both_scales(task: DecompositionTask) -> tuple[Separation, Separation]:
     """Separate the photo at both scales by the separator of the settings.
 
     Parameters
     ----------
     task : DecompositionTask
         The photo and the settings.
-    by_colour : bool, optional
-        As for `separated`.
 
     Returns
     -------
@@ -93,6 +89,7 @@ def separated_at_both_scales(
         If the monitor cancels.
     """
     method, monitor, dtype = task.settings.separator, task.monitor, task.options.layer_dtype
+    by_colour = task.settings.separates_by_colour
     monitor.report(f"separating ({method})", 0.03)
     with task.clock.stage("separation"):
         split = (

@@ -159,9 +159,9 @@ def _separated(task: DecompositionTask) -> Separation:
     """The layers of the maps' photo; progress is reported by the thread that waits."""
     with task.clock.stage("separation"):
         monitor = Monitor(cancelled=task.monitor.cancelled)
-        method, dtype = task.settings.separator, task.options.layer_dtype
-        by_colour = task.settings.model == "joint"
-        return separated(task.maps, method, monitor, dtype, by_colour=by_colour)
+        settings, dtype = task.settings, task.options.layer_dtype
+        by_colour = settings.separates_by_colour
+        return separated(task.maps, settings.separator, monitor, dtype, by_colour=by_colour)
 
 
 def _solver(model: str) -> Callable[[DecompositionTask], SceneEstimate]:

@@ -249,6 +249,11 @@ class Settings:
         return self.light_prior == LightPrior.PREDICTED
 
     @property
+    def separates_by_colour(self) -> bool:
+        """Whether the separator decides by colour alone: this model asks form itself."""
+        return self.model == "joint"
+
+    @property
     def given_light_colour(self) -> tuple[float, float, float] | None:
         """Linear RGB of mean 1 where the light's colour is given as numbers."""
         return _colour_of(self.light_colour)

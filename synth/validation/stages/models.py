@@ -113,7 +113,7 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
     def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
         known = SceneConstraints() if start is None else SceneConstraints(start.height, start.light)
         settings = replace(usual, model=model)
-        layers = None if model == "joint" else split  # it separates by colour alone
+        layers = None if settings.separates_by_colour else split
         return solve(
             replace(seen, working=image, maps=image, settings=settings, known=known, split=layers)
         )

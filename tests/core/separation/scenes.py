@@ -11,7 +11,6 @@ from isc_core.scene.decomposition import Separation
 ALBEDOS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
 RED, WHITE = np.array([0.5, 0.06, 0.05]), np.array([0.8, 0.78, 0.76])
 BALL_SIDE = 96
-COLOUR_ALONE = {"odds": 0.0}  # an option of the method isc
 
 
 Scene = tuple[np.ndarray, np.ndarray, np.ndarray]  # image, true diffuse (H, W, 3), mask (H, W)

@@ -11,12 +11,12 @@ from isc_core.decomposition.settings import Settings
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
 from isc_core.photo.highlight_marks import HighlightMarks
-from isc_core.separation import HIGHLIGHT_ODDS, separate
+from isc_core.separation import COLOUR_ALONE, HIGHLIGHT_ODDS, separate
 from isc_core.separation.support.highlight_evidence import (
     classify_highlights,
     highlight_evidence,
 )
-from tests.core.separation.scenes import BALL_SIDE, COLOUR_ALONE, ball
+from tests.core.separation.scenes import BALL_SIDE, ball
 
 
 def supported(*evidence: Any, **options: Any) -> np.ndarray:

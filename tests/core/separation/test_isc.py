@@ -16,11 +16,10 @@ from isc_core.evaluation.metrics import psnr
 from isc_core.photo import read_linear
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
-from isc_core.separation import BEST, METHODS, isc, separate
+from isc_core.separation import BEST, COLOUR_ALONE, METHODS, isc, separate
 from isc_core.separation.isc import VARIANTS, Abstention, IscOptions, abstention
 from tests.core.separation.scenes import (
     ALBEDOS,
-    COLOUR_ALONE,
     assert_layers_hold,
     ball,
     error_ratio,
