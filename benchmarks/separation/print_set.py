@@ -7,8 +7,10 @@ one, with true highlights across the paint, what it still finds.
 Construction: a traced body of `training.world` is painted, lit by a white-balanced panorama and
 lamps, and photographed: exposure, blur, noise, clipping, JPEG of 8-bit sRGB codes. Patterns are
 drawn anew, none is of the atlas that the scene network has learned from. Bodies of one colour,
-without print, are made alike. The three sets share no body, and no panorama that the network has
-learned from lights `Part.VALIDATION` or `Part.TEST`.
+without print, are made alike. The three sets share no body, and the network has learned from none:
+on bodies that it knows, it is surer than on others. `Part.TRAINING` has made bodies whose numbers
+lie beyond those of the networks' worlds. No panorama that the network has learned from lights
+`Part.VALIDATION` or `Part.TEST`.
 
 Limits: trim is a bright grey band without a reflection of its own. A true diffuse image has the
 noise of its photo.
@@ -18,7 +20,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
-from itertools import islice
 from pathlib import Path
 from zlib import crc32
 
@@ -28,6 +29,8 @@ from PIL import Image, ImageDraw
 from scipy.spatial.transform import Rotation
 from torch.nn import functional
 
+from isc_core.errors import InputError
+from training.world.bodies.body import Source
 from training.world.camera import CameraDraw
 from training.world.environments import read_panoramas
 from training.world.files import Split, views_in
@@ -46,7 +49,9 @@ from training.world.views import View
 PHOTO_SIDE = 160  # pixels; the body is 140 long
 _MAP_SIDE = 128
 _LEAST_PIXELS = 2500
-_FIT_STEP = 6  # of the bodies to learn from, one in so many is used
+# Numbers from which no network has learned from a made body of a kind: the worlds of the networks
+# had 1,200 built bodies of 18 kinds, and 600 of six families at most.
+_FIRST_NEW = {Source.BUILT: 67, Source.FAMILY: 100}
 _TRIES = 12  # lights and paints for a body, until a highlight crosses the paint
 # A highlight: specular light, averaged over _SPOT pixels, above _BRIGHT of the mean light, on a
 # share of the body within _EXTENT, of which _ACROSS lies on the paint; three quarters of the body
@@ -85,6 +90,9 @@ class PrintScene:
     Attributes
     ----------
     name : str
+        Number and kind of paint.
+    body : str
+        Name of the body.
     photo : (H, W, 3) float32 ndarray
         Linear light of an 8-bit file.
     diffuse : (H, W, 3) float32 ndarray
@@ -93,6 +101,7 @@ class PrintScene:
     """
 
     name: str
+    body: str
     photo: np.ndarray
     diffuse: np.ndarray
     mask: np.ndarray
@@ -147,7 +156,9 @@ def print_scenes(
         if scene is not None:
             made += 1
             yield replace(
-                scene, name=f"{made:03d} {'plain' if kind is None else kind.name.lower()}"
+                scene,
+                name=f"{made:03d} {'plain' if kind is None else kind.name.lower()}",
+                body=bodies[int(k)].name,
             )
 
 
@@ -159,16 +170,25 @@ def _balanced(radiance: np.ndarray) -> np.ndarray:
 
 def _bodies(world: Path, part: Part) -> list[PreparedView]:
     """One view of each body of a set."""
-    split = Split.TRAIN if part == Part.TRAINING else Split.UNSEEN_BODY
+    splits = tuple(Split) if part == Part.TRAINING else (Split.UNSEEN_BODY,)
     found = dict[str, View]()
-    for view in views_in(world, split):
-        half = Part.TEST if crc32(view.name.encode()) // 8 % 2 else Part.VALIDATION
-        if view.mask.sum() > _LEAST_PIXELS and part in (Part.TRAINING, half):
-            found.setdefault(view.name, view)
-    return [
-        prepared(view)
-        for view in islice(found.values(), 0, None, 6 if part == Part.TRAINING else 1)
-    ]
+    for split in splits:
+        for view in views_in(world, split):
+            if view.mask.sum() > _LEAST_PIXELS and _part_of(view.name, split) == part:
+                found.setdefault(view.name, view)
+    if not found:
+        raise InputError(f"{world} has no bodies for {part}: build a world with more of them")
+    return [prepared(view) for view in found.values()]
+
+
+def _part_of(name: str, split: Split) -> Part | None:
+    """The set of a body; None for one that a network has learned from."""
+    source, *_, number = name.split("/")
+    if source in _FIRST_NEW and int(number) >= _FIRST_NEW[Source(source)]:
+        return Part.TRAINING
+    if split != Split.UNSEEN_BODY:
+        return None
+    return Part.TEST if crc32(name.encode()) // 8 % 2 else Part.VALIDATION
 
 
 def _scene(
@@ -289,7 +309,7 @@ def _photographed(pictures: LitPictures, rng: np.random.Generator) -> PrintScene
     mask = (sample.mask[0, 0] * sample.known[0, 0]).numpy() > 0
     photo = np.where(mask[..., None], photo, 0).astype(np.float32)
     clipped = mask & (photo.max(axis=2) >= 1)
-    return PrintScene("", photo, photo * np.exp(-ratio), mask, clipped)
+    return PrintScene("", "", photo, photo * np.exp(-ratio), mask, clipped)
 
 
 _Draw = Callable[[ImageDraw.ImageDraw], None]
