@@ -174,15 +174,28 @@ def _bodies(world: Path, part: Part) -> list[PreparedView]:
     found = dict[str, View]()
     for split in splits:
         for view in views_in(world, split):
-            if view.mask.sum() > _LEAST_PIXELS and _part_of(view.name, split) == part:
+            if view.mask.sum() > _LEAST_PIXELS and part_of(view.name, split) == part:
                 found.setdefault(view.name, view)
     if not found:
         raise InputError(f"{world} has no bodies for {part}: build a world with more of them")
     return [prepared(view) for view in found.values()]
 
 
-def _part_of(name: str, split: Split) -> Part | None:
-    """The set of a body; None for one that a network has learned from."""
+def part_of(name: str, split: Split) -> Part | None:
+    """Return the set of a body.
+
+    Parameters
+    ----------
+    name : str
+        Of the body.
+    split : Split
+        Of its reference.
+
+    Returns
+    -------
+    Part or None
+        None for a body that a network has learned from, or of a source that is not used.
+    """
     source, *_, number = name.split("/")
     if source in _FIRST_NEW and int(number) >= _FIRST_NEW[Source(source)]:
         return Part.TRAINING
