@@ -1,10 +1,9 @@
 """Photos of bodies with relief of one paint, and of smooth bodies with print; exact normals.
 
 Every pixel is the mean of four points; its true normals are the normalised means of theirs. The
-light is that of `lighting`, the camera that of `training.world.camera`: a slight blur, noise, 8-bit
-sRGB, in two of three photos JPEG.
+light is that of `lighting`, the camera one of `cameras`.
 
-Limits: an orthographic camera; no sharpening and no tone curve of a camera's own.
+Limits: an orthographic projection.
 """
 
 from collections.abc import Sequence
@@ -13,17 +12,16 @@ from enum import StrEnum
 from zlib import crc32
 
 import numpy as np
-import torch
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
 from synth.scene.meshes import Mesh
 from synth.scene.tracing import Hits, Tracer
-from training.world.camera import CameraDraw, encoded_srgb, exposed, photographed
 from training.world.random_draws import log_uniform
 from training.world.views import camera_rays
 
 from .bodies import SHAPES, Wrap, displaced_normals, draw_wrap, facing, smooth_body
+from .cameras import Camera, photo_of
 from .lighting import Gloss, Lamp, ReachingLight, Room, outgoing_light, reaching_light
 from .print_maps import PrintKind, draw_colour, draw_print
 from .relief_maps import ReliefKind, draw_relief
@@ -81,7 +79,12 @@ class _Plan:
 
 
 def render(
-    kind: SetKind, seed: int, number: int, rooms: Sequence[np.ndarray], side: int = SIDE
+    kind: SetKind,
+    seed: int,
+    number: int,
+    rooms: Sequence[np.ndarray],
+    side: int = SIDE,
+    camera: Camera = Camera.GOOD,
 ) -> DetailScene:
     """Render one photo of a set.
 
@@ -96,6 +99,8 @@ def render(
         Surroundings to draw from.
     side : int, optional
         Of the photo, pixels, a multiple of 16; the object has the same share of it at any size.
+    camera : Camera, optional
+        Takes the photo; all else is the same for every camera.
 
     Returns
     -------
@@ -118,9 +123,9 @@ def render(
     mask = (count == len(_OFFSETS) ** 2).reshape(side, side)
     picture = (total / np.maximum(count, 1)[:, None]).reshape(side, side, 9)
     picture *= mask[..., None]
-    codes, camera = _photo(picture[..., :3], mask, rng)
+    codes, drawn = photo_of(picture[..., :3], mask, camera, rng)
     normal, smooth = (_unit(picture[..., part]) for part in (slice(3, 6), slice(6, 9)))
-    facts = plan.facts | {"camera": vars(camera), "wrapped": bool(np.isfinite(wrap.axis_depth))}
+    facts = plan.facts | {"camera": drawn, "wrapped": bool(np.isfinite(wrap.axis_depth))}
     return DetailScene(f"{kind}_{number:02d}", codes, mask, normal, smooth, facts)
 
 
@@ -203,33 +208,6 @@ def _sampled(values: np.ndarray, uv: np.ndarray, middle: float, order: int) -> n
     places = [uv[:, 1] + middle, uv[:, 0] + middle]
     found = ndimage.map_coordinates(values, places, order=order, mode="grid-wrap", prefilter=False)
     return np.asarray(found)
-
-
-def _photo(
-    light: np.ndarray, mask: np.ndarray, rng: np.random.Generator
-) -> tuple[np.ndarray, CameraDraw]:
-    """sRGB codes of a photo, on a grey ground."""
-    noise = log_uniform(rng, 0.002, 0.012)
-    camera = CameraDraw(
-        exposure=rng.uniform(0.6, 1.0),
-        blur=rng.uniform(0.3, 0.7),
-        noise=noise,
-        floor=0.2 * noise,
-        sharpness=0.0,
-        contrast=0.0,
-        quality=float(rng.random() < 2 / 3) * rng.uniform(88, 97),
-        subsampled=float(rng.random() < 0.5),
-        clips=1.0,
-    )
-    torch.manual_seed(int(rng.integers(2**31)))
-    ground = light[mask].mean(axis=0) * rng.uniform(0.1, 1.2)
-    filled = np.where(mask[..., None], light, ground)
-    layers = torch.from_numpy(filled).float().permute(2, 0, 1)[None]
-    cover = torch.from_numpy(mask).float()[None, None]
-    values = {name: torch.tensor([value]) for name, value in vars(camera).items()}
-    seen = photographed(layers * exposed(layers, cover, values["exposure"]), cover, values)
-    tones = encoded_srgb(seen[0].permute(1, 2, 0).clamp(0, 1)).numpy()
-    return np.rint(255 * tones).astype(np.uint8), camera
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

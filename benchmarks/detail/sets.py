@@ -1,11 +1,12 @@
 """Write the measured sets: photos of bodies with relief, and of smooth bodies with print.
 
-  python -m benchmarks.detail.sets FOLDER --panoramas DIR --part choice|lights|report [--count N]
+  python -m benchmarks.detail.sets FOLDER --panoramas DIR --part validation|lights|test
+  [--camera good|phone] [--count N]
 
 FOLDER gets `relief_NN` and `print_NN`, each with `photo.png` (the mask in alpha) and `truth.npz`.
-What is there already is kept. Methods are chosen on `choice` and `lights`, figures reported on
-`report`. Half of the panoramas kept from learning light the bodies of `choice`, half those of
-`report`; all others light the bodies of `choice` once more in `lights`.
+What is there already is kept. Methods are chosen on `validation` and `lights`, figures reported on
+`test`. Half of the panoramas kept from learning light the bodies of `validation`, half those of
+`test`; all others light the bodies of `validation` once more in `lights`.
 """
 
 import argparse
@@ -22,6 +23,7 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_folder
 from training.world.environments import read_panoramas
 
+from .cameras import Camera
 from .rendering import DetailScene, SetKind, render
 
 COUNT = 30
@@ -129,7 +131,13 @@ def write_scene(folder: Path, scene: DetailScene) -> None:
         (partial / FACTS).write_text(json.dumps(scene.facts, indent=1), encoding="utf-8")
 
 
-def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> Iterator[str]:
+def write_set(
+    folder: Path,
+    panoramas: Path,
+    part: Part,
+    count: int = COUNT,
+    camera: Camera = Camera.GOOD,
+) -> Iterator[str]:
     """Write the bodies of a set that are not there yet.
 
     Parameters
@@ -139,6 +147,7 @@ def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> 
     part : Part
     count : int, optional
         Bodies with relief, and as many with print.
+    camera : Camera, optional
 
     Yields
     ------
@@ -158,7 +167,7 @@ def write_set(folder: Path, panoramas: Path, part: Part, count: int = COUNT) -> 
         for kind in SetKind:
             if (folder / f"{kind}_{number:02d}" / TRUTH).exists():
                 continue
-            scene = render(kind, _SEEDS[part], number, rooms)
+            scene = render(kind, _SEEDS[part], number, rooms, camera=camera)
             write_scene(folder, scene)
             yield scene.name
 
@@ -171,10 +180,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path, metavar="FOLDER")
     parser.add_argument("--panoramas", type=Path, required=True, metavar="DIR")
     parser.add_argument("--part", type=Part, required=True, choices=list(Part))
+    parser.add_argument("--camera", type=Camera, default=Camera.GOOD, choices=list(Camera))
     parser.add_argument("--count", type=int, default=COUNT, help="default: %(default)s")
     given = parser.parse_args()
+    names = write_set(given.folder, given.panoramas, given.part, given.count, given.camera)
     try:
-        for name in write_set(given.folder, given.panoramas, given.part, given.count):
+        for name in names:
             print(name, flush=True)
     except InputError as error:
         parser.error(str(error))
