@@ -360,26 +360,44 @@ def _export_maps(key: str, folder: Path) -> list[str]:
 def _export_mesh(built: BuiltObject, folder: Path, file_format: str) -> str:
     suffix, export = _EXPORTERS[file_format]
     path = folder / f"{folder.name}{suffix}"
-    selected = [obj for obj in bpy.context.selected_objects if obj != built.object]
-    with _exportable(built), ExitStack() as stack:
+    with _exportable(built), _only_selected(built.object), ExitStack() as stack:
+        if file_format == "OBJ":
+            stack.enter_context(_textures_beside(built.object, folder))
+        if file_format == "FBX":
+            stack.enter_context(_level_as_blenders(built.material))
         try:
-            for obj in selected:
-                obj.select_set(False)
-            built.object.select_set(True, view_layer=bpy.context.view_layer)
-            if file_format == "OBJ":
-                stack.enter_context(_textures_beside(built.object, folder))
-            if file_format == "FBX":
-                stack.enter_context(_level_as_blenders(built.material))
             export(path)
         except (RuntimeError, AttributeError) as error:
             raise InputError(
                 f"Blender's exporter for {file_format} failed ({reason_line(error)}): enable it in "
                 "the preferences, or choose another format"
             ) from error
-        finally:
-            for obj in selected:
-                obj.select_set(True)
     return path.name
+
+
+@contextmanager
+def _only_selected(obj: bpy.types.Object) -> Iterator[None]:
+    """Select an object alone while the context lasts.
+
+    Exporters skip what is not selected, and Blender selects no hidden object.
+    """
+    layer, before = bpy.context.view_layer, list(bpy.context.selected_objects)
+    layer.update()  # so that it includes what was linked a moment ago
+    if layer.objects.get(obj.name) != obj:
+        raise InputError(f"{obj.name} is not in this view layer: include its collection first")
+    try:
+        for other in before:
+            other.select_set(False)
+        obj.select_set(True)
+        if not obj.select_get():
+            raise InputError(
+                f"{obj.name} is hidden, or not selectable: change this in the Outliner"
+            )
+        yield
+    finally:
+        obj.select_set(False)
+        for other in before:
+            other.select_set(True)
 
 
 @contextmanager
@@ -422,20 +440,28 @@ def _level_as_blenders(material: bpy.types.Material) -> Iterator[None]:
 @contextmanager
 def _textures_beside(obj: bpy.types.Object, folder: Path) -> Iterator[None]:
     """The packed textures are files in the folder, and have their paths while the context lasts."""
-    written = []
-    for slot in obj.material_slots:
-        nodes = slot.material.node_tree.nodes if slot.material is not None else ()
-        for node in nodes:
-            image = node.image if node.type == "TEX_IMAGE" else None
-            packed = image.packed_file if image is not None else None
-            if image is None or packed is None or packed.data[:4] != _PNG_MAGIC:
-                continue
-            path = folder / f"{bpy.path.clean_name(image.name)}.png"
-            path.write_bytes(packed.data)
-            written.append((image, image.filepath_raw))
-            image.filepath_raw = str(path)
+    paths_before: dict[bpy.types.Image, str] = {}
     try:
+        for image in _packed_textures(obj):
+            path = folder / f"{bpy.path.clean_name(image.name)}.png"
+            path.write_bytes(image.packed_file.data)
+            paths_before[image] = image.filepath_raw
+            image.filepath_raw = str(path)
         yield
     finally:
-        for image, before in written:
+        for image, before in paths_before.items():
             image.filepath_raw = before
+
+
+def _packed_textures(obj: bpy.types.Object) -> set[bpy.types.Image]:
+    """The images of an object's materials that are packed as PNG."""
+    materials = (slot.material for slot in obj.material_slots if slot.material is not None)
+    nodes = (node for material in materials for node in material.node_tree.nodes)
+    images = {node.image for node in nodes if node.type == "TEX_IMAGE"}
+    return {
+        image
+        for image in images
+        if image is not None
+        and image.packed_file is not None
+        and image.packed_file.data[:4] == _PNG_MAGIC
+    }

@@ -1,5 +1,6 @@
-"""A plain material in place of the group "ISC Dichromatic" of files from earlier versions, whose
-group was the whole surface, for export to programs without node groups.
+"""A plain material for export where the edits are not written into a Principled BSDF: in files from
+earlier versions, whose group "ISC Dichromatic" was the whole surface, and where the user has
+removed or renamed that node.
 
 Equation: base colour = min(1, g v rotated(rho; hue, saturation)), as the group computes it:
 `rotated` is Blender's Hue/Saturation, v the value, g the diffuse gain. It is baked into an 8-bit
@@ -116,24 +117,27 @@ def _fill(plain: bpy.types.Material, obj: bpy.types.Object, material: bpy.types.
     level = given["Specular Level"].default_value
     if level == 0 and shows_highlights(material):
         level = float(obj.get(SPECULAR_LEVEL, 0.0))
-    surface.inputs["Roughness"].default_value = given["Roughness"].default_value
+    gloss = given["Gloss Gain"].default_value if "Gloss Gain" in given else 1.0
+    roughness = given["Roughness"].default_value / max(gloss, 1e-3)
+    surface.inputs["Roughness"].default_value = min(1.0, roughness)
     surface.inputs["Specular IOR Level"].default_value = (
         PLASTIC * level * given["Specular Gain"].default_value
     )
     gain = given["Value"].default_value * given["Diffuse Gain"].default_value
     edits = (given["Hue"].default_value, given["Saturation"].default_value, gain)
-    if not given["Reflectance"].is_linked:
-        color = recolour_reflectance(np.array(given["Reflectance"].default_value[:3]), *edits)
+    source = given["Reflectance" if "Reflectance" in given else "Base Color"]
+    if not source.is_linked:
+        color = recolour_reflectance(np.array(source.default_value[:3]), *edits)
         surface.inputs["Base Color"].default_value = (*np.clip(color, 0, 1), 1.0)
         return
-    source = given["Reflectance"].links[0].from_node
-    if source.type != "TEX_IMAGE" or source.image is None or not source.image.size[0]:
+    node = source.links[0].from_node
+    if node.type != "TEX_IMAGE" or node.image is None or not node.image.size[0]:
         raise InputError(
-            f"the reflectance of {obj.name} is not an image: connect an image texture to the "
-            "node's Reflectance, or bake it"
+            f"the base color of {obj.name} is not an image: connect an image texture to the "
+            f"node's {source.name}, or bake it"
         )
     texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = _bake(source.image, *edits)
+    texture.image = _bake(node.image, *edits)
     tree.links.new(texture.outputs["Color"], surface.inputs["Base Color"])
 
 

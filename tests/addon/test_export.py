@@ -21,6 +21,7 @@ from blender_addon.scene.build import BuiltObject, build_object  # noqa: E402
 from blender_addon.scene.material import shows_highlights  # noqa: E402
 from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from isc_core.errors import InputError  # noqa: E402
 from isc_core.evaluation.metrics import psnr  # noqa: E402
 
 EDITS = {
@@ -303,3 +304,61 @@ def test_the_direction_of_green_is_the_programs_or_the_chosen(
         bpy.ops.isc.export_textures(directory=str(tmp_path), program=program, normals=normals)
         codes = read_raster(tmp_path / "bump" / "bump_normal.png").values
         assert abs(int(codes[5, 5, 1]) - green) <= 1, (program, normals)
+
+
+def test_a_hidden_object_is_not_exported_as_an_empty_file(
+    built: BuiltObject, tmp_path: Path
+) -> None:
+    built.object.hide_set(True)
+    with pytest.raises(InputError, match="bump is hidden"):
+        export_object(built, tmp_path)
+    built.object.hide_set(False)
+    other = bpy.data.scenes.new("other")
+    with (
+        bpy.context.temp_override(scene=other, view_layer=other.view_layers[0]),
+        pytest.raises(InputError, match="bump is not in this view layer"),
+    ):
+        export_object(built, tmp_path)
+    assert not list((tmp_path / "bump").iterdir())
+
+
+def test_an_export_leaves_the_selection(built: BuiltObject, tmp_path: Path) -> None:
+    cube = bpy.data.objects.new("cube", bpy.data.meshes.new("cube"))
+    built.scene.collection.objects.link(cube)
+    cube.select_set(True)
+    for selected in (False, True):
+        built.object.select_set(selected)
+        export_object(built, tmp_path)
+        assert (cube.select_get(), built.object.select_get()) == (True, selected)
+
+
+def test_paths_of_textures_are_restored_if_one_cannot_be_written(
+    built: BuiltObject, tmp_path: Path
+) -> None:
+    images = [node.image for node in built.material.node_tree.nodes if node.type == "TEX_IMAGE"]
+    before = [image.filepath_raw for image in images]
+    (tmp_path / "bump" / "mine.png").mkdir(parents=True)
+    for image in images[1:]:
+        image.name = "mine"
+    extra = built.material.node_tree.nodes.new("ShaderNodeTexImage")
+    extra.image = images[0].copy()
+    extra.image.name = "mine"
+    with pytest.raises(InputError, match="cannot write to"):
+        export_object(built, tmp_path, "OBJ")
+    assert [image.filepath_raw for image in images] == before
+    assert extra.image.filepath_raw == before[0]
+
+
+def test_a_material_whose_surface_was_renamed_is_exported(
+    built: BuiltObject, tmp_path: Path
+) -> None:
+    import trimesh
+
+    edit(built, {"Gloss Gain": 0.5})
+    surface = surface_node(built.material)
+    assert surface is not None
+    surface.name = "mine"
+    export_object(built, tmp_path)
+    material = trimesh.load(tmp_path / "bump" / "bump.glb", force="mesh").visual.material
+    assert material.baseColorTexture.size == built.object["isc_map_mask"].size[:]
+    assert material.roughnessFactor == pytest.approx(0.7)
