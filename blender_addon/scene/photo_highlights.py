@@ -147,9 +147,10 @@ def _fingerprint(scene: bpy.types.Scene, objects: list[Any]) -> str:
     camera, world = scene.camera, scene.world
     parts: list[Any] = [_matrix(obj) for obj in objects]
     if camera is not None:
+        parts.append(_matrix(camera))
+    if camera is not None and camera.type == "CAMERA":  # Blender looks from any object
         lens = camera.data
-        parts += [_matrix(camera), lens.type, lens.lens, lens.ortho_scale]
-        parts += [lens.shift_x, lens.shift_y]
+        parts += [lens.type, lens.lens, lens.ortho_scale, lens.shift_x, lens.shift_y]
     for lamp in (obj for obj in scene.objects if obj.type == "LIGHT" and not obj.hide_render):
         light = lamp.data
         parts += [_matrix(lamp), light.type, light.energy, list(light.color)]

@@ -49,6 +49,14 @@ def lens_shifted(built: BuiltObject) -> None:
     built.camera.data.shift_x = 0.3
 
 
+def see_from(built: BuiltObject, name: str) -> None:
+    """View > Cameras > Set Active Object as Camera takes any object."""
+    obj = bpy.data.objects.get(name) or bpy.data.objects.new(name, None)
+    if obj.name not in built.scene.objects:
+        built.scene.collection.objects.link(obj)
+    built.scene.camera = obj
+
+
 CHANGES: dict[str, Callable[[BuiltObject], None]] = {
     "lamp turned": lambda built: turn(bpy.data.objects["lamp"]),
     "lamp brighter": lambda built: setattr(bpy.data.lights["lamp"], "energy", 9.0),
@@ -56,6 +64,8 @@ CHANGES: dict[str, Callable[[BuiltObject], None]] = {
     "camera moved": lambda built: turn(built.camera),
     "lens": lens_shifted,
     "object turned": lambda built: turn(built.object),
+    "seen from an object that is no camera": lambda built: see_from(built, "lamp"),
+    "seen from an empty": lambda built: see_from(built, "empty"),
     "sky turned": world_value,
     "sky replaced": lambda built: setattr(built.scene, "world", bpy.data.worlds.new("mine")),
 }
