@@ -142,13 +142,12 @@ def build_object(
     options = options or BuildOptions()
     require_options(options)
     _require_ready(_choose_key(result, options, photo), options, scene or bpy.context.scene)
-    steps = stage_object(prepare(result, options, with_photo=photo is None), photo=photo)
+    prepared = prepare(result, options, with_photo=photo is None)
+    steps = stage_object(prepared, key_of(prepared, photo))
     return place_object(completed(steps), scene=scene, photo=photo)
 
 
-def stage_object(
-    prepared: PreparedObject, *, photo: bpy.types.Image | None = None
-) -> Generator[None, None, StagedObject]:
+def stage_object(prepared: PreparedObject, key: str) -> Generator[None, None, StagedObject]:
     """Make the images and the mesh of an object in short steps; the scene stays as it is.
 
     Between two steps anything may happen, an undo included. If closed before the end, nothing is
@@ -158,21 +157,38 @@ def stage_object(
     ----------
     prepared : PreparedObject
         What it is built of.
-    photo : bpy.types.Image, optional
-        Image behind the object; not used once the first step has been made.
+    key : str
+        As `key_of` returns it.
 
     Returns
     -------
     StagedObject
         For `place_object`, to be called at once.
     """
-    key = _choose_key(prepared.result, prepared.options, photo)
     while True:
         base = _mesh_number(key)
         blocks = yield from stage(prepared.files, prepared.mesh, base)
         if blocks.are_there and _mesh_number(key) == base:
             return StagedObject(prepared, blocks)
         blocks.discard()
+
+
+def key_of(prepared: PreparedObject, photo: bpy.types.Image | None) -> str:
+    """Return the key that a prepared object has in this file.
+
+    Parameters
+    ----------
+    prepared : PreparedObject
+        What it is built of.
+    photo : bpy.types.Image or None
+        Image behind the object.
+
+    Returns
+    -------
+    str
+        The name of the photo, numbered if the object of another photo has it.
+    """
+    return _choose_key(prepared.result, prepared.options, photo)
 
 
 def place_object(
@@ -234,9 +250,8 @@ def require_placeable(
     InputError
         As of `build_object`.
     """
-    options = staged.prepared.options
-    key = _choose_key(staged.prepared.result, options, photo)
-    _require_ready(key, options, scene or bpy.context.scene)
+    key = key_of(staged.prepared, photo)
+    _require_ready(key, staged.prepared.options, scene or bpy.context.scene)
 
 
 def _place(

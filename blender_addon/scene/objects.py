@@ -29,7 +29,14 @@ from isc_core.shading.spherical_harmonics import real_sh
 
 from ..datablocks.provenance import KEY, datablock_name
 from ..files.result_arrays import ResultArrays
-from .build import BuiltObject, StagedObject, place_object, require_placeable, stage_object
+from .build import (
+    BuiltObject,
+    StagedObject,
+    key_of,
+    place_object,
+    require_placeable,
+    stage_object,
+)
 from .camera import eye_of
 from .preparation import BuildOptions, PreparedObject, prepare
 
@@ -120,19 +127,20 @@ def stage_objects(
     prepared : sequence of PreparedObject
         What they are built of.
     photo : bpy.types.Image, optional
-        Image behind the objects.
+        Image behind the objects; not used after the first step, as an undo may free it.
 
     Returns
     -------
     list of StagedObject
         For `place_objects`, to be called at once.
     """
+    keys = [key_of(one, photo) for one in prepared]
     staged: list[StagedObject] = []
     complete = False
     try:
         while not complete:
-            for one in prepared:
-                made = yield from stage_object(one, photo=photo)
+            for one, key in zip(prepared, keys, strict=True):
+                made = yield from stage_object(one, key)
                 staged.append(made)
             # An undo in the meantime takes away what was made first.
             complete = all(one.blocks.are_there for one in staged)

@@ -36,7 +36,7 @@ def census() -> dict[str, set[int]]:
 @pytest.mark.parametrize("steps", [1, 3, 5])
 def test_closed_between_two_steps_it_leaves_nothing(result: ResultArrays, steps: int) -> None:
     before = census()
-    running = stage_object(prepare(result, SHARED, with_photo=True))
+    running = stage_object(prepare(result, SHARED, with_photo=True), "bump")
     for _ in range(steps):
         next(running)
     assert census() != before
@@ -45,7 +45,7 @@ def test_closed_between_two_steps_it_leaves_nothing(result: ResultArrays, steps:
 
 
 def test_what_an_undo_took_away_is_made_again(result: ResultArrays) -> None:
-    running = stage_object(prepare(result, SHARED, with_photo=True))
+    running = stage_object(prepare(result, SHARED, with_photo=True), "bump")
     next(running)
     bpy.data.images.remove(bpy.data.images[-1])
     staged = completed(running)
@@ -59,7 +59,7 @@ def test_a_scene_that_refuses_it_stays_as_it_was(result: ResultArrays) -> None:
     from isc_core.errors import InputError
 
     obj = build_object(result, SHARED).object
-    running = stage_object(prepare(result, SHARED, with_photo=True))
+    running = stage_object(prepare(result, SHARED, with_photo=True), "bump")
     before = census()
     bpy.context.view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")

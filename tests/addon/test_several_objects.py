@@ -304,3 +304,23 @@ def test_one_pinhole_camera_sees_each_object_where_the_photo_does(
     for one, seen in zip(built, results, strict=True):
         off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
         assert np.abs(off - seen.vertex_pixel).max() < 0.01
+
+
+def test_staging_does_not_need_the_photo_again(blender: Any, tmp_path: Path) -> None:
+    """An undo between two steps may free it; the mesh of the user's object is the base all the
+    same.
+    """
+    photo = blender.data.images.new("pair.png", 8, 8)
+    options = BuildOptions(name="pair", each=True, own_scene=False)
+    prepared = prepare_objects(several_results(tmp_path), options)
+    for one in place_objects(completed(stage_objects(prepared, photo=photo)), photo=photo):
+        one.object["isc_source_image"] = photo
+        one.object.data["mine"] = 1
+    steps = stage_objects(prepared, photo=photo)
+    next(steps)
+    again = photo.copy()
+    photo.user_remap(again)
+    blender.data.images.remove(photo)
+    built = place_objects(completed(steps), photo=again)
+    assert [one.object.name for one in built] == ["pair 1", "pair 2"]
+    assert [one.object.data.get("mine") for one in built] == [1, 1]
