@@ -18,8 +18,14 @@ from ..scene.hand_edits import is_edited_by_hand
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .edit import poll_built, require_built
 from .messages import sentence
-from .modal import WorkerOperator, poll_photo
-from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
+from .modal import WorkerOperator, poll_photo, start_operator
+from .request import (
+    DecomposeRequest,
+    inspect_images,
+    request_from_settings,
+    stored_request,
+    track_names,
+)
 from .result import build_in_steps
 from .run_steps import ResultPlace, decompose_steps
 from .viewport import started_in
@@ -63,10 +69,10 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     steps = decompose_steps(
         photo, mask, mask_size, request.method, place, preferences.threads, environment
     )
-    view = started_in(context)
+    view, renamed = started_in(context), track_names(request)
 
     def finish(context: Any, output: RunOutput) -> ImportSteps:
-        message = yield from build_in_steps(context, output, request, view)
+        message = yield from build_in_steps(context, output, renamed(), view)
         if output.remark:
             message = f"{message}; {output.remark}"
         if output.path.is_relative_to(folder):
@@ -120,6 +126,7 @@ class _Overwrites(WorkerOperator):
             "INVOKE_DEFAULT",
             again=self.bl_idname,
             edited=edited.name,
+            max_size=getattr(self, "max_size", 0),
         )
         return {"CANCELLED"}
 
@@ -199,6 +206,7 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
 
     again: StringProperty(name="Operator", description="Operator to start on confirmation")
     edited: StringProperty(name="Object", description="Name of the edited object")
+    max_size: IntProperty(name="Size", description="Size at which to update the object", min=0)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask.
@@ -240,8 +248,10 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
             {"FINISHED"}.
         """
         del context
-        again = {"isc.redo": bpy.ops.isc.redo}.get(self.again, bpy.ops.isc.decompose)
-        again("INVOKE_DEFAULT", overwrite=True)
+        if self.again == ISC_OT_redo.bl_idname:
+            start_operator(self, bpy.ops.isc.redo, overwrite=True, max_size=self.max_size)
+        else:
+            start_operator(self, bpy.ops.isc.decompose, overwrite=True)
         return {"FINISHED"}
 
 

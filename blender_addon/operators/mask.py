@@ -19,9 +19,9 @@ from ..files.image_source import ImageSource, inspect_image
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
 from .messages import error_line, sentence
-from .modal import WorkerOperator, poll_photo
+from .modal import WorkerOperator, poll_photo, start_operator
 from .photo_canvas import DragOnPhoto, PhotoCanvas
-from .request import find_by_full_name, require_photo
+from .request import DecomposeRequest, find_by_full_name, require_photo, track_names
 from .run_steps import mask_steps
 from .worker_run import (
     ImportSteps,
@@ -115,13 +115,15 @@ def mask_run(
     InputError
         If the photo cannot be used.
     """
-    photo, scene = inspect_image(context.scene.isc.image), context.scene.name_full
+    photo = inspect_image(context.scene.isc.image)
+    request = DecomposeRequest(image=photo.name, scene=context.scene.name_full)
+    renamed = track_names(request)
     folder = create_run_folder(None, "mask")
 
     def finish(context: Any, output: RunOutput) -> ImportSteps:
         del context
         yield
-        load_mask(output.path, photo.name, scene)
+        load_mask(output.path, renamed().image, renamed().scene)
         remove_folder(folder)
         return "Mask found: check it, then press Create Object"
 
@@ -249,7 +251,7 @@ class ISC_OT_draw_box(DragOnPhoto, bpy.types.Operator):
             self.report({"WARNING"}, sentence(_small_box_message()))
             return {"CANCELLED"}
         context.scene.isc.box = box
-        bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
+        start_operator(self, bpy.ops.isc.cut_mask)
         return {"FINISHED"}
 
     def outline(self, path: list[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -33,6 +33,7 @@ _FIELDS = {
 # Advice that names these is about masks, and the panel offers other ways.
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
 _PART = re.compile(r"^object (\d+) of (\d+): ")
+_REPORTED_BY = re.compile(r"^(Error: |Operator bpy\.ops\.\S+\.poll\(\) )")
 _MOST_SECONDS = 90  # more are shown in minutes
 _MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 _ADVICE = {  # what a command line does otherwise
@@ -111,9 +112,9 @@ def error_line(error: RuntimeError) -> str:
     Returns
     -------
     str
-        Its first line, without "Error: ".
+        Its first line, without "Error: " and the name of the operator.
     """
-    return str(error).strip().splitlines()[0].removeprefix("Error: ")
+    return _REPORTED_BY.sub("", str(error).strip().splitlines()[0])
 
 
 def reason_line(error: Exception) -> str:

@@ -8,13 +8,14 @@ step, whatever the user has done in the meantime.
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 import time
+from collections.abc import Callable
 from typing import Any
 
 import bpy
 
 from isc_core.errors import InputError
 
-from .messages import progress_message, sentence, stage_text, write_report
+from .messages import error_line, progress_message, sentence, stage_text, write_report
 from .worker_run import (
     RunState,
     WorkerRun,
@@ -202,6 +203,26 @@ class WorkerOperator:
         if self._timer is not None:
             context.window_manager.event_timer_remove(self._timer)
             self._timer = None
+
+
+def start_operator(operator: Any, start: Callable[..., object], **options: Any) -> None:
+    """Start another operator as a button does, and report its error.
+
+    Blender does not show what an operator reports that Python has called.
+
+    Parameters
+    ----------
+    operator : bpy.types.Operator
+        The calling operator.
+    start : callable
+        The other one, for example `bpy.ops.isc.decompose`.
+    **options
+        Its properties.
+    """
+    try:
+        start("INVOKE_DEFAULT", **options)
+    except RuntimeError as error:
+        operator.report({"ERROR"}, sentence(error_line(error)))
 
 
 def advance_run(context: Any, run: WorkerRun) -> bool:

@@ -279,18 +279,21 @@ class PhotoOperator:
         Returns
         -------
         set of str
-            {"RUNNING_MODAL"}.
+            {"RUNNING_MODAL"}; {"CANCELLED"} if the photo has no pixels.
         """
         del event
         settings, shown = context.scene.isc, shown_photo(context)
+        self._size = tuple(shown.size)
+        if 0 in self._size:
+            self.report({"ERROR"}, f"The image {shown.name} has no data: open its file again")
+            return {"CANCELLED"}
         if shown not in (settings.image, settings.mask):
             settings.image = shown
-        context.window.cursor_modal_set("CROSSHAIR")
-        context.workspace.status_text_set(self.advice())
-        self._size = tuple(shown.size)
         mask = self.mask_to_show(settings)
         fits = mask is not None and tuple(mask.size) == self._size
         self._canvas = PhotoCanvas(context, shown, self.draw_over, mask if fits else None)
+        context.window.cursor_modal_set("CROSSHAIR")
+        context.workspace.status_text_set(self.advice())
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 

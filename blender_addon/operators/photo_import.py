@@ -19,6 +19,7 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from .messages import sentence
+from .modal import start_operator
 from .request import find_by_full_name
 from .worker_run import poll_idle
 
@@ -113,8 +114,7 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
         settings.image, settings.mask, settings.mask_source = photo, None, "ALPHA"
         _show_panel(context.area)
         start = bpy.ops.isc.decompose if _has_alpha(photo) else bpy.ops.isc.auto_mask
-        with contextlib.suppress(RuntimeError):  # it has reported the error itself
-            start("INVOKE_DEFAULT")
+        start_operator(self, start)
         return {"FINISHED"}
 
     def _photo(self) -> Any:

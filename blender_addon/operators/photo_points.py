@@ -9,7 +9,7 @@ import bpy
 from bpy.props import BoolProperty
 
 from .mask import mask_run
-from .modal import WorkerOperator, poll_photo
+from .modal import WorkerOperator, poll_photo, start_operator
 from .photo_canvas import ClickOnPhoto, StrokeOnPhoto, add_point
 from .request import parse_points, require_photo
 from .run_steps import auto_mask_steps
@@ -105,7 +105,7 @@ class ISC_OT_mark_point(StrokeOnPhoto, bpy.types.Operator):
         """
         for point in points:
             add_point(settings, "other_points" if self.background else "points", point)
-        bpy.ops.isc.auto_mask("INVOKE_DEFAULT")
+        start_operator(self, bpy.ops.isc.auto_mask)
 
 
 class ISC_OT_clear_points(bpy.types.Operator):

@@ -3,6 +3,7 @@ the object.
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any
@@ -294,6 +295,38 @@ def find_by_full_name(blocks: Any, name: str) -> Any:
         The datablock.
     """
     return next((block for block in blocks if block.name_full == name), None)
+
+
+def track_names(request: DecomposeRequest) -> Callable[[], DecomposeRequest]:
+    """Follow the datablocks of a request while the user may rename them.
+
+    Parameters
+    ----------
+    request : DecomposeRequest
+        The request.
+
+    Returns
+    -------
+    callable
+        Returns the request with the present names; the names of deleted datablocks are unchanged.
+    """
+    kinds = {"image": "images", "mask": "images", "scene": "scenes"}
+    numbers = {}
+    for part, kind in kinds.items():
+        block = find_by_full_name(getattr(bpy.data, kind), getattr(request, part))
+        if block is not None:
+            numbers[part] = block.session_uid
+
+    def renamed() -> DecomposeRequest:
+        names = {
+            part: block.name_full
+            for part, number in numbers.items()
+            for block in getattr(bpy.data, kinds[part])
+            if block.session_uid == number
+        }
+        return replace(request, **names)
+
+    return renamed
 
 
 def object_key(image: Any) -> str:

@@ -24,6 +24,7 @@ from .request import (
     find_by_full_name,
     request_from_json,
     store_request,
+    track_names,
 )
 from .run_steps import import_steps, read_and_prepare
 from .viewport import activate, show, started_in
@@ -258,10 +259,10 @@ class ISC_OT_read_result(WorkerOperator, bpy.types.Operator):
         folder = Path(self.directory)
         environment = worker_environment(read_preferences(context))
         view, request = started_in(context), _panel_request(context.scene)
-        own = create_run_folder(None, "import")
+        own, renamed = create_run_folder(None, "import"), track_names(request)
 
         def finish(context: Any, output: RunOutput) -> ImportSteps:
-            message = yield from build_in_steps(context, output, request, view)
+            message = yield from build_in_steps(context, output, renamed(), view)
             remove_folder(own)
             return message
 

@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import menus  # noqa: E402 (after the skip)
 from blender_addon.operators import photo_import  # noqa: E402
-from blender_addon.operators.photo_canvas import fitted, shown_photo  # noqa: E402
+from blender_addon.operators.photo_canvas import PhotoOperator, fitted, shown_photo  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from tests.addon.scene_fixture import bump  # noqa: E402
 
@@ -134,3 +134,27 @@ def test_each_editor_has_its_photo(addon: Any) -> None:
     assert shown_photo(context("VIEW_3D")) == image
     assert shown_photo(context("IMAGE_EDITOR")) == other
     assert shown_photo(context("OUTLINER")) is None
+
+
+def test_the_error_of_what_an_operator_starts_is_its_own(addon: Any, tmp_path: Path) -> None:
+    """Blender shows nothing that an operator reports to Python."""
+    Image.fromarray(np.zeros((4, 4, 3), np.uint8)).save(tmp_path / "tiny.bmp")
+    settings = addon.context.scene.isc
+    with pytest.raises(RuntimeError, match=r"The image tiny\.bmp|tiny\.bmp is .* choose a larger"):
+        addon.ops.isc.photo_as_object(filepath=str(tmp_path / "tiny.bmp"))
+    assert settings.image.name == "tiny.bmp"
+
+
+def test_only_a_photo_with_pixels_can_be_pointed_at(addon: Any, tmp_path: Path) -> None:
+    path = photo_file(tmp_path, "a.png")
+    image = addon.data.images.load(str(path))
+    path.unlink()
+    image.reload()
+    reports: list[str] = []
+    calls: list[str] = []
+    window = SimpleNamespace(cursor_modal_set=calls.append)
+    scene = SimpleNamespace(isc=SimpleNamespace(image=image, mask=None))
+    context = SimpleNamespace(area=SimpleNamespace(type="VIEW_3D"), scene=scene, window=window)
+    operator = SimpleNamespace(report=lambda kind, text: reports.append(text))
+    assert PhotoOperator.invoke(operator, context, None) == {"CANCELLED"}  # type: ignore[arg-type]
+    assert reports == ["The image a.png has no data: open its file again"] and not calls
