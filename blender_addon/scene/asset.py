@@ -1,7 +1,8 @@
 """An object as an asset: marked, with a preview from the photo's view, in a file of a library.
 
 Limits: the preview is rendered by Cycles with 16 samples in the recovered light, along the photo's
-view but without its perspective. Blender's render result is replaced by it.
+view but without its perspective. Blender's render result is replaced by it. Where Cycles is
+disabled, Blender makes its usual preview.
 """
 
 from collections.abc import Iterator
@@ -68,7 +69,11 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
         ) from error
     for block in (built.object, built.material):
         _mark(block)
-    _set_preview(built)
+    if hasattr(bpy.types.Scene, "cycles"):
+        _set_preview(built)
+    else:  # Cycles is an add-on, which may be disabled
+        for block in (built.object, built.material):
+            block.asset_generate_preview()
     _pack_images(built.object)
     if entries := _missing_entries(catalogs):
         with new_file(library / _CATALOGS) as partial:

@@ -70,6 +70,18 @@ def test_an_asset_can_be_appended_elsewhere(addon: Any, built: BuiltObject, tmp_
     assert images and all(image.packed_file is not None for image in images)
 
 
+def test_an_asset_is_saved_without_cycles(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
+    import addon_utils  # type: ignore[import-not-found]
+
+    name = add_library(addon, tmp_path)
+    addon_utils.disable("cycles")
+    try:
+        assert addon.ops.isc.save_asset(library=name) == {"FINISHED"}
+    finally:
+        addon_utils.enable("cycles")
+    assert (tmp_path / "bump.blend").is_file() and built.object.asset_data is not None
+
+
 def test_a_library_that_cannot_be_written_is_reported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
