@@ -5,7 +5,8 @@ Blender calls `register` and `unregister`. Importing the package needs no Blende
 command without a window can print its help anywhere.
 
 Modules at the top may import the folders, never the other way round. The folders build on each
-other in this order: `files` and `worker`, then `scene` and `settings`, then `operators`.
+other in this order: `files`, `worker`, `datablocks`, `materials`, `scene`, `settings`, `runs`,
+`operators`.
 """
 
 from typing import Any

@@ -20,12 +20,12 @@ from isc_core.result_files.object_folders import object_folders
 from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
-from .operators.messages import join_notes, reason_line
-from .operators.request import DecomposeRequest, MethodSettings
 from .operators.result import build_as_undo_step
-from .operators.run_steps import result_notes
-from .operators.worker_run import RunOutput
 from .registration import register, unregister
+from .runs.messages import join_notes, reason_line
+from .runs.request import DecomposeRequest, MethodSettings
+from .runs.run_steps import result_notes
+from .runs.worker_run import RunOutput
 from .scene.copies import OBJECT
 from .scene.preparation import BuildOptions
 from .settings.preferences import read_preferences, worker_environment

@@ -10,16 +10,18 @@ from typing import Any
 import bpy
 
 from .datablocks.provenance import KEY, find_tagged
+from .materials.edit_nodes import dichromatic_node
+from .materials.material import shows_highlights
+from .materials.photo_highlights import can_show_highlights
 from .operators.mask import mask_shown_on
-from .operators.messages import NOTE, is_about_mask
 from .operators.result import scene_before
-from .operators.worker_run import RunState, active_run
-from .scene.build import LIGHT_AND_CAMERA, BuiltObject, find_built
+from .runs.active_run import active_run
+from .runs.messages import NOTE, is_about_mask
+from .runs.worker_run import RunState
+from .scene.build import LIGHT_AND_CAMERA
+from .scene.built_object import BuiltObject, find_built
 from .scene.collection import find_layer_collection
 from .scene.copies import objects_sharing_material
-from .scene.material import shows_highlights
-from .scene.material_edits import dichromatic_node
-from .scene.photo_highlights import can_show_highlights
 from .settings.usage import why_unused
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")

@@ -9,7 +9,7 @@ from bpy.app.handlers import persistent
 from . import menus, operators, panels
 from .operators.live_edits import add_handlers, remove_handlers
 from .operators.modal import update_display
-from .operators.worker_run import active_run, cancel_active_run
+from .runs.active_run import active_run, cancel_active_run
 from .settings import preferences, properties
 
 _CLASSES = (

@@ -31,8 +31,9 @@ import bpy
 import numpy as np
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
-from blender_addon.scene.build import BuiltObject, build_object
-from blender_addon.scene.material_edits import dichromatic_node
+from blender_addon.materials.edit_nodes import dichromatic_node
+from blender_addon.scene.build import build_object
+from blender_addon.scene.built_object import BuiltObject
 from blender_addon.scene.preparation import BuildOptions
 from blender_addon.scene.sun import ensure_sun
 from blender_addon.scene.world import set_sun_mix

@@ -25,7 +25,8 @@ from PIL import Image, ImageDraw
 
 from blender_addon.files.result_arrays import ARRAYS, read_result
 from blender_addon.operators.texture_set import write_texture_set
-from blender_addon.scene.build import BuiltObject, build_object
+from blender_addon.scene.build import build_object
+from blender_addon.scene.built_object import BuiltObject
 from blender_addon.scene.preparation import BuildOptions
 from isc_core.cli.main import main as isc
 from isc_core.errors import InputError

@@ -14,7 +14,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from blender_addon.scene.build import BuiltObject
+from blender_addon.scene.built_object import BuiltObject
 
 from .renders import render_scene
 

@@ -16,6 +16,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.json_files import read_json
 from isc_core.io.npy import read_arrays
+from isc_core.photo.camera import Camera
 
 ARRAYS, DESCRIPTION = "arrays.npz", "decomposition.json"
 
@@ -212,6 +213,14 @@ class ResultArrays:
     def size(self) -> tuple[int, int]:
         """Width and height of the maps in pixels."""
         return self.mask.shape[1], self.mask.shape[0]
+
+    @property
+    def camera(self) -> Camera | None:
+        """The pinhole camera of the photo, for the maps; None for an orthographic view."""
+        if self.focal_length is None or self.principal_point is None:
+            return None
+        x, y = map(float, self.principal_point)
+        return Camera(self.focal_length, (x, y))
 
     @property
     def name(self) -> str:

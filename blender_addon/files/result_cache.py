@@ -27,10 +27,9 @@ from pathlib import Path
 
 from isc_core.errors import InputError
 from isc_core.io.source_stamp import source_stamp
+from isc_core.io.stage_cache import SUFFIX
 
 from .result_arrays import ARRAYS, ResultArrays, read_result
-
-_STAGE = ".npz"  # suffix of the files of the worker's stages
 
 
 @dataclass(frozen=True)
@@ -126,7 +125,7 @@ class ResultCache:
             entries = sorted(self.folder.iterdir(), key=lambda entry: -entry.stat().st_mtime)
             room = self.limit - _size(self.place(keep))
             for entry in entries:
-                if entry.name == keep or not (entry.is_dir() or entry.suffix == _STAGE):
+                if entry.name == keep or not (entry.is_dir() or entry.suffix == SUFFIX):
                     continue
                 room -= _size(entry)
                 if room < 0:

@@ -10,12 +10,12 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
+from ..runs.messages import sentence
 from ..scene.asset import save_asset
-from .edit import poll_built, require_built
-from .messages import sentence
+from .edit import NeedsObject, require_built
 
 
-class ISC_OT_save_asset(bpy.types.Operator):
+class ISC_OT_save_asset(NeedsObject, bpy.types.Operator):
     """Save the active object as an asset."""
 
     bl_idname = "isc.save_asset"
@@ -37,22 +37,6 @@ class ISC_OT_save_asset(bpy.types.Operator):
         default=False,
         options={"SKIP_SAVE"},
     )
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether an object of ISC is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_built(cls, context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Ask for the library.

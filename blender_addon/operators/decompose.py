@@ -13,30 +13,24 @@ from isc_core.result_files.object_folders import object_folders
 
 from ..datablocks.provenance import KEY, find_tagged
 from ..files.result_arrays import ARRAYS
-from ..scene.copies import OBJECT, find_original, is_copy
-from ..scene.hand_edits import is_edited_by_hand
-from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .edit import poll_built, require_built
-from .messages import sentence
-from .modal import WorkerOperator, poll_photo, start_operator
-from .request import (
+from ..runs.active_run import poll_idle, require_no_active_run
+from ..runs.messages import sentence
+from ..runs.request import (
     DecomposeRequest,
     inspect_images,
     request_from_settings,
     stored_request,
     track_names,
 )
+from ..runs.run_steps import ResultPlace, decompose_steps
+from ..runs.worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder
+from ..scene.copies import OBJECT, find_original, is_copy
+from ..scene.hand_edits import is_edited_by_hand
+from ..settings.preferences import create_run_folder, read_preferences, worker_environment
+from .edit import NeedsObject, require_built
+from .modal import NeedsPhoto, WorkerOperator, start_operator
 from .result import build_in_steps
-from .run_steps import ResultPlace, decompose_steps
 from .viewport import started_in
-from .worker_run import (
-    ImportSteps,
-    RunOutput,
-    WorkerRun,
-    poll_idle,
-    remove_folder,
-    require_no_active_run,
-)
 
 
 def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
@@ -255,7 +249,7 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
+class ISC_OT_decompose(NeedsPhoto, _Overwrites, bpy.types.Operator):
     """Create the object of the panel's photo."""
 
     bl_idname = "isc.decompose"
@@ -264,22 +258,6 @@ class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
         "Recover shape, material and light of the object in the photo and add it to the scene, "
         "in the background"
     )
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether there is a photo and no run is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_photo(cls, context)
 
     def request(self, context: Any) -> DecomposeRequest:
         """Return the request of the scene's panel; see `_Overwrites`.
@@ -302,7 +280,7 @@ class ISC_OT_decompose(_Overwrites, bpy.types.Operator):
         return request_from_settings(context.scene)
 
 
-class ISC_OT_redo(_Overwrites, bpy.types.Operator):
+class ISC_OT_redo(NeedsObject, _Overwrites, bpy.types.Operator):
     """Create an object again from its photo, at another size."""
 
     bl_idname = "isc.redo"
@@ -336,7 +314,7 @@ class ISC_OT_redo(_Overwrites, bpy.types.Operator):
         bool
             Where False, the tooltip gives the reason.
         """
-        return poll_built(cls, context) and poll_idle(cls)
+        return super().poll(context) and poll_idle(cls)
 
     def request(self, context: Any) -> DecomposeRequest:
         """Return the request that made the active object; see `_Overwrites`.

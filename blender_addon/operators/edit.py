@@ -15,15 +15,15 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from isc_core.errors import InputError
 
 from ..datablocks.provenance import KEY
-from ..scene.build import BuiltObject, find_built, why_not_built
+from ..materials.edit_nodes import dichromatic_node
+from ..materials.material import set_specular_gain
+from ..materials.photo_highlights import can_show_highlights, hide_highlights, show_highlights
+from ..runs.messages import sentence
+from ..scene.built_object import BuiltObject, find_built, why_not_built
 from ..scene.copies import find_material, make_material_single_user
-from ..scene.material import set_specular_gain
-from ..scene.material_edits import dichromatic_node
-from ..scene.photo_highlights import can_show_highlights, hide_highlights, show_highlights
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
 from .live_edits import settle_edits
-from .messages import sentence
 
 _LIGHTS = (
     (
@@ -36,24 +36,29 @@ _LIGHTS = (
 )
 
 
-def poll_built(operator: Any, context: Any) -> bool:
-    """Return whether an object, camera or sun of ISC is active; else the tooltip says what to do.
+class NeedsObject:
+    """Mixin for operators on an object that ISC has built."""
 
-    Parameters
-    ----------
-    operator : type
-        Of the button.
-    context : bpy.types.Context
-        Blender's context.
+    poll_message_set: Any  # from bpy.types.Operator
 
-    Returns
-    -------
-    bool
-    """
-    reason = why_not_built(context.object)
-    if reason:
-        operator.poll_message_set(reason)
-    return not reason
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether an object, camera or sun of ISC is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
+        reason = why_not_built(context.object)
+        if reason:
+            cls.poll_message_set(reason)
+        return not reason
 
 
 def require_built(context: Any) -> BuiltObject:
@@ -80,7 +85,7 @@ def require_built(context: Any) -> BuiltObject:
     return built
 
 
-class EditOperator:
+class EditOperator(NeedsObject):
     """Mixin for operators that change what ISC has built, as one undo step.
 
     `edit` changes it, or raises `InputError` before any change.
@@ -88,22 +93,6 @@ class EditOperator:
 
     report: Any  # from bpy.types.Operator
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether an object, camera or sun of ISC is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_built(cls, context)
 
     def execute(self, context: Any) -> set[str]:
         """Apply the edit.

@@ -21,13 +21,13 @@ from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
 from ..datablocks.provenance import KEY, ROLE
-from ..scene.build import BuiltObject
+from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
+from ..runs.messages import reason_line, sentence
+from ..scene.built_object import BuiltObject
 from ..scene.copies import is_copy
-from ..scene.material_edits import PLASTIC, specular_level, surface_node
-from .edit import poll_built, require_built
+from .edit import NeedsObject, require_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
-from .messages import reason_line, sentence
 from .texture_set import linked_image, write_texture_set
 
 _EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
@@ -97,7 +97,7 @@ _EXPORTERS: Mapping[str, tuple[str, Callable[[Path], None]]] = {
 }
 
 
-class _FolderOperator:
+class _FolderOperator(NeedsObject):
     """Mixin for operators that write into a folder of the user's choice.
 
     `write` writes into an existing folder of the object's name, or raises `InputError`.
@@ -106,22 +106,6 @@ class _FolderOperator:
     report: Any  # from bpy.types.Operator
     directory: str
     bl_options = {"REGISTER"}
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether an ISC object is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_built(cls, context)
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Open the file browser.

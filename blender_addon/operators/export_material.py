@@ -27,9 +27,9 @@ from isc_core.errors import InputError
 from ..datablocks.images import SRGB, image_name, new_image, texture_file
 from ..datablocks.nodes import node_tree
 from ..datablocks.provenance import SPECULAR_LEVEL
-from ..scene.color_bake import linear_colors, recolour_reflectance
-from ..scene.material import shows_highlights
-from ..scene.material_edits import PLASTIC, dichromatic_node
+from ..materials.color_bake import linear_colors, recolour_reflectance
+from ..materials.edit_nodes import PLASTIC, dichromatic_node
+from ..materials.material import shows_highlights
 
 
 @contextmanager

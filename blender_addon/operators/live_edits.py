@@ -1,8 +1,8 @@
 """What happens after an edit, by a slider, a script, undo or the node editor.
 
-After each update of the scene, edits are written into the material (`scene.material_edits`), and
+After each update of the scene, edits are written into the material (`material_edits`), and
 highlights of the photo that no longer belong to what is seen are turned off
-(`scene.photo_highlights`). Baking waits until no slider has moved for a moment, and computes the
+(`photo_highlights`). Baking waits until no slider has moved for a moment, and computes the
 colours in a thread, which a later edit stops; without a window, and before a file is saved or
 exported, it happens at once.
 
@@ -21,8 +21,8 @@ from bpy.app.handlers import persistent
 
 from ..datablocks.images import ImageFile
 from ..datablocks.provenance import KEY
-from ..scene.material import shows_highlights
-from ..scene.material_edits import (
+from ..materials.material import shows_highlights
+from ..materials.material_edits import (
     PendingBake,
     apply_edits,
     bake_edits,
@@ -31,7 +31,7 @@ from ..scene.material_edits import (
     finish_bake,
     release_edited,
 )
-from ..scene.photo_highlights import has_moved, hide_highlights, show_highlights
+from ..materials.photo_highlights import has_moved, hide_highlights, show_highlights
 
 # Seconds: without a change before baking; between two looks at bakes; of a line in the status bar.
 _PAUSE, _POLL, _SHOWN = 0.4, 0.05, 6.0

@@ -16,48 +16,27 @@ from bpy.props import StringProperty
 from isc_core.errors import InputError
 
 from ..files.image_source import ImageSource, inspect_image
+from ..runs.active_run import require_no_active_run
+from ..runs.messages import error_line, sentence
+from ..runs.request import DecomposeRequest, find_by_full_name, require_photo, track_names
+from ..runs.run_steps import mask_steps
+from ..runs.worker_run import ImportSteps, RunOutput, RunSteps, WorkerRun, remove_folder
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from ..worker.commands import Box, WorkerEnvironment, overlay_of
-from .messages import error_line, sentence
-from .modal import WorkerOperator, poll_photo, start_operator
-from .photo_canvas import DragOnPhoto, PhotoCanvas
-from .request import DecomposeRequest, find_by_full_name, require_photo, track_names
-from .run_steps import mask_steps
-from .worker_run import (
-    ImportSteps,
-    RunOutput,
-    RunSteps,
-    WorkerRun,
-    remove_folder,
-    require_no_active_run,
-)
+from .modal import NeedsPhoto, WorkerOperator, start_operator
+from .photo_canvas import PhotoCanvas
+from .photo_operators import DragOnPhoto
 
 _MASK_OF, _SHOWN_ON = "isc_mask_of", "isc_shown_on"
 _MIN_SIDE = 8
 
 
-class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
+class ISC_OT_cut_mask(NeedsPhoto, WorkerOperator, bpy.types.Operator):
     """Segment the object inside the box and make it the mask."""
 
     bl_idname = "isc.cut_mask"
     bl_label = "Cut Out"
     bl_description = "Create the mask by segmenting the object inside the box by color"
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether there is a photo and no run is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_photo(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run; see `WorkerOperator`.

@@ -15,39 +15,38 @@ import bpy
 
 from isc_core.errors import InputError
 
-from .messages import error_line, progress_message, sentence, stage_text, write_report
-from .worker_run import (
-    RunState,
-    WorkerRun,
-    active_run,
-    begin_run,
-    cancel_active_run,
-    poll_idle,
-)
+from ..runs.active_run import active_run, begin_run, cancel_active_run, poll_idle
+from ..runs.messages import error_line, progress_message, sentence, stage_text, write_report
+from ..runs.worker_run import RunState, WorkerRun
 
 POLL_SECONDS = 0.1
 _IMPORT_PAUSE = 0.01  # between two parts of an import
 _PANEL_EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}
 
 
-def poll_photo(operator: Any, context: Any) -> bool:
-    """Return whether there is a photo and no run is active; else the tooltip says what to do.
+class NeedsPhoto:
+    """Mixin for operators that start a run on the photo of the panel."""
 
-    Parameters
-    ----------
-    operator : type
-        Of the button.
-    context : bpy.types.Context
-        Blender's context.
+    poll_message_set: Any  # from bpy.types.Operator
 
-    Returns
-    -------
-    bool
-    """
-    if context.scene.isc.image is None:
-        operator.poll_message_set("Open a photo first")
-        return False
-    return poll_idle(operator)
+    @classmethod
+    def poll(cls, context: Any) -> bool:
+        """Return whether there is a photo and no run is active.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        bool
+            Where False, the tooltip gives the reason.
+        """
+        if context.scene.isc.image is None:
+            cls.poll_message_set("Open a photo first")
+            return False
+        return poll_idle(cls)
 
 
 class WorkerOperator:

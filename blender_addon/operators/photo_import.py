@@ -18,10 +18,10 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from .messages import sentence
+from ..runs.active_run import poll_idle
+from ..runs.messages import sentence
+from ..runs.request import find_by_full_name
 from .modal import start_operator
-from .request import find_by_full_name
-from .worker_run import poll_idle
 
 SUFFIXES = (".jpg", ".jpeg", ".png", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".webp", ".tga")
 _EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}

@@ -8,36 +8,21 @@ from typing import Any
 import bpy
 from bpy.props import BoolProperty
 
+from ..runs.active_run import require_no_active_run
+from ..runs.request import parse_points, require_photo
+from ..runs.run_steps import auto_mask_steps
+from ..runs.worker_run import WorkerRun
 from .mask import mask_run
-from .modal import WorkerOperator, poll_photo, start_operator
-from .photo_canvas import ClickOnPhoto, StrokeOnPhoto, add_point
-from .request import parse_points, require_photo
-from .run_steps import auto_mask_steps
-from .worker_run import WorkerRun, require_no_active_run
+from .modal import NeedsPhoto, WorkerOperator, start_operator
+from .photo_operators import ClickOnPhoto, StrokeOnPhoto
 
 
-class ISC_OT_auto_mask(WorkerOperator, bpy.types.Operator):
+class ISC_OT_auto_mask(NeedsPhoto, WorkerOperator, bpy.types.Operator):
     """Find the object and make it the mask."""
 
     bl_idname = "isc.auto_mask"
     bl_label = "Auto Mask"
     bl_description = "Find the object in the photo and make it the mask; points select the object"
-
-    @classmethod
-    def poll(cls, context: Any) -> bool:
-        """Return whether there is a photo and no run is active.
-
-        Parameters
-        ----------
-        context : bpy.types.Context
-            Blender's context.
-
-        Returns
-        -------
-        bool
-            Where False, the tooltip gives the reason.
-        """
-        return poll_photo(cls, context)
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run; see `WorkerOperator`.
@@ -104,7 +89,7 @@ class ISC_OT_mark_point(StrokeOnPhoto, bpy.types.Operator):
             Columns and rows.
         """
         for point in points:
-            add_point(settings, "other_points" if self.background else "points", point)
+            _add_point(settings, "other_points" if self.background else "points", point)
         start_operator(self, bpy.ops.isc.auto_mask)
 
 
@@ -166,7 +151,7 @@ class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
         point : str
             Column and row.
         """
-        add_point(settings, "not_highlights" if self.reject else "highlights", point)
+        _add_point(settings, "not_highlights" if self.reject else "highlights", point)
 
 
 class ISC_OT_clear_highlights(bpy.types.Operator):
@@ -192,3 +177,8 @@ class ISC_OT_clear_highlights(bpy.types.Operator):
         """
         context.scene.isc.highlights = context.scene.isc.not_highlights = ""
         return {"FINISHED"}
+
+
+def _add_point(settings: Any, name: str, point: str) -> None:
+    """Append a point, column and row, to a field of the panel."""
+    setattr(settings, name, f"{getattr(settings, name)} {point}".strip())

@@ -13,12 +13,9 @@ from isc_core.errors import InputError
 
 from ..datablocks.staging import completed
 from ..files.result_arrays import DESCRIPTION
-from ..scene.build import BuiltObject, StagedObject, find_built
-from ..scene.objects import discard, place_objects, stage_objects
-from ..settings.preferences import create_run_folder, read_preferences, worker_environment
-from .messages import error_line, sentence
-from .modal import WorkerOperator
-from .request import (
+from ..runs.active_run import require_no_active_run
+from ..runs.messages import error_line, sentence
+from ..runs.request import (
     DecomposeRequest,
     build_options,
     find_by_full_name,
@@ -26,9 +23,14 @@ from .request import (
     store_request,
     track_names,
 )
-from .run_steps import import_steps, read_and_prepare
+from ..runs.run_steps import import_steps, read_and_prepare
+from ..runs.worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder
+from ..scene.build import StagedObject
+from ..scene.built_object import BuiltObject, find_built
+from ..scene.objects import discard, place_objects, stage_objects
+from ..settings.preferences import create_run_folder, read_preferences, worker_environment
+from .modal import WorkerOperator
 from .viewport import activate, show, started_in
-from .worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder, require_no_active_run
 
 # Objects whose datablocks are made, until they are placed: operators take plain values only.
 _staged: dict[str, list[StagedObject]] = {}

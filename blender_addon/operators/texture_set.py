@@ -30,9 +30,9 @@ from isc_core.result_files.exports.targets import PACKED, TARGETS
 from isc_core.result_files.solids.solid_mesh import continued
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 
-from ..scene.build import BuiltObject
-from ..scene.color_bake import linear_colors
-from ..scene.material_edits import LEVEL_FACTOR, PLASTIC, specular_level, surface_node
+from ..materials.color_bake import linear_colors
+from ..materials.edit_nodes import LEVEL_FACTOR, PLASTIC, specular_level, surface_node
+from ..scene.built_object import BuiltObject
 
 _FLAT = (0.5, 0.5, 1.0)
 _REACH = 2  # pixels of the maps beyond the object that the cubic kernel reads

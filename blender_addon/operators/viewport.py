@@ -10,7 +10,7 @@ from typing import Any
 import bpy
 from mathutils import Euler, Quaternion, Vector
 
-from ..scene.build import BuiltObject
+from ..scene.built_object import BuiltObject
 
 _PLAIN = {"WIREFRAME", "SOLID"}
 _FRONT = Vector((0, -1, 0))  # of an object, in its own axes

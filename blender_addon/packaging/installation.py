@@ -200,9 +200,9 @@ def extension_module(name: str) -> Any:
 
 def begin_run() -> Any:
     """Start a run as the button does, without a window."""
-    request = extension_module("operators.request").request_from_settings(bpy.data.scenes[0])
+    request = extension_module("runs.request").request_from_settings(bpy.data.scenes[0])
     run = extension_module("operators.decompose").create_decompose_run(bpy.context, request)
-    return extension_module("operators.worker_run").begin_run(run)
+    return extension_module("runs.worker_run").begin_run(run)
 
 
 def poll_run(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:

@@ -32,6 +32,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.io.png",
         "isc_core.io.reading_notes",
         "isc_core.io.source_stamp",
+        "isc_core.io.stage_cache",
         "isc_core.lobe_fitting.specular_layer",
         "isc_core.photo.camera",
         "isc_core.photo.names",

@@ -6,7 +6,8 @@ camera frame becomes (x, -z, y).
 """
 
 from ..datablocks.provenance import is_isc_datablock
-from .build import BuiltObject, build_object, find_built
+from .build import build_object
+from .built_object import BuiltObject, find_built
 from .preparation import BuildOptions
 
 __all__ = ["BuildOptions", "BuiltObject", "build_object", "find_built", "is_isc_datablock"]

@@ -18,7 +18,7 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
 
 from ..datablocks.provenance import KEY, require_local
-from .build import BuiltObject
+from .built_object import BuiltObject
 from .collection import use_standard_view
 
 CATALOG = "5d1b3c5e-6a0f-4b57-9d0b-1c5a3f0e8a11"

@@ -23,13 +23,10 @@ from ..datablocks.images import (
 )
 from ..datablocks.mesh import replace_mesh
 from ..datablocks.provenance import (
-    KEY,
     PHOTO_HASH,
-    ROLE,
     SOURCE_IMAGE,
     datablock_name,
     find_tagged,
-    is_isc_datablock,
     photo_hash,
     require_local,
     tag,
@@ -37,8 +34,12 @@ from ..datablocks.provenance import (
 )
 from ..datablocks.staging import StagedBlocks, completed, stage
 from ..files.result_arrays import ResultArrays
+from ..materials.coated_surface import recovered_light
+from ..materials.gloss_edits import GlossBasis
+from ..materials.material import MaterialMaps, ensure_material
+from ..materials.photo_highlights import forget_view
+from .built_object import BuiltObject
 from .camera import ensure_camera, set_background_photo, set_render_size
-from .coated_surface import recovered_light
 from .collection import (
     ensure_collection,
     ensure_optional_part,
@@ -46,12 +47,9 @@ from .collection import (
     link_object,
     use_standard_view,
 )
-from .copies import COPY, OBJECT, find_material
+from .copies import OBJECT
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import remember_mesh
-from .material import MaterialMaps, ensure_material
-from .material_edits import GlossBasis
-from .photo_highlights import forget_view
 from .placement import free_place
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ensure_lamps, ensure_sun, relight
@@ -60,34 +58,6 @@ from .world import ensure_world
 LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 
 _NO_LAMPS = np.zeros((0, 3))
-
-
-@dataclass(frozen=True)
-class BuiltObject:
-    """An object and what belongs to it.
-
-    Attributes
-    ----------
-    collection : bpy.types.Collection
-        Collection of everything built of the photo.
-    object : bpy.types.Object
-        The object.
-    camera : bpy.types.Object or None
-        The photo's camera.
-    world : bpy.types.World
-        The recovered light; a shared scene uses it only if requested.
-    scene : bpy.types.Scene
-        Scene of the object.
-    material : bpy.types.Material
-        Material of the object.
-    """
-
-    collection: bpy.types.Collection
-    object: bpy.types.Object
-    camera: bpy.types.Object | None
-    world: bpy.types.World
-    scene: bpy.types.Scene
-    material: bpy.types.Material
 
 
 @dataclass(frozen=True)
@@ -314,65 +284,6 @@ def _lamps(result: ResultArrays) -> tuple[np.ndarray, np.ndarray]:
     if result.lamp_direction is None or result.lamp_strength is None:
         return _NO_LAMPS, _NO_LAMPS
     return result.lamp_direction, result.lamp_strength
-
-
-def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
-    """Find what belongs to an object, camera or sun that ISC made.
-
-    A copy of an object is found itself, with its own material, and with what it shares with the
-    original. Camera, world, scene and collection are None where they were deleted, or not appended
-    with the object.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object or None
-        Any object.
-
-    Returns
-    -------
-    BuiltObject or None
-        None for other objects, and where the object or its material was deleted.
-    """
-    if obj is None or not is_isc_datablock(obj):
-        return None
-    key = obj[KEY]
-    is_local_object = obj.get(ROLE) in (OBJECT, COPY) and obj.library is None
-    built = obj if is_local_object else find_tagged(bpy.data.objects, key, OBJECT)
-    material = None if built is None else find_material(built)
-    if built is None or material is None:
-        return None
-    return BuiltObject(
-        collection=find_tagged(bpy.data.collections, key, "collection")
-        or next(iter(built.users_collection), None),
-        object=built,
-        camera=find_tagged(bpy.data.objects, key, "camera"),
-        world=find_tagged(bpy.data.worlds, key, "world"),
-        scene=find_tagged(bpy.data.scenes, key, "scene") or next(iter(built.users_scene), None),
-        material=material,
-    )
-
-
-def why_not_built(obj: bpy.types.Object | None) -> str:
-    """Return why an object is none that operators of ISC can work on.
-
-    Parameters
-    ----------
-    obj : bpy.types.Object or None
-        Any object.
-
-    Returns
-    -------
-    str
-        What to do; "" where `find_built` finds one.
-    """
-    if find_built(obj) is not None:
-        return ""
-    if obj is not None and obj.library is not None and is_isc_datablock(obj):
-        return (
-            f"{obj.name} is linked from another file: make it local first (Object > Relations > "
-            "Make Local > All)"
-        )
-    return "Select an object created by ISC"
 
 
 def _choose_key(result: ResultArrays, options: BuildOptions, photo: bpy.types.Image | None) -> str:

@@ -11,8 +11,6 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from isc_core.photo.camera import Camera
-
 from ..datablocks.mesh import metres_per_pixel, to_blender
 from ..datablocks.provenance import datablock_name, find_tagged, tag
 from ..files.result_arrays import ResultArrays
@@ -20,25 +18,6 @@ from .collection import link_object
 
 _PHOTO = "isc_background"
 _SENSOR = 36.0  # millimetres: Blender's usual sensor
-
-
-def camera_of(result: ResultArrays) -> Camera | None:
-    """Return the photo's pinhole camera.
-
-    Parameters
-    ----------
-    result : ResultArrays
-        The result.
-
-    Returns
-    -------
-    Camera or None
-        Of the maps; None for an orthographic view.
-    """
-    if result.focal_length is None or result.principal_point is None:
-        return None
-    x, y = map(float, result.principal_point)
-    return Camera(result.focal_length, (x, y))
 
 
 def ensure_camera(

@@ -29,14 +29,8 @@ from isc_core.shading.spherical_harmonics import real_sh
 
 from ..datablocks.provenance import KEY, datablock_name
 from ..files.result_arrays import ResultArrays
-from .build import (
-    BuiltObject,
-    StagedObject,
-    key_of,
-    place_object,
-    require_placeable,
-    stage_object,
-)
+from .build import StagedObject, key_of, place_object, require_placeable, stage_object
+from .built_object import BuiltObject
 from .camera import eye_of
 from .preparation import BuildOptions, PreparedObject, prepare
 

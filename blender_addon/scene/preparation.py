@@ -24,12 +24,12 @@ from ..datablocks.images import (
 )
 from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arrays
 from ..files.result_arrays import ResultArrays
-from .body import body_geometry
+from ..materials.coated_surface import coated_surface, coded_normals
+from ..materials.material import SpecularSettings, SpecularSource
 from .camera import eye_of
-from .coated_surface import coated_surface, coded_normals
 from .displacement import displacement_map, flatten
 from .hand_edits import checksum_of
-from .material import SpecularSettings, SpecularSource
+from .solid_mesh import solid_geometry
 
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
@@ -212,7 +212,7 @@ def _geometry(result: ResultArrays, options: BuildOptions) -> tuple[MeshGeometry
         sheet = front_geometry(result, options.size_metres)
         return flatten(sheet, eye_of(result, options.size_metres)), result.normal_map
     if options.back:
-        return body_geometry(result, options.size_metres, options.back, options.triangles)
+        return solid_geometry(result, options.size_metres, options.back, options.triangles)
     return front_geometry(result, options.size_metres), result.normal_map
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from isc_core.errors import InputError
 
+from ..files.result_arrays import ARRAYS
 from .process import WorkerProcess
 
 Box = tuple[int, int, int, int]
@@ -209,7 +210,7 @@ def start_arrays(result: Path, environment: WorkerEnvironment) -> WorkerProcess:
     InputError
         If the worker cannot be started.
     """
-    return _start(["arrays", _absolute(result)], result / "arrays.npz", environment)
+    return _start(["arrays", _absolute(result)], result / ARRAYS, environment)
 
 
 def start_box_mask(

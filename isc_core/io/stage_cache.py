@@ -34,7 +34,7 @@ from .atomic import new_file
 from .npy import read_arrays
 from .source_stamp import source_stamp
 
-SUFFIX = ".npz"
+SUFFIX = ".npz"  # of the files in the folder; the Blender add-on limits their size
 _CHECK = "sha256"
 _PACKAGE = Path(__file__).resolve().parents[1]
 Arrays = Mapping[str, np.ndarray]

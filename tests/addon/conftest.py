@@ -23,7 +23,7 @@ def blender() -> Any:
 def addon(blender: Any) -> Iterator[Any]:
     """Blender with the add-on registered; no run is left behind."""
     import blender_addon
-    from blender_addon.operators.worker_run import cancel_active_run
+    from blender_addon.runs.active_run import cancel_active_run
 
     blender_addon.register()
     yield blender

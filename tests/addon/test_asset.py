@@ -10,7 +10,7 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.operators.asset import library_folder  # noqa: E402 (after the skip)
 from blender_addon.scene.asset import CATALOG  # noqa: E402
-from blender_addon.scene.build import BuiltObject, find_built  # noqa: E402
+from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 
 

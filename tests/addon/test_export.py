@@ -16,10 +16,11 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from benchmarks.blender.read_back import READERS, read_back, shown  # noqa: E402
 from blender_addon.files.result_arrays import read_result  # noqa: E402
+from blender_addon.materials.edit_nodes import dichromatic_node, surface_node  # noqa: E402
+from blender_addon.materials.material import shows_highlights  # noqa: E402
 from blender_addon.operators.export import export_object  # noqa: E402
-from blender_addon.scene.build import BuiltObject, build_object  # noqa: E402
-from blender_addon.scene.material import shows_highlights  # noqa: E402
-from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
+from blender_addon.scene.build import build_object  # noqa: E402
+from blender_addon.scene.built_object import BuiltObject  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from isc_core.evaluation.metrics import psnr  # noqa: E402

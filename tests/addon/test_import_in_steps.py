@@ -12,10 +12,10 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 from blender_addon.datablocks.images import DATA, SRGB, map_file, new_image, own_file  # noqa: E402
 from blender_addon.datablocks.staging import completed  # noqa: E402
 from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
+from blender_addon.materials.color_bake import ColorEdit, color_source, edited_file  # noqa: E402
+from blender_addon.materials.edit_nodes import dichromatic_node, surface_node  # noqa: E402
 from blender_addon.operators import live_edits  # noqa: E402
 from blender_addon.scene.build import build_object, place_object, stage_object  # noqa: E402
-from blender_addon.scene.color_bake import ColorEdit, color_source, edited_file  # noqa: E402
-from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
 from isc_core.io.png import decode_png  # noqa: E402
 

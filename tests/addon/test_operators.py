@@ -16,17 +16,18 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import operators  # noqa: E402
-from blender_addon.operators import request as requests  # noqa: E402
-from blender_addon.operators import run_steps, worker_run  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
 from blender_addon.operators.mask import box_from_corners  # noqa: E402
-from blender_addon.operators.messages import join_notes, sentence, translate_message  # noqa: E402
-from blender_addon.operators.photo_canvas import point_at  # noqa: E402
-from blender_addon.operators.request import parse_points, request_from_settings  # noqa: E402
+from blender_addon.operators.photo_operators import point_at  # noqa: E402
 from blender_addon.operators.result import ISC_OT_read_result  # noqa: E402
-from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
 from blender_addon.panels import read_notes, wrap_text  # noqa: E402
-from blender_addon.scene.build import find_built  # noqa: E402
+from blender_addon.runs import request as requests  # noqa: E402
+from blender_addon.runs import run_steps, worker_run  # noqa: E402
+from blender_addon.runs.active_run import begin_run  # noqa: E402
+from blender_addon.runs.messages import join_notes, sentence, translate_message  # noqa: E402
+from blender_addon.runs.request import parse_points, request_from_settings  # noqa: E402
+from blender_addon.runs.worker_run import WorkerRun  # noqa: E402
+from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402

@@ -17,13 +17,14 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 from mathutils import Vector  # noqa: E402 (after the skip)
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402
+from blender_addon.materials.color_bake import recolour_reflectance  # noqa: E402
+from blender_addon.materials.edit_nodes import dichromatic_node  # noqa: E402
+from blender_addon.materials.material import set_specular_gain  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
 from blender_addon.operators.export import export_object  # noqa: E402
-from blender_addon.scene.build import BuiltObject, build_object, find_built  # noqa: E402
-from blender_addon.scene.color_bake import recolour_reflectance  # noqa: E402
+from blender_addon.scene.build import build_object  # noqa: E402
+from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
 from blender_addon.scene.copies import objects_sharing_material  # noqa: E402
-from blender_addon.scene.material import set_specular_gain  # noqa: E402
-from blender_addon.scene.material_edits import dichromatic_node  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402

@@ -14,19 +14,17 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 import blender_addon  # noqa: E402 (after the skip)
 from blender_addon.files.image_source import ImageSource  # noqa: E402
-from blender_addon.operators import run_steps  # noqa: E402
 from blender_addon.operators.modal import WorkerOperator, advance_run  # noqa: E402
-from blender_addon.operators.request import MethodSettings  # noqa: E402
-from blender_addon.operators.run_steps import ResultPlace, decompose_steps, mask_steps  # noqa: E402
-from blender_addon.operators.worker_run import (  # noqa: E402
+from blender_addon.runs import run_steps  # noqa: E402
+from blender_addon.runs.active_run import active_run, begin_run, cancel_active_run  # noqa: E402
+from blender_addon.runs.request import MethodSettings  # noqa: E402
+from blender_addon.runs.run_steps import ResultPlace, decompose_steps, mask_steps  # noqa: E402
+from blender_addon.runs.worker_run import (  # noqa: E402
     ImportSteps,
     RunOutput,
     RunSteps,
     WorkerFailed,
     WorkerRun,
-    active_run,
-    begin_run,
-    cancel_active_run,
     follow_worker,
     remove_folder,
 )
@@ -505,9 +503,9 @@ def unregister_last():
     blender_addon.unregister()  # Blender 4.5 does not exit while an add-on is registered
 atexit.register(unregister_last)
 blender_addon.register()
-from blender_addon.operators.worker_run import RunOutput, WorkerRun, begin_run
-from blender_addon.operators.request import MethodSettings
-from blender_addon.operators.run_steps import ResultPlace, decompose_steps
+from blender_addon.runs.worker_run import RunOutput, WorkerRun, begin_run
+from blender_addon.runs.request import MethodSettings
+from blender_addon.runs.run_steps import ResultPlace, decompose_steps
 from blender_addon.files.image_source import ImageSource
 from blender_addon.worker.commands import WorkerEnvironment
 search, cache = Path({str(environment.search[0])!r}), Path({str(tmp_path / "cache")!r})

@@ -2,7 +2,7 @@
 
 import pytest
 
-from blender_addon.operators.messages import stage_text
+from blender_addon.runs.messages import stage_text
 from blender_addon.worker.pace import Pace
 from blender_addon.worker.process import WorkerUpdate
 

@@ -12,11 +12,11 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import panels  # noqa: E402 (after the skip)
 from blender_addon.files.image_source import ImageSource  # noqa: E402
-from blender_addon.operators import request, run_steps  # noqa: E402
-from blender_addon.operators.worker_run import WorkerFailed  # noqa: E402
-from blender_addon.scene.build import BuiltObject, find_built  # noqa: E402
-from blender_addon.scene.dichromatic import HIGHLIGHTS  # noqa: E402
-from blender_addon.scene.material_edits import dichromatic_node  # noqa: E402
+from blender_addon.materials.dichromatic import HIGHLIGHTS  # noqa: E402
+from blender_addon.materials.edit_nodes import dichromatic_node  # noqa: E402
+from blender_addon.runs import request, run_steps  # noqa: E402
+from blender_addon.runs.worker_run import WorkerFailed  # noqa: E402
+from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
 from blender_addon.settings import usage  # noqa: E402
 from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment  # noqa: E402
 from isc_core.decomposition.settings import (  # noqa: E402

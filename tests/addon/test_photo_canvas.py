@@ -11,10 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.operators.mask import ISC_OT_draw_box  # noqa: E402 (after the skip)
-from blender_addon.operators.photo_canvas import (  # noqa: E402
-    StrokeOnPhoto,
-    spread,
-)
+from blender_addon.operators.photo_operators import StrokeOnPhoto, spread  # noqa: E402
 
 SIZE = (200, 100)
 

@@ -12,10 +12,11 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402
+from blender_addon.materials.edit_nodes import dichromatic_node, surface_node  # noqa: E402
+from blender_addon.materials.material import shows_highlights  # noqa: E402
 from blender_addon.operators import live_edits  # noqa: E402
-from blender_addon.scene.build import BuiltObject, build_object  # noqa: E402
-from blender_addon.scene.material import shows_highlights  # noqa: E402
-from blender_addon.scene.material_edits import dichromatic_node, surface_node  # noqa: E402
+from blender_addon.scene.build import build_object  # noqa: E402
+from blender_addon.scene.built_object import BuiltObject  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.evaluation.metrics import psnr  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
@@ -176,7 +177,7 @@ def test_with_a_window_baking_waits_until_the_slider_rests(
 
 
 def test_a_saved_file_has_the_edits(built: BuiltObject, tmp_path: Path) -> None:
-    from blender_addon.scene.material_edits import apply_edits
+    from blender_addon.materials.material_edits import apply_edits
 
     node, surface = dichromatic_node(built.material), surface_node(built.material)
     assert node is not None and surface is not None

@@ -12,7 +12,8 @@ from mathutils import Euler, Vector  # noqa: E402 (after the skip)
 
 from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
 from blender_addon.operators.viewport import find_view, front_view, show  # noqa: E402
-from blender_addon.scene.build import build_object, find_built  # noqa: E402
+from blender_addon.scene.build import build_object  # noqa: E402
+from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.hand_edits import is_edited_by_hand  # noqa: E402
 from blender_addon.scene.placement import _sample, _winding_number  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402

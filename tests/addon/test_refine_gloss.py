@@ -12,9 +12,9 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.headless_command import _parser  # noqa: E402
-from blender_addon.operators import run_steps  # noqa: E402
 from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
-from blender_addon.operators.request import request_from_settings, stored_request  # noqa: E402
+from blender_addon.runs import run_steps  # noqa: E402
+from blender_addon.runs.request import request_from_settings, stored_request  # noqa: E402
 from blender_addon.worker.commands import DecomposeJob, start_decompose  # noqa: E402
 from blender_addon.worker.pace import Pace  # noqa: E402
 from blender_addon.worker.process import WorkerState, WorkerUpdate  # noqa: E402

@@ -12,11 +12,11 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402 (after the skip)
 from blender_addon.operators import decompose  # noqa: E402
-from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators.mask import mask_run  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
-from blender_addon.operators.request import request_from_settings  # noqa: E402
-from blender_addon.operators.worker_run import RunOutput  # noqa: E402
+from blender_addon.runs import request as requests  # noqa: E402
+from blender_addon.runs.request import request_from_settings  # noqa: E402
+from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.scene.build import build_object  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402

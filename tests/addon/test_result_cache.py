@@ -12,10 +12,10 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 from blender_addon.datablocks.staging import completed  # noqa: E402 (after the skip)
 from blender_addon.files.image_source import ImageSource  # noqa: E402
 from blender_addon.files.result_cache import ResultCache, content_key  # noqa: E402
-from blender_addon.operators import run_steps  # noqa: E402
-from blender_addon.operators.request import MethodSettings  # noqa: E402
-from blender_addon.operators.run_steps import ResultPlace, decompose_steps  # noqa: E402
-from blender_addon.operators.worker_run import RunOutput  # noqa: E402
+from blender_addon.runs import run_steps  # noqa: E402
+from blender_addon.runs.request import MethodSettings  # noqa: E402
+from blender_addon.runs.run_steps import ResultPlace, decompose_steps  # noqa: E402
+from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment  # noqa: E402
 from blender_addon.worker.process import WorkerState, WorkerUpdate  # noqa: E402
 

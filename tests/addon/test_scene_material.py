@@ -34,20 +34,20 @@ def build(result: ResultArrays, **options: Any) -> Any:
 
 
 def group_node(built: Any) -> Any:
-    from blender_addon.scene.material_edits import dichromatic_node
+    from blender_addon.materials.edit_nodes import dichromatic_node
 
     return dichromatic_node(built.material)
 
 
 def surface(built: Any) -> Any:
-    from blender_addon.scene.material_edits import surface_node
+    from blender_addon.materials.edit_nodes import surface_node
 
     return surface_node(built.material)
 
 
 def edit(built: Any, **values: float) -> None:
     """Set inputs of the node (`_` for spaces), and write them as a slider does."""
-    from blender_addon.scene.material_edits import bake_edits
+    from blender_addon.materials.material_edits import bake_edits
 
     for name, value in values.items():
         group_node(built).inputs[name.replace("_", " ")].default_value = value
@@ -143,7 +143,7 @@ def test_the_surface_is_the_diffuse_light_and_a_ggx_lobe(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     """The lobe is that of the fit; of the diffuse light it takes a share that grows sideways."""
-    from blender_addon.scene.coated_surface import coated_surface
+    from blender_addon.materials.coated_surface import coated_surface
 
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
     built = build(replace(result, specular_level=1.0, roughness=0.45))
@@ -213,7 +213,7 @@ def test_the_object_looks_as_without_a_specular_layer(
 def test_a_texture_of_any_resolution_is_under_the_layer_as_the_maps_are(
     result: ResultArrays, sharper: int
 ) -> None:
-    from blender_addon.scene.coated_surface import coated_surface
+    from blender_addon.materials.coated_surface import coated_surface
 
     layer, (rows, columns) = coated_surface(result).layer(1.0, 0.3), result.mask.shape
     assert layer is not None
@@ -242,7 +242,7 @@ def test_at_most_half_of_a_color_is_the_mirrored_environment(result: ResultArray
 
 
 def test_gloss_and_gains_are_numbers_on_the_surface(blender: Any, result: ResultArrays) -> None:
-    from blender_addon.scene.material_edits import specular_level
+    from blender_addon.materials.edit_nodes import specular_level
 
     built = build(replace(result, specular_level=0.8, roughness=0.4))
     inputs = surface(built).inputs
@@ -264,7 +264,8 @@ def test_gloss_and_gains_are_numbers_on_the_surface(blender: Any, result: Result
 def test_an_edited_color_is_an_image_and_an_unedited_one_the_original(
     blender: Any, result: ResultArrays
 ) -> None:
-    from blender_addon.scene.material_edits import EDITED, apply_edits
+    from blender_addon.materials.edit_nodes import EDITED
+    from blender_addon.materials.material_edits import apply_edits
 
     built = build(result)
     color = surface(built).inputs["Base Color"]
@@ -293,7 +294,7 @@ def test_the_base_color_follows_the_gloss(blender: Any, result: ResultArrays, va
     """It is that of an object whose fit has the edited gloss; with the fitted gloss again, it is
     what it was.
     """
-    from blender_addon.scene.material_edits import apply_edits
+    from blender_addon.materials.material_edits import apply_edits
 
     def fitted(level: float, roughness: float, name: str) -> Any:
         variation = 0.5 * result.confidence + 0.25 if varies else None
@@ -434,14 +435,14 @@ def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result
 def test_the_photos_highlights_are_visible_and_emit_no_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
-    from blender_addon.scene.material import set_specular_gain
+    from blender_addon.materials.material import set_specular_gain
 
     built = build(result, specular_from="image")
     set_specular_gain(built.material, 2.0)
     layers, here = render(built.scene, tmp_path), inside(result)
     shine = layers["Emission"] if "Emission" in layers else layers["Emit"]
     np.testing.assert_allclose(shine[here], 2 * result.specular[here], rtol=0.02, atol=2e-4)
-    from blender_addon.scene.dichromatic import highlights_group
+    from blender_addon.materials.dichromatic import highlights_group
 
     strength = next(node for node in highlights_group().nodes if node.type == "EMISSION").inputs[
         "Strength"
@@ -506,7 +507,7 @@ def test_gloss_is_that_of_the_fit_until_it_is_set_by_hand(
 def test_the_group_is_shared_and_other_versions_are_not_changed(
     blender: Any, result: ResultArrays
 ) -> None:
-    from blender_addon.scene.dichromatic import VERSION
+    from blender_addon.materials.dichromatic import VERSION
 
     first, second = build(result, name="one"), build(result, name="two")
     assert group_node(first).node_tree == group_node(second).node_tree

@@ -178,7 +178,7 @@ def test_halves_of_squares_become_quads_and_split_into_them_again(seed: int) -> 
 
 @pytest.mark.parametrize("back", ["flat", "rounded", "open"])
 def test_a_full_mesh_is_a_grid_of_quads(blender: Any, bump_folder: Path, back: str) -> None:
-    from blender_addon.scene.body import _solid
+    from blender_addon.scene.solid_mesh import _solid
 
     result = read_result(bump_folder)
     mesh = build(result, back=back, triangles=0).object.data

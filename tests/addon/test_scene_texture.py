@@ -49,8 +49,9 @@ def test_the_material_shows_the_fine_texture(blender: Any, fine: ResultArrays) -
 
 def test_the_photos_highlights_are_on_the_plain_texture(blender: Any, fine: ResultArrays) -> None:
     """The surface's own highlights, and its environment's, are on another one."""
-    from blender_addon.scene.material_edits import bake_edits, dichromatic_node
-    from blender_addon.scene.photo_highlights import hide_highlights, show_highlights
+    from blender_addon.materials.edit_nodes import dichromatic_node
+    from blender_addon.materials.material_edits import bake_edits
+    from blender_addon.materials.photo_highlights import hide_highlights, show_highlights
 
     glossy = replace(fine, specular_level=1.0, roughness=0.3)
     built = build(glossy, specular_from="image")
@@ -95,7 +96,8 @@ def test_building_again_with_maps_replaces_it(blender: Any, fine: ResultArrays) 
 
 
 def test_hue_is_edited_at_full_resolution(blender: Any, fine: ResultArrays) -> None:
-    from blender_addon.scene.material_edits import bake_edits, dichromatic_node
+    from blender_addon.materials.edit_nodes import dichromatic_node
+    from blender_addon.materials.material_edits import bake_edits
 
     built = build(fine, specular_from="lobe")
     node = dichromatic_node(built.material)

@@ -19,9 +19,9 @@ from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators import decompose as operators  # noqa: E402
 from blender_addon.operators import result  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
-from blender_addon.operators.request import request_from_settings  # noqa: E402
-from blender_addon.operators.worker_run import begin_run  # noqa: E402
-from blender_addon.scene.build import find_built  # noqa: E402
+from blender_addon.runs.active_run import begin_run  # noqa: E402
+from blender_addon.runs.request import request_from_settings  # noqa: E402
+from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.objects import place_objects, prepare_objects, stage_objects  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.result_files.object_folders import object_folders  # noqa: E402

@@ -125,7 +125,7 @@ def test_the_object_ends_where_the_cover_does(
 def test_exporters_keep_the_opacity(
     enabled: Any, soft: ResultArrays, tmp_path: Path, kind: str, edited: bool
 ) -> None:
-    from blender_addon.scene.material_edits import dichromatic_node
+    from blender_addon.materials.edit_nodes import dichromatic_node
 
     bpy, built = enabled, build(soft)
     if edited:

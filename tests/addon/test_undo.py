@@ -30,7 +30,7 @@ def require_no_dangling_image(blender: Any) -> None:
 
 
 def edits(blender: Any) -> Any:
-    from blender_addon.scene.material_edits import dichromatic_node
+    from blender_addon.materials.edit_nodes import dichromatic_node
 
     node: Any = dichromatic_node(material(blender))
     return node.inputs
@@ -47,9 +47,9 @@ def shown_edits(blender: Any) -> str:
 def test_undo_in_any_order_frees_no_image_that_is_used(
     addon: Any, result: ResultArrays, monkeypatch: pytest.MonkeyPatch, seed: int
 ) -> None:
+    from blender_addon.materials.material_edits import apply_edits, bake_edits, color_state
     from blender_addon.operators import live_edits
     from blender_addon.scene import BuildOptions, build_object
-    from blender_addon.scene.material_edits import apply_edits, bake_edits, color_state
 
     # As in a window, where colours come later.
     monkeypatch.setattr(live_edits, "settle_edits", apply_edits)

@@ -15,7 +15,7 @@ import bpy
 
 from ..datablocks.nodes import add_node, connect
 from .dichromatic import HIGHLIGHTS, highlights_group
-from .material_edits import dichromatic_node, surface_node
+from .edit_nodes import dichromatic_node, surface_node
 
 IMAGE, _SEEN = "isc_highlights", "isc_highlights_seen"
 _SUM, _TEXTURE = "Photo Highlights", "Highlights of the Photo"

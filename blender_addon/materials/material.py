@@ -14,19 +14,9 @@ from ..datablocks.mesh import UV
 from ..datablocks.nodes import add_node, connect, node_tree
 from ..datablocks.provenance import datablock_name, find_tagged, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
-from .material_edits import (
-    BASE_COLOR,
-    FITTED_GLOSS,
-    LEVEL_FACTOR,
-    OWN_LEVEL,
-    SURFACE,
-    GlossBasis,
-    bake_edits,
-    begin_bake,
-    dichromatic_node,
-    forget_edits,
-    remember_base_colors,
-)
+from .edit_nodes import BASE_COLOR, LEVEL_FACTOR, OWN_LEVEL, SURFACE, dichromatic_node
+from .gloss_edits import FITTED_GLOSS, GlossBasis, remember_base_colors
+from .material_edits import bake_edits, begin_bake, forget_edits
 from .photo_highlights import show_highlights
 
 SpecularSource = Literal["lobe", "image", "none"]

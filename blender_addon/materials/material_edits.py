@@ -24,10 +24,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from isc_core.lobe_fitting.specular_layer import MOST
-from isc_core.shading.brdf.ggx import F0
-
-from ..datablocks.images import ImageFile, image_name, new_image, own_file
+from ..datablocks.images import ImageFile, image_name, new_image
 from ..datablocks.nodes import add_node
 from ..datablocks.provenance import KEY, ROLE, all_tagged, tag
 from .color_bake import (
@@ -39,108 +36,20 @@ from .color_bake import (
     edited_file,
     recolour_reflectance,
 )
-from .dichromatic import DICHROMATIC, HIGHLIGHTS
-
-SURFACE, BASE_COLOR, EDITED, LEVEL_FACTOR = (
-    "Principled BSDF",
-    "Base Color",
-    "Edited Base Color",
-    "Specular Level",
+from .dichromatic import HIGHLIGHTS
+from .edit_nodes import BASE_COLOR, EDITED, dichromatic_node, refraction, surface_node
+from .gloss_edits import (
+    choose_base_color,
+    current_gloss,
+    edited_gloss,
+    gloss_edit,
+    plain_base_color,
 )
-PLASTIC = 0.5  # Blender's own level of the BSDF for plastic
-# With exactly .5, its glTF exporter leaves out the index of refraction.
-OWN_LEVEL = 0.499
+
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
-_UNDER_LAYER, _PLAIN = "isc_base_color", "isc_plain_base_color"
-_NORMALS, _LIGHT, _VARIATION = "isc_normals", "isc_light", "isc_variation"
-FITTED_GLOSS = "isc_fitted_gloss"  # of a material: level and roughness that `_UNDER_LAYER` is for
 _FORMER = "Specular Share"
 _GLOSS_MARK = "\n"  # before the gloss in the text of a state
 _EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
-
-
-def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Find the node of the group "ISC Dichromatic", of any version, in a material.
-
-    Parameters
-    ----------
-    material : bpy.types.Material
-        The material.
-
-    Returns
-    -------
-    bpy.types.Node or None
-        The node.
-    """
-    nodes = material.node_tree.nodes if material.node_tree else ()
-    groups = (node for node in nodes if node.type == "GROUP" and node.node_tree)
-    return next((node for node in groups if node.node_tree.get("isc_group") == DICHROMATIC), None)
-
-
-def surface_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """Find the Principled BSDF that the edits of a material are written to.
-
-    Parameters
-    ----------
-    material : bpy.types.Material
-        The material.
-
-    Returns
-    -------
-    bpy.types.Node or None
-        None for materials of earlier versions, whose group is the whole surface.
-    """
-    group = dichromatic_node(material)
-    if group is None or "Gloss Gain" not in group.inputs:
-        return None
-    node = material.node_tree.nodes.get(SURFACE)
-    return node if node is not None and node.type == "BSDF_PRINCIPLED" else None
-
-
-@dataclass(frozen=True)
-class GlossBasis:
-    """What the base colour under another gloss than the fitted one follows from.
-
-    Attributes
-    ----------
-    plain : bpy.types.Image
-        Base colour without a specular layer above.
-    normals : bpy.types.Image
-        Coded normals, see `coated_surface`.
-    light : list of float
-        Numbers of the `RecoveredLight`.
-    variation : bpy.types.Image or None
-        Spatial factor of the specular level.
-    """
-
-    plain: bpy.types.Image
-    normals: bpy.types.Image
-    light: list[float]
-    variation: bpy.types.Image | None = None
-
-
-def remember_base_colors(
-    material: bpy.types.Material, under_layer: bpy.types.Image, basis: GlossBasis | None
-) -> None:
-    """Store the two base colours of a material, and what others follow from: `apply_edits` shows
-    the right one.
-
-    Parameters
-    ----------
-    material : bpy.types.Material
-        A local material of ISC.
-    under_layer : bpy.types.Image
-        Under its fitted specular layer.
-    basis : GlossBasis or None
-        None if it has no such layer.
-    """
-    for name in (_UNDER_LAYER, _PLAIN, _NORMALS, _LIGHT, _VARIATION):
-        material.pop(name, None)
-    if basis is not None:
-        material[_UNDER_LAYER], material[_PLAIN] = under_layer, basis.plain
-        material[_NORMALS], material[_LIGHT] = basis.normals, basis.light
-        if basis.variation is not None:
-            material[_VARIATION] = basis.variation
 
 
 def apply_edits(material: bpy.types.Material) -> bool:
@@ -161,7 +70,7 @@ def apply_edits(material: bpy.types.Material) -> bool:
         return False
     _write_numbers(material, surface, group.inputs)
     _pass_gain(group)
-    _choose_base_color(material, group)
+    choose_base_color(material, group)
     state, shown = _color_state(material, group), material.get(_COLOR)
     if state == shown:
         return False
@@ -247,13 +156,13 @@ def begin_bake(material: bpy.types.Material) -> PendingBake | None:
         return None
     tree, edit, target = material.node_tree, _color_edit(group.inputs), surface.inputs["Base Color"]
     source, state = group.inputs["Base Color"], _color_state(material, group)
-    gloss = _gloss_edit(material, group)
+    gloss = gloss_edit(material, group)
     if not source.is_linked:
         color = recolour_reflectance(np.array(source.default_value[:3]), *edit.values)
         tree.links.remove(target.links[0])
         target.default_value = (*np.clip(color, 0, 1), 1.0)
     elif gloss is not None:
-        return PendingBake(state, color_source(material[_PLAIN]), edit, gloss)
+        return PendingBake(state, color_source(plain_base_color(material)), edit, gloss)
     elif not edit.changes_nothing:
         return PendingBake(state, color_source(source.links[0].from_node.image), edit)
     else:
@@ -347,55 +256,6 @@ def forget_edits(material: bpy.types.Material) -> None:
         _replace_image(node, None)
 
 
-def refraction(level: float) -> float:
-    """Return the index of refraction of a specular level.
-
-    Parameters
-    ----------
-    level : float
-        0 or more; 1 is plastic.
-
-    Returns
-    -------
-    float
-        1 or more.
-    """
-    amplitude = min(F0 * level, MOST) ** 0.5
-    return float((1 + amplitude) / (1 - amplitude))
-
-
-def specular_level(surface: Any) -> float:
-    """Return the specular level of a Principled BSDF, from its index of refraction.
-
-    Parameters
-    ----------
-    surface : bpy.types.ShaderNodeBsdfPrincipled
-        The BSDF; its own level, or its factor, is 0.5 for plastic.
-
-    Returns
-    -------
-    float
-        1 is plastic; without the spatial variation.
-    """
-    index = surface.inputs["IOR"].default_value
-    level = surface.inputs["Specular IOR Level"]
-    factor = OWN_LEVEL if level.is_linked else level.default_value
-    return float(((index - 1) / (index + 1)) ** 2 / F0 * factor / PLASTIC)
-
-
-def _choose_base_color(material: bpy.types.Material, group: bpy.types.Node) -> None:
-    """Without highlights of its own, the surface has the base colour without a layer above; images
-    that the user has put in their place stay.
-    """
-    under, plain = material.get(_UNDER_LAYER), material.get(_PLAIN)
-    node = group.id_data.nodes.get(BASE_COLOR)
-    if under is None or plain is None or node is None or node.type != "TEX_IMAGE":
-        return
-    wanted = under if _gloss(group.inputs)[0] > 0 else plain
-    if node.image in (under, plain) and node.image != wanted:
-        node.image = wanted
-
-
 def _color_edit(inputs: Any) -> ColorEdit:
     hue, saturation, value, gain, shown = (
         float(inputs[name].default_value)
@@ -414,7 +274,7 @@ def _color_state(material: bpy.types.Material, group: bpy.types.Node) -> str:
     else:
         image = getattr(source.links[0].from_node, "image", None)
         base = image.name if image is not None else "nodes"
-    gloss = _edited_gloss(material, group)
+    gloss = edited_gloss(material, group)
     parts = (_color_edit(group.inputs).values, () if gloss is None else gloss)
     colors, above = (" ".join(f"{value:.6f}" for value in part) for part in parts)
     return f"{colors} {base}" + (_GLOSS_MARK + above if above else "")
@@ -424,49 +284,9 @@ def _without_gloss(state: str) -> str:
     return state.partition(_GLOSS_MARK)[0]
 
 
-def _edited_gloss(
-    material: bpy.types.Material, group: bpy.types.Node
-) -> tuple[float, float] | None:
-    """Edited level and roughness, where the base colour has to follow the edit."""
-    source, fitted = group.inputs["Base Color"], material.get(FITTED_GLOSS)
-    images = [material.get(name) for name in (_UNDER_LAYER, _PLAIN, _NORMALS)]
-    if not source.is_linked or fitted is None or None in images:
-        return None
-    if getattr(source.links[0].from_node, "image", None) != images[0]:
-        return None
-    edited = _gloss(group.inputs)
-    is_as_fitted = np.abs(np.subtract(list(fitted), edited)).max() <= UNCHANGED
-    return None if is_as_fitted else edited
-
-
-def _gloss_edit(material: bpy.types.Material, group: bpy.types.Node) -> GlossEdit | None:
-    """None also where the user has painted on the base colour."""
-    gloss = _edited_gloss(material, group)
-    if gloss is None or not own_file(material[_UNDER_LAYER]):
-        return None
-    normals, variation = own_file(material[_NORMALS]), material.get(_VARIATION)
-    varies = b"" if variation is None else own_file(variation)
-    return GlossEdit(*gloss, normals, tuple(material[_LIGHT]), varies) if normals else None
-
-
-def _gloss(inputs: Any) -> tuple[float, float]:
-    """Level and roughness with all edits; no level while the photo's highlights are shown."""
-    level, gain, roughness, gloss, shown = (
-        float(inputs[name].default_value)
-        for name in (
-            "Specular Level",
-            "Specular Gain",
-            "Roughness",
-            "Gloss Gain",
-            "Photo Highlights",
-        )
-    )
-    return level * gain * (1 - shown), min(1.0, roughness / max(gloss, 1e-3))
-
-
 def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> None:
     """Write what has changed since the last time: the BSDF's own fields can be edited, too."""
-    level, roughness = _gloss(inputs)
+    level, roughness = current_gloss(inputs)
     wanted = [refraction(level), roughness]
     written = material.get(_NUMBERS)
     if written is None or abs(written[0] - wanted[0]) > UNCHANGED:

@@ -14,10 +14,9 @@ from isc_core.shading.perspective import view_directions
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
 from ..datablocks.quads import joined_squares
 from ..files.result_arrays import ResultArrays
-from .camera import camera_of
 
 
-def body_geometry(
+def solid_geometry(
     result: ResultArrays, size_metres: float, back: str, triangles: int
 ) -> tuple[MeshGeometry, np.ndarray]:
     """Return the mesh of a body, and its normal map; this may run in another thread.
@@ -62,7 +61,7 @@ def body_geometry(
 
 def _solid(result: ResultArrays, back: str, triangles: int) -> Solid:
     """The mesh in pixels."""
-    camera, (height, width) = camera_of(result), result.mask.shape
+    camera, (height, width) = result.camera, result.mask.shape
     view = np.array([0.0, 0.0, 1.0])
     if camera is not None:
         view = view_directions(camera, (height, width))
@@ -88,7 +87,7 @@ def _heights(result: ResultArrays) -> np.ndarray:
 
 def _placed(result: ResultArrays, solid: Solid) -> np.ndarray:
     """(V, 3): the vertices in pixels, camera frame, the mesh's origin at 0."""
-    (row, column), heights, camera = solid.mesh.places.T, solid.mesh.heights, camera_of(result)
+    (row, column), heights, camera = solid.mesh.places.T, solid.mesh.heights, result.camera
     if result.eye is None or camera is None:
         return np.stack([column - result.origin[0], result.origin[1] - row, heights], -1)
     eye = result.eye.astype(np.float64) / result.metres_per_pixel

@@ -25,7 +25,6 @@ from isc_core.shading.perspective import view_directions
 from isc_core.shading.spherical_harmonics import real_sh
 
 from ..files.result_arrays import ResultArrays
-from .camera import camera_of
 
 _COEFFICIENTS = 27  # of the illumination
 
@@ -105,7 +104,7 @@ def recovered_light(result: ResultArrays) -> RecoveredLight:
     RecoveredLight
     """
     environment = resampled(result.environment_map.astype(float), ENVIRONMENT_ROWS)
-    return RecoveredLight(environment, result.mesh_illumination, camera_of(result))
+    return RecoveredLight(environment, result.mesh_illumination, result.camera)
 
 
 def coated_surface(result: ResultArrays) -> CoatedSurface:

@@ -1,0 +1,95 @@
+"""An object and what belongs to it, found again in any file by the custom properties of ISC."""
+
+from dataclasses import dataclass
+
+import bpy
+
+from ..datablocks.provenance import KEY, ROLE, find_tagged, is_isc_datablock
+from .copies import COPY, OBJECT, find_material
+
+
+@dataclass(frozen=True)
+class BuiltObject:
+    """An object and what belongs to it.
+
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        Collection of everything built of the photo.
+    object : bpy.types.Object
+        The object.
+    camera : bpy.types.Object or None
+        The photo's camera.
+    world : bpy.types.World
+        The recovered light; a shared scene uses it only if requested.
+    scene : bpy.types.Scene
+        Scene of the object.
+    material : bpy.types.Material
+        Material of the object.
+    """
+
+    collection: bpy.types.Collection
+    object: bpy.types.Object
+    camera: bpy.types.Object | None
+    world: bpy.types.World
+    scene: bpy.types.Scene
+    material: bpy.types.Material
+
+
+def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
+    """Find what belongs to an object, camera or sun that ISC made.
+
+    A copy of an object is found itself, with its own material, and with what it shares with the
+    original. Camera, world, scene and collection are None where they were deleted, or not appended
+    with the object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object or None
+        Any object.
+
+    Returns
+    -------
+    BuiltObject or None
+        None for other objects, and where the object or its material was deleted.
+    """
+    if obj is None or not is_isc_datablock(obj):
+        return None
+    key = obj[KEY]
+    is_local_object = obj.get(ROLE) in (OBJECT, COPY) and obj.library is None
+    built = obj if is_local_object else find_tagged(bpy.data.objects, key, OBJECT)
+    material = None if built is None else find_material(built)
+    if built is None or material is None:
+        return None
+    return BuiltObject(
+        collection=find_tagged(bpy.data.collections, key, "collection")
+        or next(iter(built.users_collection), None),
+        object=built,
+        camera=find_tagged(bpy.data.objects, key, "camera"),
+        world=find_tagged(bpy.data.worlds, key, "world"),
+        scene=find_tagged(bpy.data.scenes, key, "scene") or next(iter(built.users_scene), None),
+        material=material,
+    )
+
+
+def why_not_built(obj: bpy.types.Object | None) -> str:
+    """Return why an object is none that operators of ISC can work on.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object or None
+        Any object.
+
+    Returns
+    -------
+    str
+        What to do; "" where `find_built` finds one.
+    """
+    if find_built(obj) is not None:
+        return ""
+    if obj is not None and obj.library is not None and is_isc_datablock(obj):
+        return (
+            f"{obj.name} is linked from another file: make it local first (Object > Relations > "
+            "Make Local > All)"
+        )
+    return "Select an object created by ISC"
