@@ -11,7 +11,7 @@ _PHOTO = "isc.photo_as_object"
 
 
 class ISC_MT_object(bpy.types.Menu):
-    """What is in the panels, for the search."""
+    """The operators of the panels, for the search."""
 
     bl_idname = "ISC_MT_object"
     bl_label = "ISC"
@@ -66,7 +66,7 @@ def _draw_add(menu: Any, context: Any) -> None:
 
 
 def _draw_image(menu: Any, context: Any) -> None:
-    """The image that the editor shows is the photo."""
+    """Offer the image in the editor as the photo."""
     image = context.space_data.image
     menu.layout.separator()
     row = menu.layout.row()

@@ -22,7 +22,7 @@ from .scene.build import LIGHT_AND_CAMERA
 from .scene.built_object import BuiltObject, find_built
 from .scene.collection import find_layer_collection
 from .scene.copies import objects_sharing_material
-from .settings.usage import why_unused
+from .settings.usage import unused_reason
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
 _COLOR_EDITS = ("Hue", "Saturation", "Value")
@@ -36,7 +36,7 @@ _LINE_LENGTH = 34  # characters that fit into a sidebar of default width
 
 
 class _Panel:
-    """What all panels share."""
+    """Base class of the panels."""
 
     bl_region_type = "UI"
     bl_category = "ISC"
@@ -115,7 +115,7 @@ class _Highlights(_Panel):
         self.layout.label(text="Remove Highlights")
         draw_settings(self.layout.column(), settings, "highlight_odds", text="")
         row = self.layout.row(align=True)
-        row.enabled = not why_unused(settings, "highlights")
+        row.enabled = not unused_reason(settings, "highlights")
         row.operator("isc.mark_highlight", icon="ADD").reject = False
         row.operator("isc.mark_highlight", text="Mark as Print", icon="REMOVE").reject = True
         draw_settings(self.property_column(), settings, "highlights", "not_highlights")
@@ -132,7 +132,7 @@ class _Method(_Panel):
         """Draw the settings of how the object is recovered."""
         settings, column = context.scene.isc, self.property_column()
         draw_settings(column, settings, "model", "separator", "illumination", "light_color")
-        if settings.light_color == "custom" and not why_unused(settings, "light_color"):
+        if settings.light_color == "custom" and not unused_reason(settings, "light_color"):
             column.prop(settings, "custom_light_color")
         column.prop(settings, "camera")
         if settings.camera == "focal_length":
@@ -187,7 +187,7 @@ class _Edit(_Panel):
         column.label(text="Light", icon="LIGHT_SUN")
         for light, text in (("OPTIMAL", "Estimated Sun"), ("CHOSEN", "Sun from the Side")):
             column.operator("isc.relight", text=text).light = light
-        # Elsewhere than in the world of the photo, all that this can do is to take the sun away.
+        # In another world than the photo's, the button can only remove the sun.
         recovered = built.world is not None and context.scene.world == built.world
         text = "Recovered Light" if recovered else "Remove Sun"
         row = column.row(align=True)
@@ -206,7 +206,7 @@ class _Edit(_Panel):
     def _draw_material(self, built: BuiltObject) -> None:
         node = dichromatic_node(built.material)
         if node is None:
-            self.layout.label(text="Material lacks node ISC Dichromatic", icon="INFO")
+            self.layout.label(text="The node ISC Dichromatic is missing", icon="INFO")
             return
         # The sliders would change all of them, and drawing a panel may change nothing.
         if objects_sharing_material(built.object, built.material):
@@ -255,7 +255,7 @@ def draw_settings(column: Any, settings: Any, *names: str, **label: str) -> None
     """
     reason = ""
     for name in names:
-        previous, reason = reason, why_unused(settings, name)
+        previous, reason = reason, unused_reason(settings, name)
         if previous and previous != reason:
             column.label(text=previous, icon="INFO")
         row = column.row()
@@ -297,7 +297,7 @@ def _draw_thumbnail(layout: Any, settings: Any) -> None:
 
 
 def _draw_outcome(layout: Any, context: Any) -> None:
-    """Draw the outcome of the last run: a line, what helps, and the details folded."""
+    """Draw the outcome of the last run: a line, remedies, and the details in a closed subpanel."""
     shown = context.window_manager.isc
     icons = {str(state): icon for state, icon in _STATE_ICONS.items()}
     if shown.state not in icons or not shown.message:

@@ -41,7 +41,7 @@ MAPS = {
 }
 
 
-# What materials and exports need; the others are for those who want them.
+# Maps that materials and exports need; the others are optional.
 USED_MAPS = ("specular", "height", "mask")
 
 
@@ -81,9 +81,9 @@ class ImageFile:
     is_png : bool
         Whether it is PNG.
     alpha_is_data : bool
-        Whether alpha is a channel like the others, and no opacity.
+        Whether alpha is a data channel and not opacity.
     checksum : str
-        CRC-32 of the data, hexadecimal: numbers of Blender have a sign.
+        CRC-32 of the data, hexadecimal, as Blender's integer properties are signed.
     """
 
     data: bytes
@@ -93,7 +93,7 @@ class ImageFile:
     checksum: str = field(init=False)
 
     def __post_init__(self) -> None:
-        # Here, as files are made in threads: of a large map it takes as long as packing it.
+        # Computed here, in the thread that encodes: it takes as long as packing a large map.
         object.__setattr__(self, "checksum", f"{zlib.crc32(self.data):08x}")
 
 
@@ -202,8 +202,8 @@ def new_image(file: ImageFile) -> bpy.types.Image:
     return image
 
 
-def own_file(image: bpy.types.Image) -> bytes:
-    """Return the file of an image, if `new_image` made it and it has not been painted on.
+def unmodified_file(image: bpy.types.Image) -> bytes:
+    """Return the packed file of an image made by `new_image` that has not been painted on.
 
     Parameters
     ----------
@@ -221,8 +221,8 @@ def own_file(image: bpy.types.Image) -> bytes:
     return data if f"{zlib.crc32(data):08x}" == image[_CHECKSUM] else b""
 
 
-def put_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
-    """Name and tag an image, which replaces the one of that role everywhere it is used.
+def replace_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
+    """Name and tag an image, and replace the previous one of that role everywhere.
 
     A generated image loses its pixels when resized in place, so it is replaced instead.
 
@@ -255,7 +255,7 @@ def image_name(key: str, role: str) -> str:
     Parameters
     ----------
     key, role : str
-        As of `put_image`.
+        As of `replace_image`.
 
     Returns
     -------

@@ -48,7 +48,7 @@ class MeshGeometry:
 
 @dataclass(frozen=True)
 class MeshArrays:
-    """A mesh as Blender stores it, so that filling one takes milliseconds.
+    """A mesh in the layout of Blender's attributes, so that it is filled in milliseconds.
 
     Attributes
     ----------
@@ -215,7 +215,7 @@ def fill_mesh(mesh: bpy.types.Mesh, arrays: MeshArrays) -> None:
 
 
 def replace_mesh(old: bpy.types.Mesh, new: bpy.types.Mesh) -> None:
-    """Put a mesh in the place of another one, which is removed, in all of its objects.
+    """Replace a mesh in all of its objects by another one, and remove it.
 
     Parameters
     ----------

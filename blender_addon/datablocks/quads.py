@@ -1,7 +1,7 @@
-"""Triangles over a grid joined in squares, so that a mesh can be subdivided and its loops selected.
+"""Triangles on a grid joined into quads, so that a mesh can be subdivided and edge loops selected.
 
 Problem: a height map as few triangles bisects right isosceles triangles. Two that share their
-hypotenuse are a square of the grid, of which artists and subdivision expect one face.
+hypotenuse form a square of the grid, for which artists and subdivision expect one face.
 
 Method: a triangle whose shorter sides are equal and at a right angle, in the plane of the grid, is
 joined with the one beyond its hypotenuse if that is alike. The quad begins at an end of the
@@ -14,11 +14,11 @@ diagonal. Triangles of another size across the hypotenuse, and along the outline
 
 import numpy as np
 
-_CLOSE = 1e-6  # in the unit of the places, squared
+_CLOSE = 1e-6  # squared, in the unit of the positions
 
 
-def joined_squares(faces: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Join pairs of triangles that are squares of a grid.
+def joined_quads(faces: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Join pairs of triangles that form squares of a grid.
 
     Parameters
     ----------

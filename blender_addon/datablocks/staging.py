@@ -1,9 +1,9 @@
-"""New images and a new mesh that nothing uses yet, made in short steps.
+"""New images and a new mesh without users, created in short steps.
 
-The window lives on between two steps. An undo may take away what was made since the last undo step,
-and loading a file all of it; references from Python would then be invalid. Datablocks are therefore
-known by Blender's number for them (`session_uid`), which is the same after an undo and is not used
-again.
+The window stays responsive between two steps. An undo may remove what was created since the last
+undo step, and loading a file removes everything; Python references would then be invalid.
+Datablocks are therefore identified by their `session_uid`, which is the same after an undo and is
+not reused.
 """
 
 from collections.abc import Generator, Mapping
@@ -25,22 +25,22 @@ class StagedBlocks:
     Attributes
     ----------
     images : dict of str to int
-        Numbers of the images, by role.
+        `session_uid` of the images, by role.
     mesh : int
-        Number of the mesh; 0 before it is made.
+        `session_uid` of the mesh; 0 before it is created.
     """
 
     images: dict[str, int] = field(default_factory=dict)
     mesh: int = 0
 
     @property
-    def are_there(self) -> bool:
+    def exist(self) -> bool:
         """Whether Blender still has all of them."""
         present = {block.session_uid for block in (*bpy.data.images, *bpy.data.meshes)}
         return present.issuperset((*self.images.values(), self.mesh))
 
     def take_image(self, role: str) -> bpy.types.Image | None:
-        """Return an image, which is then no longer one of these.
+        """Hand over an image, which is then no longer one of these.
 
         Parameters
         ----------
@@ -55,7 +55,7 @@ class StagedBlocks:
         return _find(bpy.data.images, self.images.pop(role, 0))
 
     def take_mesh(self) -> bpy.types.Mesh:
-        """Return the mesh, which is then no longer one of these.
+        """Hand over the mesh, which is then no longer one of these.
 
         Returns
         -------
@@ -66,7 +66,7 @@ class StagedBlocks:
         return _find(bpy.data.meshes, number)
 
     def discard(self) -> None:
-        """Remove what was not taken."""
+        """Remove the datablocks that were not handed over."""
         for blocks, number in (
             *((bpy.data.images, number) for number in self.images.values()),
             (bpy.data.meshes, self.mesh),
@@ -80,7 +80,7 @@ class StagedBlocks:
 def stage(
     files: Mapping[str, ImageFile], arrays: MeshArrays, base: int = 0
 ) -> Generator[None, None, StagedBlocks]:
-    """Make images and a mesh, one datablock a step; if closed before the end, remove them.
+    """Create images and a mesh, one datablock per step; removes them if closed early.
 
     Parameters
     ----------
@@ -89,12 +89,12 @@ def stage(
     arrays : MeshArrays
         The mesh.
     base : int, optional
-        Number of a mesh whose materials and properties the new one has; 0 for none.
+        `session_uid` of a mesh whose materials and properties are copied; 0 for none.
 
     Returns
     -------
     StagedBlocks
-        The datablocks. Some are missing if an undo took them away in the meantime.
+        The datablocks. Some are missing if an undo removed them in the meantime.
     """
     blocks, complete = StagedBlocks(), False
     try:
@@ -112,8 +112,8 @@ def stage(
             blocks.discard()
 
 
-def completed(steps: Generator[Any, None, Outcome]) -> Outcome:
-    """Make all steps at once, where no window waits.
+def run_to_end(steps: Generator[Any, None, Outcome]) -> Outcome:
+    """Run all steps at once, where no window would be blocked.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """How a Blender image can be handed to the worker, decided before any of its pixels are read.
 
-Problem: an image datablock may be a file, packed, generated, or painted and never saved; of 8 bits
+Problem: an image datablock may be a file, packed, generated, or painted and unsaved; with 8 bits
 or float; in any colour space. The worker reads files. An image that equals its file is handed over
 as that file, which keeps 16 bits and the file's own colour coding. All others leave Blender as
 pixels (see `image_export`).

@@ -73,7 +73,7 @@ _OPTIONAL, _MAY_BE_NAN = (
     {"specular_variation", "texture", "cover", "soft", "alpha", *_CAMERA, *_LAMPS},
     {"roughness", "specular_level"},
 )
-_MOST_LAMPS = 3
+_MAX_LAMPS = 3
 # Names that earlier versions wrote.
 _FORMER_NAMES = {"environment_map": "sky"}
 
@@ -312,7 +312,7 @@ def _check_arrays(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
     if camera and (len(camera) < len(_CAMERA) or not values["focal_length"] > 0):
         raise InputError(f"{path} is damaged (half a camera): decompose the photo again")
     lamps = [name for name in _LAMPS if name in values]
-    if lamps and (len(lamps) < len(_LAMPS) or sizes["lamps"] > _MOST_LAMPS):
+    if lamps and (len(lamps) < len(_LAMPS) or sizes["lamps"] > _MAX_LAMPS):
         raise InputError(f"{path} is damaged (lamps): decompose the photo again")
     faces, (rows, columns) = values["faces"], values["vertex_pixel"].T
     outside = faces.min() < 0 or faces.max() >= sizes["V"] or min(rows.min(), columns.min()) < 0

@@ -1,20 +1,21 @@
-"""Results of earlier runs, and of stages of runs, found again by what they were made of.
+"""A cache of results of earlier runs, keyed by the content that they depend on.
 
-A result is kept in a folder whose name is a SHA-256 of everything that it depends on: the content
-of photo and mask, the settings, and the files of `isc_core`. What is built of it in Blender does
-not count, nor do names and places of files: Blender packs them.
+A result is stored in a folder whose name is a SHA-256 of everything that it depends on: the content
+of photo and mask, the settings, and the files of `isc_core`. What is built from it in Blender is
+not part of the key, nor are names and paths of files, as Blender packs them.
 
 The worker writes a result under its final name complete or not at all. One that cannot be read is
-removed, and made again. When the folder grows above its limit, the results that were not used for
-the longest time go first.
+removed and recomputed. If the folder exceeds its limit, the least recently used results are
+removed.
 
-The worker keeps in the same folder what does not depend on model and separator, in files of its own
-(`isc_core.io.stage_cache`). They count toward the limit, and are removed like results.
+The worker stores results of stages that do not depend on model and separator in the same folder, in
+files of its own (`isc_core.io.stage_cache`). They count toward the limit, and are removed like
+results.
 
 Citation: FIPS 180-4, Secure Hash Standard, 2015.
 
 Limits: the hash of `isc_core` is of names, sizes and dates of its files, not of their content. A
-result that is larger than the limit is kept until the next one is made.
+result that is larger than the limit stays until the next one is added.
 """
 
 import contextlib
@@ -49,7 +50,7 @@ class ResultCache:
     limit: int
 
     def place(self, key: str) -> Path:
-        """Return where the result of a key is, or belongs.
+        """Return the folder of a key's result, which need not exist.
 
         Parameters
         ----------
@@ -64,7 +65,7 @@ class ResultCache:
         return self.folder / key
 
     def read(self, key: str) -> ResultArrays | None:
-        """Read a result, and note that it was used.
+        """Read a result, and mark it as used.
 
         Parameters
         ----------
@@ -84,12 +85,12 @@ class ResultCache:
         except InputError:
             shutil.rmtree(place, ignore_errors=True)
             return None
-        with contextlib.suppress(OSError):  # a cache of somebody else's can still be read
+        with contextlib.suppress(OSError):  # a read-only cache can still be used
             os.utime(place)
         return result
 
-    def take(self, key: str, made: Path) -> None:
-        """Move what was made into the cache, completely or not at all.
+    def store(self, key: str, made: Path) -> None:
+        """Move a folder into the cache, completely or not at all.
 
         Parameters
         ----------
@@ -114,7 +115,7 @@ class ResultCache:
             raise InputError(f"cannot write {place}: {error.strerror or error}") from error
 
     def trim(self, keep: str) -> None:
-        """Remove what was not used for the longest time, until the rest fits.
+        """Remove the least recently used entries until the rest fits.
 
         Parameters
         ----------
@@ -133,7 +134,7 @@ class ResultCache:
 
 
 def content_key(files: Sequence[Path | None], settings: Iterable[object], core: Path) -> str:
-    """Return the key of what a result depends on.
+    """Return the cache key of everything that a result depends on.
 
     Parameters
     ----------

@@ -1,15 +1,15 @@
-"""The surface of an object under its specular layer, from a result or from what a file keeps of it.
+"""The surface of an object under its specular layer, from a result or from data in a .blend file.
 
 Problem: the base colour under gloss (`isc_core.lobe_fitting.specular_layer`) has to follow when the
-gloss is edited, as if the fit had found that gloss. The file has no result any more.
+gloss is edited, as if the fit had found that gloss. The file no longer contains the result.
 
 Equation: normals are codes of 8 bits; the shading is exp(SH(n)) of the light's coefficients, which
 are kept as numbers with the environment and the camera.
 
 Citation: none.
 
-Limits: a shading that is no function of the normal, as after `isc refine --light`, is followed as
-if it were.
+Limits: shading that does not depend on the normal alone, as after `isc refine --light`, is treated
+as if it did.
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ _COEFFICIENTS = 27  # of the illumination
 
 @dataclass(frozen=True)
 class RecoveredLight:
-    """What of the recovered light a layer needs.
+    """The part of the recovered light that a specular layer needs.
 
     Attributes
     ----------
@@ -65,13 +65,13 @@ class RecoveredLight:
 
     @property
     def numbers(self) -> list[float]:
-        """The same as numbers, which a datablock can store."""
+        """The same as a list of numbers, which a datablock can store."""
         camera = self.camera
         place = [0.0, 0, 0] if camera is None else [camera.focal_length, *camera.principal_point]
         return [*place, *self.illumination.ravel().tolist(), *self.environment.ravel().tolist()]
 
 
-def light_of_numbers(numbers: Sequence[float]) -> RecoveredLight:
+def light_from_numbers(numbers: Sequence[float]) -> RecoveredLight:
     """Return the light of `RecoveredLight.numbers`.
 
     Parameters
@@ -93,7 +93,7 @@ def light_of_numbers(numbers: Sequence[float]) -> RecoveredLight:
 
 
 def recovered_light(result: ResultArrays) -> RecoveredLight:
-    """Return what of the light of a result a layer needs.
+    """Return the part of a result's light that a specular layer needs.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def coated_surface(result: ResultArrays) -> CoatedSurface:
     )
 
 
-def coded_normals(normal: np.ndarray) -> np.ndarray:
+def encode_normals(normal: np.ndarray) -> np.ndarray:
     """Code normals in 8 bits; 0 outside the object, where they are 0.
 
     Parameters
@@ -144,10 +144,10 @@ def coded_normals(normal: np.ndarray) -> np.ndarray:
     return np.where(normal.any(-1)[..., None], codes, np.uint8(0))
 
 
-def surface_of_codes(
+def surface_from_codes(
     normals: np.ndarray, light: RecoveredLight, variation: np.ndarray | None
 ) -> CoatedSurface:
-    """Return the surface of `coded_normals`, whose shading is that of the light's illumination.
+    """Return the surface of `encode_normals`, whose shading is that of the light's illumination.
 
     Parameters
     ----------

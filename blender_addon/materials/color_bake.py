@@ -7,9 +7,9 @@ under the edited specular layer, see `isc_core.lobe_fitting.specular_layer`.
 Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
 saturation and value).
 
-Four million pixels take seconds, so that the colours are computed in rows, in any thread, and from
-the image's file where it is one of the extension's own: reading the pixels of an image is for the
-main thread alone, and blocks the window.
+Four million pixels take seconds. The colours are therefore computed row by row, in any thread, and
+from the packed file of an image that the extension has made: only the main thread may read the
+pixels of an image, which blocks the window.
 
 Limits: a base colour brighter than white is clipped.
 """
@@ -24,11 +24,11 @@ from isc_core.imaging.srgb import srgb_codes, srgb_to_linear
 from isc_core.io.png import decode_png
 from isc_core.lobe_fitting.specular_layer import SpecularLayer
 
-from ..datablocks.images import SRGB, ImageFile, coded_file, own_file, scaled_file
-from .coated_surface import light_of_numbers, surface_of_codes
+from ..datablocks.images import SRGB, ImageFile, coded_file, scaled_file, unmodified_file
+from .coated_surface import light_from_numbers, surface_from_codes
 
 UNCHANGED = 1e-6  # as in the group
-_ROWS = 32  # computed between two looks at whether to go on
+_ROWS = 32  # computed between two checks for cancellation
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class ColorSource:
 
 @dataclass(frozen=True)
 class GlossEdit:
-    """An edit of the gloss above a base colour, and what the colour below follows from.
+    """An edit of the gloss above a base colour, and what the colour below is computed from.
 
     Attributes
     ----------
@@ -132,13 +132,13 @@ class GlossEdit:
             None without gloss.
         """
         variation = decode_png(self.variation)[..., 0] if self.variation else None
-        light = light_of_numbers(self.light)
-        surface = surface_of_codes(decode_png(self.normals), light, variation)
+        light = light_from_numbers(self.light)
+        surface = surface_from_codes(decode_png(self.normals), light, variation)
         return surface.layer(self.level, self.roughness)
 
 
 def color_source(image: bpy.types.Image) -> ColorSource:
-    """Return the colours of an image, without its pixels where its file is known.
+    """Return the colours of an image, without reading its pixels if it is unchanged.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def color_source(image: bpy.types.Image) -> ColorSource:
     ColorSource
         Its colours.
     """
-    if image.colorspace_settings.name == SRGB and (png := own_file(image)):
+    if image.colorspace_settings.name == SRGB and (png := unmodified_file(image)):
         return ColorSource(png)
     return ColorSource(b"", _pixels(image), _is_coded(image))
 
@@ -161,7 +161,7 @@ def edited_file(
     stopped: Callable[[], bool] = lambda: False,
     gloss: GlossEdit | None = None,
 ) -> ImageFile | None:
-    """Return edited colours; this may run in another thread.
+    """Compute edited colours; may run in another thread.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def edited_file(
     edit : ColorEdit
         Their edit.
     stopped : callable, optional
-        Whether they are no longer needed.
+        Returns whether they are no longer needed.
     gloss : GlossEdit, optional
         The edit of the gloss above; then the colours are those without a layer above.
 

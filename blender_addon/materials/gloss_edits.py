@@ -12,7 +12,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..datablocks.images import own_file
+from ..datablocks.images import unmodified_file
 from .color_bake import UNCHANGED, GlossEdit
 from .edit_nodes import BASE_COLOR
 
@@ -23,7 +23,7 @@ FITTED_GLOSS = "isc_fitted_gloss"  # of a material: level and roughness that `_U
 
 @dataclass(frozen=True)
 class GlossBasis:
-    """What the base colour under another gloss than the fitted one follows from.
+    """What the base colour under edited gloss is computed from.
 
     Attributes
     ----------
@@ -43,11 +43,11 @@ class GlossBasis:
     variation: bpy.types.Image | None = None
 
 
-def remember_base_colors(
+def store_base_colors(
     material: bpy.types.Material, under_layer: bpy.types.Image, basis: GlossBasis | None
 ) -> None:
-    """Store the two base colours of a material, and what others follow from: `apply_edits` shows
-    the right one.
+    """Store the two base colours of a material, and what others are computed from; `apply_edits`
+    shows the right one.
 
     Parameters
     ----------
@@ -144,10 +144,10 @@ def gloss_edit(material: bpy.types.Material, group: bpy.types.Node) -> GlossEdit
         None as of `edited_gloss`, and where the user has painted on the base colour.
     """
     gloss = edited_gloss(material, group)
-    if gloss is None or not own_file(material[_UNDER_LAYER]):
+    if gloss is None or not unmodified_file(material[_UNDER_LAYER]):
         return None
-    normals, variation = own_file(material[_NORMALS]), material.get(_VARIATION)
-    varies = b"" if variation is None else own_file(variation)
+    normals, variation = unmodified_file(material[_NORMALS]), material.get(_VARIATION)
+    varies = b"" if variation is None else unmodified_file(variation)
     return GlossEdit(*gloss, normals, tuple(material[_LIGHT]), varies) if normals else None
 
 

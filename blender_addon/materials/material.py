@@ -15,8 +15,8 @@ from ..datablocks.nodes import add_node, connect, node_tree
 from ..datablocks.provenance import datablock_name, find_tagged, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .edit_nodes import BASE_COLOR, LEVEL_FACTOR, OWN_LEVEL, SURFACE, dichromatic_node
-from .gloss_edits import FITTED_GLOSS, GlossBasis, remember_base_colors
-from .material_edits import bake_edits, begin_bake, forget_edits
+from .gloss_edits import FITTED_GLOSS, GlossBasis, store_base_colors
+from .material_edits import bake_edits, begin_bake, discard_edits
 from .photo_highlights import show_highlights
 
 SpecularSource = Literal["lobe", "image", "none"]
@@ -94,7 +94,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     )
     kept = _edited_values(material)
     tree = node_tree(material)
-    forget_edits(material)
+    discard_edits(material)
     tree.nodes.clear()
     if hasattr(material, "cycles"):
         # The photo's highlights emit no light: rays toward them would only add noise.
@@ -103,7 +103,7 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     _set_values(material, group, specular, kept)
     if maps.specular is not None:
         material["isc_highlights"] = maps.specular
-    remember_base_colors(material, maps.base_color, maps.basis)
+    store_base_colors(material, maps.base_color, maps.basis)
     if specular.source == "image":
         show_highlights(material)
     if bpy.app.background:

@@ -10,8 +10,8 @@ is the recovered texture itself.
 
 Equation: see `color_bake`. The recovered texture is one of two: with highlights, of what is under
 the fitted specular layer, see `isc_core.lobe_fitting.specular_layer`; without, or while the photo's
-are shown, the plain one. Edits of the gloss are colour edits, too: under another gloss lies another
-base colour. Only the bake knows it: while such a slider moves, the last colour stays.
+are shown, the plain one. Edits of the gloss change the base colour, too, which only the bake
+computes: while such a slider moves, the last colour is shown.
 
 Limits: keyframed edits, and a base colour that comes from the user's own nodes, stay live:
 exporters then see the unedited image, or none.
@@ -47,7 +47,7 @@ from .gloss_edits import (
 )
 
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
-_FORMER = "Specular Share"
+_FORMER_FACTOR = "Specular Share"
 _GLOSS_MARK = "\n"  # before the gloss in the text of a state
 _EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
 
@@ -69,12 +69,12 @@ def apply_edits(material: bpy.types.Material) -> bool:
     if surface is None or group is None:
         return False
     _write_numbers(material, surface, group.inputs)
-    _pass_gain(group)
+    _sync_highlight_gain(group)
     choose_base_color(material, group)
     state, shown = _color_state(material, group), material.get(_COLOR)
     if state == shown:
         return False
-    if not _is_ours(surface.inputs["Base Color"], group):
+    if not _is_isc_color(surface.inputs["Base Color"], group):
         return False
     can_bake = _can_bake(material, group)
     image = _find_edited(material, state) if can_bake else None
@@ -137,7 +137,7 @@ def bake_edits(material: bpy.types.Material) -> None:
 
 
 def begin_bake(material: bpy.types.Material) -> PendingBake | None:
-    """Write all edits into the BSDF that need no computing of colours.
+    """Write all edits into the BSDF for which no colours have to be computed.
 
     Parameters
     ----------
@@ -147,7 +147,7 @@ def begin_bake(material: bpy.types.Material) -> PendingBake | None:
     Returns
     -------
     PendingBake or None
-        The colours to compute, in any thread, for `finish_bake`; None if all is written.
+        The colours to compute, in any thread, for `finish_bake`; None if there are none.
     """
     if not apply_edits(material):
         return None
@@ -175,7 +175,7 @@ def begin_bake(material: bpy.types.Material) -> PendingBake | None:
 
 
 def finish_bake(material: bpy.types.Material, state: str, file: ImageFile) -> None:
-    """Give a material its edited colours; does nothing if it has been edited since.
+    """Show edited colours in a material; does nothing if it has been edited since.
 
     Parameters
     ----------
@@ -238,8 +238,8 @@ def color_state(material: bpy.types.Material) -> str:
     return "" if group is None else _color_state(material, group)
 
 
-def forget_edits(material: bpy.types.Material) -> None:
-    """Remove the edited texture, and what is known of written values: the nodes are made anew.
+def discard_edits(material: bpy.types.Material) -> None:
+    """Remove the edited texture and the record of written values, before the nodes are rebuilt.
 
     Parameters
     ----------
@@ -262,7 +262,7 @@ def _color_edit(inputs: Any) -> ColorEdit:
         for name in ("Hue", "Saturation", "Value", "Diffuse Gain", "Photo Highlights")
     )
     # Until version 3 of the group, the photo's highlights used the base colour under the layer.
-    share = inputs[_FORMER].default_value if _FORMER in inputs else 0.0
+    share = inputs[_FORMER_FACTOR].default_value if _FORMER_FACTOR in inputs else 0.0
     return ColorEdit(hue, saturation, value * gain * (1 - shown * share))
 
 
@@ -297,15 +297,15 @@ def _write_numbers(material: bpy.types.Material, surface: Any, inputs: Any) -> N
         material[_NUMBERS] = wanted
 
 
-def _pass_gain(group: bpy.types.Node) -> None:
-    """The layer of the photo's highlights, where it is shown, has the same gain."""
+def _sync_highlight_gain(group: bpy.types.Node) -> None:
+    """Give the layer of the photo's highlights, if it is shown, the same gain."""
     layer, gain = group.id_data.nodes.get(HIGHLIGHTS), group.inputs["Specular Gain"].default_value
     socket = None if layer is None else layer.inputs.get("Specular Gain")
     if socket is not None and socket.default_value != gain:
         socket.default_value = gain
 
 
-def _is_ours(target: Any, group: bpy.types.Node) -> bool:
+def _is_isc_color(target: Any, group: bpy.types.Node) -> bool:
     """Whether the BSDF's colour comes from the group, its image or the edited one, or is a number:
     the user's own nodes are left alone.
     """
@@ -341,7 +341,7 @@ def _key(material: bpy.types.Material) -> str:
 
 
 def _find_edited(material: bpy.types.Material, state: str) -> bpy.types.Image | None:
-    """An image of these edits that is still there, as after an undo."""
+    """An existing image of these edits, for example after an undo."""
     found = (image for image in _edited_images(material) if image.get(_STATE) == state)
     return next(found, None)
 

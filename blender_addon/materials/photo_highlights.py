@@ -1,9 +1,9 @@
-"""The photo's own highlights as a layer on the material: what the photo's camera saw.
+"""The photo's own highlights as a layer of the material, as the photo's camera saw them.
 
 The layer is emission that only the camera sees, so it is exact from the photo's view and in the
-photo's light, and wrong elsewhere: highlights would stand still under a moving lamp. It therefore
-turns itself off as soon as the light, the camera or the object's place differ from those that it
-was first seen with. While it is on, the BSDF's own highlights are off.
+photo's light, and wrong elsewhere: highlights would not follow a moving lamp. It is therefore
+turned off as soon as light, camera or object pose differ from those with which it was first shown.
+While it is on, the BSDF's own highlights are off.
 """
 
 import hashlib
@@ -66,11 +66,11 @@ def show_highlights(material: bpy.types.Material) -> None:
         (total.outputs["Shader"], output.inputs["Surface"]),
     )
     group.inputs["Photo Highlights"].default_value = 1.0
-    forget_view(material)
+    reset_view(material)
 
 
 def hide_highlights(material: bpy.types.Material) -> None:
-    """Remove the layer, and give the BSDF its highlights back.
+    """Remove the layer, and restore the highlights of the BSDF.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def hide_highlights(material: bpy.types.Material) -> None:
         A local material of ISC.
     """
     tree, surface, group = material.node_tree, surface_node(material), dichromatic_node(material)
-    forget_view(material)
+    reset_view(material)
     if surface is None or group is None:
         return
     output = _output(surface)
@@ -90,8 +90,8 @@ def hide_highlights(material: bpy.types.Material) -> None:
         tree.links.new(surface.outputs["BSDF"], output.inputs["Surface"])
 
 
-def forget_view(material: bpy.types.Material) -> None:
-    """Let the layer be right for what is seen next.
+def reset_view(material: bpy.types.Material) -> None:
+    """Make the layer valid for the next view.
 
     Parameters
     ----------
@@ -102,13 +102,13 @@ def forget_view(material: bpy.types.Material) -> None:
         del material[_SEEN]
 
 
-def has_moved(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
-    """Return whether light, camera or pose differ from those that the layer was first seen with.
+def has_view_changed(material: bpy.types.Material, scene: bpy.types.Scene) -> bool:
+    """Return whether light, camera or pose differ from those with which the layer was first shown.
 
     Parameters
     ----------
     material : bpy.types.Material
-        A material with the layer; stores what it is seen with for the first time.
+        A material with the layer; stores the view in which it is first shown.
     scene : bpy.types.Scene
         The evaluated scene.
 

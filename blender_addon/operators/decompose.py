@@ -22,7 +22,7 @@ from ..runs.request import (
     stored_request,
     track_names,
 )
-from ..runs.run_steps import ResultPlace, decompose_steps
+from ..runs.run_steps import ResultDestination, decompose_steps
 from ..runs.worker_run import ImportSteps, RunOutput, WorkerRun, remove_folder
 from ..scene.copies import OBJECT, find_original, is_copy
 from ..scene.hand_edits import is_edited_by_hand
@@ -30,7 +30,7 @@ from ..settings.preferences import create_run_folder, read_preferences, worker_e
 from .edit import NeedsObject, require_built
 from .modal import NeedsPhoto, WorkerOperator, start_operator
 from .result import build_in_steps
-from .viewport import started_in
+from .viewport import invoking_view
 
 
 def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
@@ -59,11 +59,11 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     environment = worker_environment(preferences)
     folder = create_run_folder(preferences.results, request.build.name)
     keep, with_photo = preferences.results is not None, not request.image
-    place = ResultPlace(folder, preferences.earlier, keep, request.build, with_photo)
+    place = ResultDestination(folder, preferences.earlier, keep, request.build, with_photo)
     steps = decompose_steps(
         photo, mask, mask_size, request.method, place, preferences.threads, environment
     )
-    view, renamed = started_in(context), track_names(request)
+    view, renamed = invoking_view(context), track_names(request)
 
     def finish(context: Any, output: RunOutput) -> ImportSteps:
         message = yield from build_in_steps(context, output, renamed(), view)
@@ -80,9 +80,9 @@ def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
     return WorkerRun(f"Create {request.build.name}", steps, finish, folder)
 
 
-class _Overwrites(WorkerOperator):
-    """What the operators share that replace the mesh of an object: they ask before they overwrite
-    one that was edited by hand.
+class _OverwriteMixin(WorkerOperator):
+    """Mixin for operators that replace the mesh of an object: they ask before they overwrite one
+    that was edited by hand.
     """
 
     bl_idname: str
@@ -249,7 +249,7 @@ class ISC_OT_confirm_overwrite(bpy.types.Operator):
         return {"FINISHED"}
 
 
-class ISC_OT_decompose(NeedsPhoto, _Overwrites, bpy.types.Operator):
+class ISC_OT_decompose(NeedsPhoto, _OverwriteMixin, bpy.types.Operator):
     """Create the object of the panel's photo."""
 
     bl_idname = "isc.decompose"
@@ -260,7 +260,7 @@ class ISC_OT_decompose(NeedsPhoto, _Overwrites, bpy.types.Operator):
     )
 
     def request(self, context: Any) -> DecomposeRequest:
-        """Return the request of the scene's panel; see `_Overwrites`.
+        """Return the request of the scene's panel; see `_OverwriteMixin`.
 
         Parameters
         ----------
@@ -280,7 +280,7 @@ class ISC_OT_decompose(NeedsPhoto, _Overwrites, bpy.types.Operator):
         return request_from_settings(context.scene)
 
 
-class ISC_OT_redo(NeedsObject, _Overwrites, bpy.types.Operator):
+class ISC_OT_redo(NeedsObject, _OverwriteMixin, bpy.types.Operator):
     """Create an object again from its photo, at another size."""
 
     bl_idname = "isc.redo"
@@ -317,7 +317,7 @@ class ISC_OT_redo(NeedsObject, _Overwrites, bpy.types.Operator):
         return super().poll(context) and poll_idle(cls)
 
     def request(self, context: Any) -> DecomposeRequest:
-        """Return the request that made the active object; see `_Overwrites`.
+        """Return the request that made the active object; see `_OverwriteMixin`.
 
         Parameters
         ----------

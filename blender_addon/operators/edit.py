@@ -19,11 +19,11 @@ from ..materials.edit_nodes import dichromatic_node
 from ..materials.material import set_specular_gain
 from ..materials.photo_highlights import can_show_highlights, hide_highlights, show_highlights
 from ..runs.messages import sentence
-from ..scene.built_object import BuiltObject, find_built, why_not_built
+from ..scene.built_object import BuiltObject, find_built, selection_problem
 from ..scene.copies import find_material, make_material_single_user
 from ..scene.sun import ensure_sun, relight
 from ..scene.world import set_sun_mix
-from .live_edits import settle_edits
+from .live_edits import write_edits
 
 _LIGHTS = (
     (
@@ -55,7 +55,7 @@ class NeedsObject:
         bool
             Where False, the tooltip gives the reason.
         """
-        reason = why_not_built(context.object)
+        reason = selection_problem(context.object)
         if reason:
             cls.poll_message_set(reason)
         return not reason
@@ -110,7 +110,7 @@ class EditOperator(NeedsObject):
         try:
             built = require_built(context)
             self.edit(built)
-            settle_edits(find_material(built.object) or built.material)
+            write_edits(find_material(built.object) or built.material)
         except InputError as error:
             self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}

@@ -1,10 +1,10 @@
 """Export for other programs: the object as GLB, USD, FBX or OBJ by Blender's own exporters, its
 textures under the names of other programs, and the recovered maps as OpenEXR.
 
-What is seen is exported: edits are baked first, and the layer with the photo's highlights is hidden
-meanwhile. Objects of files from earlier versions get a plain material meanwhile
-(`export_material`). Blender's OBJ exporter names packed textures without writing them: they
-are written beside the file.
+The object is exported as shown: edits are baked first, and the layer with the photo's highlights is
+hidden during the export. Objects in files of earlier versions temporarily have a plain material
+(`export_material`). Blender's OBJ exporter references packed textures without writing
+them, so they are written beside the file.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
@@ -306,7 +306,7 @@ def export_object(
 
 @contextmanager
 def _object_folder(built: BuiltObject, parent: Path) -> Iterator[Path]:
-    """The folder of an object, created; errors of writing are the user's to solve."""
+    """Create the folder of an object; raises `InputError` if it cannot be written to."""
     name = built.object.name if is_copy(built.object) else str(built.object[KEY])
     letters = (letter if letter.isalnum() or letter in " -_." else "_" for letter in name)
     folder = parent / ("".join(letters).strip(" .") or "object")
@@ -321,7 +321,7 @@ def _object_folder(built: BuiltObject, parent: Path) -> Iterator[Path]:
 
 @contextmanager
 def _settled() -> Iterator[None]:
-    """All edits are in the BSDF while the context lasts."""
+    """Bake all edits into the BSDF while the context lasts."""
     prepare_export()
     try:
         yield
@@ -386,7 +386,7 @@ def _only_selected(obj: bpy.types.Object) -> Iterator[None]:
 
 @contextmanager
 def _exportable(built: BuiltObject) -> Iterator[None]:
-    """The object has a material that exporters read while the context lasts."""
+    """Give the object a material that exporters can read while the context lasts."""
     material = built.material
     if surface_node(material) is None:
         with export_material(built.object, material):
@@ -404,7 +404,7 @@ def _exportable(built: BuiltObject) -> Iterator[None]:
 
 @contextmanager
 def _level_as_blenders(material: bpy.types.Material) -> Iterator[None]:
-    """The specular level is Blender's own meanwhile: FBX has no index of refraction."""
+    """Temporarily express the specular level as Blender's own: FBX has no index of refraction."""
     surface = surface_node(material)
     if surface is None:
         yield
@@ -423,7 +423,7 @@ def _level_as_blenders(material: bpy.types.Material) -> Iterator[None]:
 
 @contextmanager
 def _textures_beside(obj: bpy.types.Object, folder: Path) -> Iterator[None]:
-    """The packed textures are files in the folder, and have their paths while the context lasts."""
+    """Write the packed textures into the folder, and use these files while the context lasts."""
     paths_before: dict[bpy.types.Image, str] = {}
     try:
         for image in _packed_textures(obj):

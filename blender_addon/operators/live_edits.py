@@ -1,7 +1,7 @@
-"""What happens after an edit, by a slider, a script, undo or the node editor.
+"""Handlers that follow edits, by a slider, a script, undo or the node editor.
 
 After each update of the scene, edits are written into the material (`material_edits`), and
-highlights of the photo that no longer belong to what is seen are turned off
+highlights of the photo that are no longer valid for the view are turned off
 (`photo_highlights`). Baking waits until no slider has moved for a moment, and computes the
 colours in a thread, which a later edit stops; without a window, and before a file is saved or
 exported, it happens at once.
@@ -31,9 +31,9 @@ from ..materials.material_edits import (
     finish_bake,
     release_edited,
 )
-from ..materials.photo_highlights import has_moved, hide_highlights, show_highlights
+from ..materials.photo_highlights import has_view_changed, hide_highlights, show_highlights
 
-# Seconds: without a change before baking; between two looks at bakes; of a line in the status bar.
+# Seconds: without a change before baking; between two polls of bakes; of a status bar text.
 _PAUSE, _POLL, _SHOWN = 0.4, 0.05, 6.0
 _MATERIAL_KINDS = ("MATERIAL", "NODETREE")
 _VIEW_KINDS = ("OBJECT", "LIGHT", "CAMERA", "WORLD", "NODETREE", "SCENE")
@@ -87,8 +87,8 @@ class _RunningBake:
 _bakes: dict[int, _RunningBake] = {}
 
 
-def settle_edits(material: bpy.types.Material) -> None:
-    """Write the edits of a material: numbers now, colours once no slider moves.
+def write_edits(material: bpy.types.Material) -> None:
+    """Write the edits of a material: numbers at once, colours when no slider moves any more.
 
     Parameters
     ----------
@@ -102,8 +102,8 @@ def settle_edits(material: bpy.types.Material) -> None:
         return
     running = _bakes.get(material.session_uid)
     if running is None or running.state != color_state(material):
-        _drop(material.session_uid)
-        _restart(_bake_when_idle, _PAUSE)
+        _discard(material.session_uid)
+        _restart_timer(_bake_when_idle, _PAUSE)
 
 
 def prepare_export() -> None:
@@ -134,13 +134,15 @@ def _materials() -> Iterator[bpy.types.Material]:
 def _after_update(scene: Any, depsgraph: Any) -> None:
     if any(depsgraph.id_type_updated(kind) for kind in _MATERIAL_KINDS):
         for material in _materials():
-            settle_edits(material)
+            write_edits(material)
     if any(depsgraph.id_type_updated(kind) for kind in _VIEW_KINDS):
         for material in _materials():
-            if shows_highlights(material) and has_moved(material, scene):
+            if shows_highlights(material) and has_view_changed(material, scene):
                 hide_highlights(material)
-                settle_edits(material)
-                _tell(f"{material.name}: photo highlights turned off, because the view changed")
+                write_edits(material)
+                _show_status(
+                    f"{material.name}: photo highlights turned off, because the view changed"
+                )
 
 
 @persistent
@@ -158,66 +160,66 @@ def _before_undo(*_: Any) -> None:
 @persistent
 def _after_undo(*_: Any) -> None:
     for material in _materials():
-        settle_edits(material)
+        write_edits(material)
 
 
 def _bake_now(material: bpy.types.Material) -> None:
     """Bake all edits of a material; waits for the colours that a thread computes."""
     running = _bakes.get(material.session_uid)
     if running is not None and running.state == color_state(material):
-        _take(material, running)
-    _drop(material.session_uid)
+        _finish(material, running)
+    _discard(material.session_uid)
     bake_edits(material)
 
 
 def _bake_when_idle() -> float | None:
-    """Begin bakes in threads, and take those that are done; stays registered while some go on."""
+    """Start bakes in threads, and show finished ones; stays registered while some are running."""
     if bpy.app.is_job_running("RENDER"):
         return _PAUSE
     present = {material.session_uid: material for material in _materials()}
     for number, running in list(_bakes.items()):
         material = present.get(number)
         if material is None or running.state != color_state(material):
-            _drop(number)
+            _discard(number)
         elif running.file.done():
-            _take(material, running)
-            _drop(number)
+            _finish(material, running)
+            _discard(number)
     for number, material in present.items():
         if number not in _bakes and (pending := begin_bake(material)) is not None:
-            _bakes[number] = _begin(pending)
+            _bakes[number] = _start(pending)
     return _POLL if _bakes else None
 
 
-def _begin(pending: PendingBake) -> _RunningBake:
+def _start(pending: PendingBake) -> _RunningBake:
     stop, pool = Event(), ThreadPoolExecutor(1)
     file = pool.submit(pending.file, stop.is_set)
     pool.shutdown(wait=False)
     return _RunningBake(pending.state, stop, file)
 
 
-def _take(material: bpy.types.Material, running: _RunningBake) -> None:
+def _finish(material: bpy.types.Material, running: _RunningBake) -> None:
     if (file := running.file.result()) is not None:
         finish_bake(material, running.state, file)
 
 
-def _drop(number: int) -> None:
+def _discard(number: int) -> None:
     if (running := _bakes.pop(number, None)) is not None:
         running.stop.set()
 
 
 def _stop_bakes() -> None:
     for number in list(_bakes):
-        _drop(number)
+        _discard(number)
 
 
-def _tell(line: str) -> None:
+def _show_status(line: str) -> None:
     """Show a line in the status bar for a while."""
     if bpy.app.background:
         print(line)
         return
     for window in bpy.context.window_manager.windows:
         window.workspace.status_text_set(line)
-    _restart(_clear_status, _SHOWN)
+    _restart_timer(_clear_status, _SHOWN)
 
 
 def _clear_status() -> None:
@@ -225,7 +227,7 @@ def _clear_status() -> None:
         window.workspace.status_text_set(None)
 
 
-def _restart(timer: Any, seconds: float) -> None:
+def _restart_timer(timer: Any, seconds: float) -> None:
     if bpy.app.timers.is_registered(timer):
         bpy.app.timers.unregister(timer)
     bpy.app.timers.register(timer, first_interval=seconds)

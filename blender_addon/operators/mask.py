@@ -198,7 +198,7 @@ class ISC_OT_draw_box(DragOnPhoto, bpy.types.Operator):
         "Draw a box around the object, with some background, and cut the object out of it"
     )
 
-    def advice(self) -> str:
+    def status_text(self) -> str:
         """Return what to do with the mouse; see `PhotoOperator`.
 
         Returns

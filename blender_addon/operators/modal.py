@@ -1,4 +1,4 @@
-"""Runs in a window: a timer that polls, progress in the panels and the status bar, Esc to cancel.
+"""Runs in a window: polled by a timer, with progress in the panels and the status bar; Esc cancels.
 
 The operators here have no UNDO of their own: Blender would push an undo step for them while they
 run. The result is built by a separate operator that has it, called when the work is done: one undo
@@ -59,7 +59,7 @@ class WorkerOperator:
     report: Any  # from bpy.types.Operator
     _timer: Any = None
     _run: WorkerRun | None = None
-    _hurries = False
+    _interval_shortened = False
 
     def prepare(self, context: Any) -> WorkerRun:
         """Create the run.
@@ -151,7 +151,7 @@ class WorkerOperator:
             return {"PASS_THROUGH"}
         if not advance_run(context, run):
             if run.status.state == RunState.READY:
-                self._hurry(context)
+                self._shorten_interval(context)
             return {"PASS_THROUGH"}
         self._stop_timer(context)
         return self._report_outcome(run)
@@ -190,13 +190,13 @@ class WorkerOperator:
         self.report({"ERROR" if state == RunState.FAILED else "INFO"}, sentence(message))
         return {"FINISHED"} if state == RunState.DONE else {"CANCELLED"}
 
-    def _hurry(self, context: Any) -> None:
-        """Import in steps that follow each other closely."""
-        if not self._hurries:
+    def _shorten_interval(self, context: Any) -> None:
+        """Shorten the timer's interval for the steps of an import."""
+        if not self._interval_shortened:
             self._stop_timer(context)
             manager = context.window_manager
             self._timer = manager.event_timer_add(_IMPORT_PAUSE, window=context.window)
-            self._hurries = True
+            self._interval_shortened = True
 
     def _stop_timer(self, context: Any) -> None:
         if self._timer is not None:

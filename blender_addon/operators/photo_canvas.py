@@ -75,7 +75,7 @@ class PhotoCanvas:
         return None if region is None else (event.mouse_x - region.x, event.mouse_y - region.y)
 
     def place(self, position: tuple[int, int]) -> Point:
-        """Return which place of the photo is at a position.
+        """Return the place of the photo that is at a position.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class PhotoCanvas:
         if self._kind != "VIEW_3D":
             view: Point = region.view2d.region_to_view(*position)
             return view
-        left, bottom, width, height = fitted(self._size, _room(area, region))
+        left, bottom, width, height = fit_rectangle(self._size, _free_size(area, region))
         return (position[0] - left) / width, (position[1] - bottom) / height
 
     def redraw(self) -> None:
@@ -139,7 +139,7 @@ class PhotoCanvas:
         if self._kind != "VIEW_3D":
             first, last = (region.view2d.view_to_region(end, end, clip=False) for end in (0.0, 1.0))
             return first, last
-        left, bottom, width, height = fitted(self._size, _room(area, region))
+        left, bottom, width, height = fit_rectangle(self._size, _free_size(area, region))
         return (left, bottom), (left + width, bottom + height)
 
 
@@ -175,7 +175,7 @@ def _tint_shader() -> Any:
     return gpu.shader.create_from_info(info)
 
 
-def _room(area: Any, region: Any) -> tuple[int, int]:
+def _free_size(area: Any, region: Any) -> tuple[int, int]:
     """Width and height of a region, without the sidebar that lies over its right part."""
     edges = [part.x for part in area.regions if part.type == "UI" and part.width > 1]
     return min([region.x + region.width, *edges]) - region.x, region.height
@@ -189,14 +189,16 @@ def _image_shader() -> Any:
         return gpu.shader.from_builtin("IMAGE")
 
 
-def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, float, float]:
+def fit_rectangle(
+    size: tuple[int, int], available: tuple[int, int]
+) -> tuple[float, float, float, float]:
     """Fit a photo into a region.
 
     Parameters
     ----------
     size : tuple of int
         Width and height of the photo.
-    room : tuple of int
+    available : tuple of int
         Width and height of the free part of the region, from its lower left corner.
 
     Returns
@@ -204,6 +206,6 @@ def fitted(size: tuple[int, int], room: tuple[int, int]) -> tuple[float, float, 
     tuple of float
         Left, bottom, width and height in pixels of the region.
     """
-    scale = _FILL * min(room[0] / size[0], room[1] / size[1])
+    scale = _FILL * min(available[0] / size[0], available[1] / size[1])
     width, height = scale * size[0], scale * size[1]
-    return (room[0] - width) / 2, (room[1] - height) / 2, width, height
+    return (available[0] - width) / 2, (available[1] - height) / 2, width, height

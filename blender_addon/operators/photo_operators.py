@@ -16,7 +16,7 @@ from gpu_extras.batch import batch_for_shader
 from ..runs.active_run import poll_idle
 from .photo_canvas import PhotoCanvas
 
-_SPACING, _MOST_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
+_SPACING, _MAX_POINTS = 0.02, 8  # of the points of a stroke: of the photo's longer side; how many
 _LINE_COLOR = (1.0, 0.6, 0.1, 1.0)
 OUTSIDE = "The point lies outside the photo: click on the photo"
 
@@ -94,11 +94,11 @@ class PhotoOperator:
         fits = mask is not None and tuple(mask.size) == self._size
         self._canvas = PhotoCanvas(context, shown, self.draw_over, mask if fits else None)
         context.window.cursor_modal_set("CROSSHAIR")
-        context.workspace.status_text_set(self.advice())
+        context.workspace.status_text_set(self.status_text())
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def advice(self) -> str:
+    def status_text(self) -> str:
         """Return what to do with the mouse, for the status bar; the operator's own.
 
         Returns
@@ -147,7 +147,7 @@ class PhotoOperator:
 class ClickOnPhoto(PhotoOperator):
     """An operator that waits for a click on the photo."""
 
-    def take(self, settings: Any, point: str) -> None:
+    def use_point(self, settings: Any, point: str) -> None:
         """Use the click; the operator's own.
 
         Parameters
@@ -187,7 +187,7 @@ class ClickOnPhoto(PhotoOperator):
         if point is None:
             self.report({"WARNING"}, OUTSIDE)
             return {"CANCELLED"}
-        self.take(context.scene.isc, f"{point[0]},{point[1]}")
+        self.use_point(context.scene.isc, f"{point[0]},{point[1]}")
         return {"FINISHED"}
 
 
@@ -279,7 +279,7 @@ class StrokeOnPhoto(DragOnPhoto):
 
     line_width = 3.0
 
-    def take(self, settings: Any, points: Sequence[str]) -> None:
+    def use_points(self, settings: Any, points: Sequence[str]) -> None:
         """Use the points of the stroke; the operator's own.
 
         Parameters
@@ -324,15 +324,15 @@ class StrokeOnPhoto(DragOnPhoto):
         """
         pixels = [point_at(canvas.place(position), self._size) for position in path]
         self._leave(context, set())
-        points = spread([pixel for pixel in pixels if pixel is not None], self._size)
+        points = points_along([pixel for pixel in pixels if pixel is not None], self._size)
         if not points:
             self.report({"WARNING"}, OUTSIDE)
             return {"CANCELLED"}
-        self.take(context.scene.isc, [f"{x},{y}" for x, y in points])
+        self.use_points(context.scene.isc, [f"{x},{y}" for x, y in points])
         return {"FINISHED"}
 
 
-def spread(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple[int, int]]:
+def points_along(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple[int, int]]:
     """Choose points along a stroke.
 
     Parameters
@@ -351,7 +351,7 @@ def spread(path: Sequence[tuple[int, int]], size: tuple[int, ...]) -> list[tuple
         return []
     steps = [hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(path)]
     gone = np.concatenate([[0.0], np.cumsum(steps)])
-    count = min(_MOST_POINTS, 1 + int(gone[-1] / (_SPACING * max(size))))
+    count = min(_MAX_POINTS, 1 + int(gone[-1] / (_SPACING * max(size))))
     places = np.linspace(0.0, gone[-1], count)
     columns, rows = (np.interp(places, gone, part) for part in np.array(path, float).T)
     return list(dict.fromkeys((round(x), round(y)) for x, y in zip(columns, rows, strict=True)))

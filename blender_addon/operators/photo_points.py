@@ -68,7 +68,7 @@ class ISC_OT_mark_point(StrokeOnPhoto, bpy.types.Operator):
         name="Background", description="Mark a point that does not belong to the object"
     )
 
-    def advice(self) -> str:
+    def status_text(self) -> str:
         """Return what to mark; see `StrokeOnPhoto`.
 
         Returns
@@ -78,7 +78,7 @@ class ISC_OT_mark_point(StrokeOnPhoto, bpy.types.Operator):
         what = "background" if self.background else "object"
         return f"Click on the {what} or draw a stroke over it, Esc or right mouse button to cancel"
 
-    def take(self, settings: Any, points: Sequence[str]) -> None:
+    def use_points(self, settings: Any, points: Sequence[str]) -> None:
         """Add the points, and find the mask again; see `StrokeOnPhoto`.
 
         Parameters
@@ -131,7 +131,7 @@ class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
 
     reject: BoolProperty(name="Print", description="Mark print or paint instead of a highlight")
 
-    def advice(self) -> str:
+    def status_text(self) -> str:
         """Return what to click on; see `ClickOnPhoto`.
 
         Returns
@@ -141,7 +141,7 @@ class ISC_OT_mark_highlight(ClickOnPhoto, bpy.types.Operator):
         what = "print or paint" if self.reject else "a highlight"
         return f"Click on {what}, Esc or right mouse button to cancel"
 
-    def take(self, settings: Any, point: str) -> None:
+    def use_point(self, settings: Any, point: str) -> None:
         """Add the mark; see `ClickOnPhoto`.
 
         Parameters

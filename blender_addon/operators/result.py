@@ -11,7 +11,7 @@ from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..datablocks.staging import completed
+from ..datablocks.staging import run_to_end
 from ..files.result_arrays import DESCRIPTION
 from ..runs.active_run import require_no_active_run
 from ..runs.messages import error_line, sentence
@@ -30,9 +30,9 @@ from ..scene.built_object import BuiltObject, find_built
 from ..scene.objects import discard, place_objects, stage_objects
 from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .modal import WorkerOperator
-from .viewport import activate, show, started_in
+from .viewport import activate, invoking_view, show
 
-# Objects whose datablocks are made, until they are placed: operators take plain values only.
+# Staged objects by folder, until they are placed: operators take plain values only.
 _staged: dict[str, list[StagedObject]] = {}
 _CAME_FROM = "isc_came_from"
 
@@ -42,7 +42,7 @@ def build_in_steps(
 ) -> ImportSteps:
     """Build the result of a folder in short steps, as one undo step, and show it.
 
-    Until the last step the scene is as before, and nothing is left if the steps are closed.
+    The scene is unchanged until the last step; if the steps are closed early, nothing is left.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def build_in_steps(
     request : DecomposeRequest, optional
         What to build; None uses the panel's settings.
     view : int, optional
-        The 3D view to show it in, see `viewport.started_in`.
+        The 3D view to show it in, see `viewport.invoking_view`.
 
     Returns
     -------
@@ -111,16 +111,16 @@ def build_as_undo_step(
     InputError
         If the result cannot be built.
     """
-    return completed(build_in_steps(context, output, request, view))
+    return run_to_end(build_in_steps(context, output, request, view))
 
 
 class ISC_OT_build_result(bpy.types.Operator):
     """Build the object of a result folder."""
 
     bl_idname = "isc.build_result"
-    bl_label = "Create Object of Result"
+    bl_label = "Create Object from Result"
     bl_description = (
-        "Create the object of a result folder, or update the object created from the same photo"
+        "Create the object from a result folder, or update the object of the same photo"
     )
     bl_options = {"UNDO", "INTERNAL"}
 
@@ -155,13 +155,13 @@ class ISC_OT_build_result(bpy.types.Operator):
                 prepared = read_and_prepare(
                     Path(self.directory), request.build, with_photo=photo is None
                 )
-                staged = completed(stage_objects(prepared, photo=photo))
+                staged = run_to_end(stage_objects(prepared, photo=photo))
             built = place_objects(staged, scene=scene, photo=photo)
         except InputError as error:
             self.report({"ERROR"}, sentence(str(error)))
             return {"CANCELLED"}
         for one in built:
-            _complete(one, request, scene)
+            _store_settings(one, request, scene)
         activate(context, *built)
         return {"FINISHED"}
 
@@ -260,7 +260,7 @@ class ISC_OT_read_result(WorkerOperator, bpy.types.Operator):
         require_no_active_run()
         folder = Path(self.directory)
         environment = worker_environment(read_preferences(context))
-        view, request = started_in(context), _panel_request(context.scene)
+        view, request = invoking_view(context), _panel_request(context.scene)
         own, renamed = create_run_folder(None, "import"), track_names(request)
 
         def finish(context: Any, output: RunOutput) -> ImportSteps:
@@ -332,7 +332,7 @@ def _panel_request(scene: Any) -> DecomposeRequest:
     return DecomposeRequest(build=build_options(scene.isc, ""), scene=scene.name_full)
 
 
-def _complete(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:
+def _store_settings(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:
     """Store what the panels need later; the object's own scene also gets the settings."""
     store_request(built.object, request)
     photo = find_by_full_name(bpy.data.images, request.image)

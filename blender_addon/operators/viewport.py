@@ -1,7 +1,7 @@
-"""Show a new object where the user works: selected, active, framed, in Material Preview.
+"""Show a new object in the user's 3D view: selected, active, framed, in Material Preview.
 
-A photo shows one side. A view that looks at the object from elsewhere turns to that side, as seen
-from a little to the right and above, so that the form is seen, too.
+A photo shows one side. A view from another side is rotated to that side, slightly from the right
+and from above, so that the shape is visible, too.
 """
 
 from math import cos, radians
@@ -14,11 +14,11 @@ from ..scene.built_object import BuiltObject
 
 _PLAIN = {"WIREFRAME", "SOLID"}
 _FRONT = Vector((0, -1, 0))  # of an object, in its own axes
-_MOST_ASIDE = radians(35)
+_MAX_ASIDE = radians(35)
 _RIGHT, _ABOVE = radians(20), radians(12)
 
 
-def started_in(context: Any) -> int:
+def invoking_view(context: Any) -> int:
     """Return which 3D view an operator was started from.
 
     Parameters
@@ -43,7 +43,7 @@ def find_view(window: Any, address: int) -> Any:
     window : bpy.types.Window
         The window.
     address : int
-        As `started_in` returns it.
+        As `invoking_view` returns it.
 
     Returns
     -------
@@ -97,7 +97,7 @@ def show(context: Any, built: BuiltObject, own_scene: bool, address: int = 0) ->
     own_scene : bool
         Whether the scene is the object's own.
     address : int, optional
-        The view, as `started_in` returns it.
+        The view, as `invoking_view` returns it.
     """
     window = context.window
     area = None if window is None else find_view(window, address)
@@ -132,7 +132,7 @@ def front_view(view: Quaternion, rotation: Quaternion) -> Quaternion:
         The rotation.
     """
     toward_viewer = view @ Vector((0, 0, 1))
-    if toward_viewer.dot(rotation @ _FRONT) >= cos(_MOST_ASIDE):
+    if toward_viewer.dot(rotation @ _FRONT) >= cos(_MAX_ASIDE):
         return view.copy()
     return rotation @ Euler((radians(90) - _ABOVE, 0, _RIGHT)).to_quaternion()
 

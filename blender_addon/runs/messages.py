@@ -34,7 +34,7 @@ _FIELDS = {
 _MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
 _PART = re.compile(r"^object (\d+) of (\d+): ")
 _REPORTED_BY = re.compile(r"^(Error: |Operator bpy\.ops\.\S+\.poll\(\) )")
-_MOST_SECONDS = 90  # more are shown in minutes
+_MAX_SECONDS = 90  # more are shown in minutes
 _MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 _ADVICE = {  # what a command line does otherwise
     "use --light-colour estimate": "set Light Color to Estimate",
@@ -219,7 +219,7 @@ def stage_text(stage: str, seconds_left: float | None) -> str:
     stage = _PART.sub(r"\1/\2: ", stage)
     if seconds_left is None:
         return stage
-    if seconds_left < _MOST_SECONDS:
+    if seconds_left < _MAX_SECONDS:
         return f"{stage}, about {max(5 * round(seconds_left / 5), 5)} s left"
     return f"{stage}, about {round(seconds_left / 60)} min left"
 

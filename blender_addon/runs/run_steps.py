@@ -1,5 +1,5 @@
-"""The work of each kind of run, as steps for `WorkerRun`: decompose a photo, segment a mask, read
-a result.
+"""The work of each kind of run as steps for `WorkerRun`: decompose a photo, find a mask, read a
+result.
 """
 
 import shutil
@@ -51,7 +51,7 @@ T = TypeVar("T")
 
 
 @dataclass(frozen=True)
-class ResultPlace:
+class ResultDestination:
     """Where the result of a run goes.
 
     Attributes
@@ -63,7 +63,7 @@ class ResultPlace:
     keep : bool
         Whether a copy of a cached result is kept in the run's folder, without the arrays.
     build : BuildOptions
-        What will be built of it.
+        What will be built from it.
     with_photo : bool
         Whether the masked photo of the result becomes an image.
     """
@@ -80,7 +80,7 @@ def decompose_steps(
     mask: ImageSource | None,
     mask_size: tuple[int, int] | None,
     method: MethodSettings,
-    place: ResultPlace,
+    place: ResultDestination,
     threads: int,
     environment: WorkerEnvironment,
 ) -> RunSteps:
@@ -96,7 +96,7 @@ def decompose_steps(
         Width and height to scale the mask to.
     method : MethodSettings
         How to decompose.
-    place : ResultPlace
+    place : ResultDestination
         Where the result goes.
     threads : int
         Number of threads; 0 uses one per core.
@@ -106,7 +106,7 @@ def decompose_steps(
     Returns
     -------
     RunOutput
-        The result folder, and what is built of it.
+        The result folder, and what is built from it.
     """
     folder = place.folder
     highlights, not_highlights = (
@@ -153,13 +153,13 @@ def decompose_steps(
 
 def _several_objects(
     job: DecomposeJob,
-    place: ResultPlace,
+    place: ResultDestination,
     names: Mapping[str, str],
     environment: WorkerEnvironment,
 ) -> RunSteps:
-    """What is built of each object: of earlier results of the same content, or a worker's.
+    """What is built from each object: from cached results of the same content, or from a worker's.
 
-    Of objects that fail there are notes; the next run tries all again.
+    Objects that fail are listed in the notes; the next run tries all of them again.
     """
     cache, key, folder = place.cache, "", job.output
     failures: tuple[str, ...] = ()
@@ -168,13 +168,13 @@ def _several_objects(
     if cache is None or not key or not cache.place(key).is_dir():
         worker = _run_worker(lambda: start_decompose(job, environment), names)
         try:
-            yield from _in_time(worker, Pace(job.max_size, job.refine, several=True))
+            yield from _with_time_left(worker, Pace(job.max_size, job.refine, several=True))
         except WorkerFailed as failure:
             if not object_folders(folder):
                 raise
             failures, cache = (f"{NOTE}{failure}",), None
         if cache is not None and key:
-            yield from _in_thread(partial(cache.take, key, folder), _READING)
+            yield from _in_thread(partial(cache.store, key, folder), _READING)
     if cache is not None and key:
         folder = cache.place(key)
     made = partial(read_and_prepare, folder, place.build, with_photo=place.with_photo)
@@ -189,7 +189,7 @@ def _several_objects(
         if place.keep:
             yield from _in_thread(partial(_copy_result, folder, job.output), _READING)
             folder = job.output
-            prepared = tuple(_moved(one, folder) for one in prepared)
+            prepared = tuple(_in_folder(one, folder) for one in prepared)
     results = object_folders(folder)
     notes = dict.fromkeys(note for one in results for note in _notes(one))
     remarks = set(map(_remark, results))
@@ -201,18 +201,18 @@ def _several_objects(
     )
 
 
-def _moved(prepared: PreparedObject, folder: Path) -> PreparedObject:
+def _in_folder(prepared: PreparedObject, folder: Path) -> PreparedObject:
     result = prepared.result
     return replace(prepared, result=replace(result, folder=folder / result.folder.name))
 
 
 def _cached_result(
     job: DecomposeJob,
-    place: ResultPlace,
+    place: ResultDestination,
     names: Mapping[str, str],
     environment: WorkerEnvironment,
 ) -> Generator[WorkerUpdate, None, PreparedObject]:
-    """What is built of a job's result: an earlier one of the same content, or a worker's."""
+    """What is built from a job's result: a cached one of the same content, or a worker's."""
     cache, key = place.cache, ""
     result: ResultArrays | None = None
     if cache is not None:
@@ -222,7 +222,7 @@ def _cached_result(
         result = yield from _in_thread(partial(cache.read, key), _LOOKING)
     if result is None:
         worker = _run_worker(lambda: start_decompose(job, environment), names)
-        yield from _in_time(worker, Pace(job.max_size, job.refine))
+        yield from _with_time_left(worker, Pace(job.max_size, job.refine))
         result = yield from _in_thread(partial(read_result, job.output), _READING)
     prepared = yield from _in_thread(
         partial(prepare, result, place.build, with_photo=place.with_photo), _READING
@@ -249,10 +249,10 @@ def _copy_result(source: Path, target: Path) -> None:
     shutil.copytree(source, target, ignore=shutil.ignore_patterns(ARRAYS))
 
 
-def _in_time(
+def _with_time_left(
     updates: Generator[WorkerUpdate, None, WorkerUpdate], pace: Pace
 ) -> Generator[WorkerUpdate, None, WorkerUpdate]:
-    """Progress that grows with the time, and the time left."""
+    """Updates with the fraction of the time that has passed, and the time left."""
     began = time.monotonic()
     try:
         while True:
@@ -351,14 +351,14 @@ def import_steps(result: Path, build: BuildOptions, environment: WorkerEnvironme
     result : Path
         Result folder.
     build : BuildOptions
-        What will be built of it.
+        What will be built from it.
     environment : WorkerEnvironment
         What the worker runs with.
 
     Returns
     -------
     RunOutput
-        The result folder, and what is built of it.
+        The result folder, and what is built from it.
     """
     if not (result / ARRAYS).is_file():
         yield from _run_worker(lambda: start_arrays(result, environment), {})
@@ -370,7 +370,7 @@ def import_steps(result: Path, build: BuildOptions, environment: WorkerEnvironme
 def read_and_prepare(
     folder: Path, build: BuildOptions, *, with_photo: bool = False
 ) -> tuple[PreparedObject, ...]:
-    """Read a result, or those of each object of a photo, and make in advance what takes time.
+    """Read a result, or those of each object of a photo, and do the slow part of building.
 
     Parameters
     ----------
@@ -452,7 +452,7 @@ def _in_thread(
     shown: WorkerUpdate,
     undo: Callable[[Future[T]], None] | None = None,
 ) -> Generator[WorkerUpdate, None, T]:
-    """Work that may block the window too long; even starting a process may, on a busy machine."""
+    """Run in a thread what could block the window; even starting a process may."""
     pool = ThreadPoolExecutor(1)
     working = pool.submit(work)
     pool.shutdown(wait=False)

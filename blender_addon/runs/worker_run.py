@@ -35,9 +35,9 @@ class RunOutput:
     notes : tuple of str
         Notes on the result; those that advise something begin with "note: ".
     prepared : tuple of PreparedObject
-        What is built of the folder, if it was read: one object, or one for each object.
+        What is built from the folder, if it was read; one entry per object.
     remark : str
-        What the message on the outcome says besides; "" for nothing.
+        Addition to the message on the outcome; "" for none.
     """
 
     path: Path
@@ -52,7 +52,7 @@ RunSteps = Generator[WorkerUpdate, None, RunOutput]
 ImportSteps = Generator[None, None, str]
 """Imports an output in short steps and returns one line on it; raises `InputError`."""
 
-IMPORT_SECONDS = 0.005  # of steps at a time; a longer one is alone
+IMPORT_SECONDS = 0.005  # of import steps per tick; a longer step has a tick of its own
 
 _REMOVE_SECONDS = 5.0
 
@@ -124,8 +124,8 @@ class WorkerRun:
     steps : RunSteps
         The work.
     finish : callable
-        Called with Blender's context and the output; the steps that import the result. They decide
-        what is kept of the folder; closed before their end, they leave the scene as it was.
+        Called with Blender's context and the output; returns the steps that import the result. They
+        delete what is not needed of the folder; if closed early, they leave the scene unchanged.
     folder : Path
         The run's own folder, deleted unless the run succeeds.
 
@@ -193,7 +193,7 @@ class WorkerRun:
         self.longest_call_ms = max(self.longest_call_ms, 1e3 * seconds)
 
     def import_result(self, context: Any) -> RunStatus:
-        """Import a part of the result of a run that is ready, for `IMPORT_SECONDS`.
+        """Import a part of the result of a ready run, in about `IMPORT_SECONDS`.
 
         Parameters
         ----------

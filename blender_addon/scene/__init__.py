@@ -1,7 +1,7 @@
-"""What ISC builds in Blender, one kind of datablock a module.
+"""What ISC builds in Blender, one module per kind of datablock.
 
-Every function can be called again: it finds what it has built before, by custom properties, and
-updates it. Blender's axes are x right, y away from the viewer, z up: a vector (x, y, z) of the
+Every function can be called again: it finds what it built before by custom properties, and updates
+it. Blender's axes are x right, y away from the viewer, z up: a vector (x, y, z) of the
 camera frame becomes (x, -z, y).
 """
 

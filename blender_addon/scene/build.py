@@ -18,7 +18,7 @@ from ..datablocks.images import (
     MAPS,
     SRGB,
     attach_maps,
-    put_image,
+    replace_image,
     require_color_spaces,
 )
 from ..datablocks.mesh import replace_mesh
@@ -32,12 +32,12 @@ from ..datablocks.provenance import (
     tag,
     write_provenance,
 )
-from ..datablocks.staging import StagedBlocks, completed, stage
+from ..datablocks.staging import StagedBlocks, run_to_end, stage
 from ..files.result_arrays import ResultArrays
 from ..materials.coated_surface import recovered_light
 from ..materials.gloss_edits import GlossBasis
 from ..materials.material import MaterialMaps, ensure_material
-from ..materials.photo_highlights import forget_view
+from ..materials.photo_highlights import reset_view
 from .built_object import BuiltObject
 from .camera import ensure_camera, set_background_photo, set_render_size
 from .collection import (
@@ -49,8 +49,8 @@ from .collection import (
 )
 from .copies import OBJECT
 from .displacement import add_displacement, remove_displacement
-from .hand_edits import remember_mesh
-from .placement import free_place
+from .hand_edits import store_checksum
+from .placement import free_location
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
@@ -62,7 +62,7 @@ _NO_LAMPS = np.zeros((0, 3))
 
 @dataclass(frozen=True)
 class StagedObject:
-    """An object whose images and mesh are made, and nothing else.
+    """An object of which only the images and the mesh exist.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def build_object(
 ) -> BuiltObject:
     """Build a result, or update what was built of the same photo under its name.
 
-    An object of another photo is kept; the new one is then named "name-2" and so on.
+    An object of another photo is not changed; the new one is then named "name-2" and so on.
 
     Parameters
     ----------
@@ -114,14 +114,14 @@ def build_object(
     _require_ready(_choose_key(result, options, photo), options, scene or bpy.context.scene)
     prepared = prepare(result, options, with_photo=photo is None)
     steps = stage_object(prepared, key_of(prepared, photo))
-    return place_object(completed(steps), scene=scene, photo=photo)
+    return place_object(run_to_end(steps), scene=scene, photo=photo)
 
 
 def stage_object(prepared: PreparedObject, key: str) -> Generator[None, None, StagedObject]:
-    """Make the images and the mesh of an object in short steps; the scene stays as it is.
+    """Create the images and the mesh of an object in short steps; the scene is unchanged.
 
-    Between two steps anything may happen, an undo included. If closed before the end, nothing is
-    left.
+    Between two steps anything may happen, including an undo. If it is closed early, nothing is left
+    behind.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def stage_object(prepared: PreparedObject, key: str) -> Generator[None, None, St
     while True:
         base = _mesh_number(key)
         blocks = yield from stage(prepared.files, prepared.mesh, base)
-        if blocks.are_there and _mesh_number(key) == base:
+        if blocks.exist and _mesh_number(key) == base:
             return StagedObject(prepared, blocks)
         blocks.discard()
 
@@ -166,22 +166,22 @@ def place_object(
     *,
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
-    place: Matrix | None = None,
-    room: np.ndarray | None = None,
+    matrix: Matrix | None = None,
+    bounds: np.ndarray | None = None,
 ) -> BuiltObject:
     """Put a staged object in the scene, as `build_object` does, in one short call.
 
     Parameters
     ----------
     staged : StagedObject
-        The object; its datablocks are used or removed.
+        The object; its datablocks are used, or removed.
     scene, photo
         As of `build_object`.
-    place : Matrix, optional
-        Transform of a new object; None puts it at the 3D cursor, or at the origin of its own scene.
-    room : (2, 3) ndarray, optional
-        The lowest and the highest corner of what is at the cursor, from the object's origin; those
-        of its mesh if None.
+    matrix : Matrix, optional
+        Transform of a new object; None uses the 3D cursor, or the origin of its own scene.
+    bounds : (2, 3) ndarray, optional
+        Minimum and maximum corner of what is placed at the cursor, relative to the object's origin;
+        those of its mesh if None.
 
     Returns
     -------
@@ -195,7 +195,7 @@ def place_object(
     """
     try:
         scene = scene or bpy.context.scene
-        return _place(staged.prepared, staged.blocks, scene, photo, (place, room))
+        return _place(staged.prepared, staged.blocks, scene, photo, (matrix, bounds))
     finally:
         staged.blocks.discard()
 
@@ -229,7 +229,7 @@ def _place(
     blocks: StagedBlocks,
     scene: bpy.types.Scene,
     photo: bpy.types.Image | None,
-    standing: tuple[Matrix | None, np.ndarray | None],
+    position: tuple[Matrix | None, np.ndarray | None],
 ) -> BuiltObject:
     result, options = prepared.result, prepared.options
     key = _choose_key(result, options, photo)
@@ -238,7 +238,7 @@ def _place(
         scene = ensure_scene(key)
     collection = ensure_collection(key, scene)
     images = {
-        role: put_image(image, key, role)
+        role: replace_image(image, key, role)
         for role in prepared.files
         if (image := blocks.take_image(role)) is not None
     }
@@ -259,10 +259,10 @@ def _place(
     else:
         remove_displacement(key, obj)
     if is_new:
-        _stand(obj, options, scene, *standing)
+        _position(obj, options, scene, *position)
     attach_maps(key, obj, {name: images[name] for name in MAPS if name in images})
     world = ensure_world(key, images["environment_map"], result.sun_ambient, options.sun)
-    # Saves and appends the light with the object, whether or not a scene uses it.
+    # So that the light is saved and appended with the object even if no scene uses it.
     obj["isc_world"] = world
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))
@@ -275,7 +275,7 @@ def _place(
         set_background_photo(camera, photo)
     built = BuiltObject(collection, obj, camera, world, scene, material)
     _set_scene(built, options, result)
-    forget_view(material)  # the layer of highlights belongs to what is seen now
+    reset_view(material)  # the layer of highlights is valid for the present view
     return built
 
 
@@ -287,7 +287,7 @@ def _lamps(result: ResultArrays) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _choose_key(result: ResultArrays, options: BuildOptions, photo: bpy.types.Image | None) -> str:
-    """The name, numbered if another photo's object has it: folders may share file names."""
+    """The name, numbered if the object of another photo has it: photos may share a file name."""
     name = options.name or result.name
     key, number = name, 1
     while (obj := find_tagged(bpy.data.objects, key, OBJECT)) is not None and not _is_of_same_photo(
@@ -343,7 +343,7 @@ def _ensure_object(
         obj.shape_key_clear()
         replace_mesh(obj.data, mesh)
     tag(mesh, key, "mesh")
-    remember_mesh(mesh, prepared.checksum)
+    store_checksum(mesh, prepared.checksum)
     if shadows is not None:
         obj.visible_shadow = obj.visible_diffuse = shadows
     link_object(obj, collection)
@@ -352,17 +352,17 @@ def _ensure_object(
     return obj
 
 
-def _stand(
+def _position(
     obj: bpy.types.Object,
     options: BuildOptions,
     scene: bpy.types.Scene,
-    place: Matrix | None,
-    room: np.ndarray | None,
+    matrix: Matrix | None,
+    bounds: np.ndarray | None,
 ) -> None:
-    if place is not None:
-        obj.matrix_basis = place
+    if matrix is not None:
+        obj.matrix_basis = matrix
     elif not options.own_scene:
-        obj.location = free_place(obj, scene, room)
+        obj.location = free_location(obj, scene, bounds)
 
 
 def _ensure_camera_and_light(
@@ -373,7 +373,7 @@ def _ensure_camera_and_light(
     options: BuildOptions,
     scene: bpy.types.Scene,
 ) -> bpy.types.Object | None:
-    """The photo's camera; in a shared scene in a part of its own, with a sun, if wanted at all."""
+    """The photo's camera; in a shared scene, in a collection with a sun, if requested."""
     if not options.own_scene and not (options.light_and_camera or options.set_camera):
         return find_tagged(bpy.data.objects, key, "camera")
     if not options.own_scene:

@@ -15,7 +15,7 @@ class BuiltObject:
     Attributes
     ----------
     collection : bpy.types.Collection
-        Collection of everything built of the photo.
+        Collection of everything built from the photo.
     object : bpy.types.Object
         The object.
     camera : bpy.types.Object or None
@@ -39,9 +39,9 @@ class BuiltObject:
 def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     """Find what belongs to an object, camera or sun that ISC made.
 
-    A copy of an object is found itself, with its own material, and with what it shares with the
-    original. Camera, world, scene and collection are None where they were deleted, or not appended
-    with the object.
+    For a copy, this is the copy with its own material, and what it shares with the original.
+    Camera, world, scene and collection are None if they were deleted, or not appended with the
+    object.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     Returns
     -------
     BuiltObject or None
-        None for other objects, and where the object or its material was deleted.
+        None for other objects, or if the object or its material was deleted.
     """
     if obj is None or not is_isc_datablock(obj):
         return None
@@ -72,8 +72,8 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
     )
 
 
-def why_not_built(obj: bpy.types.Object | None) -> str:
-    """Return why an object is none that operators of ISC can work on.
+def selection_problem(obj: bpy.types.Object | None) -> str:
+    """Return why the operators of ISC cannot be used on an object.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def why_not_built(obj: bpy.types.Object | None) -> str:
     Returns
     -------
     str
-        What to do; "" where `find_built` finds one.
+        What to do, as a tooltip; "" if they can be used.
     """
     if find_built(obj) is not None:
         return ""

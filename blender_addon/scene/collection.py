@@ -78,8 +78,8 @@ def ensure_optional_part(
     role : str
         Purpose of the part.
     shown : bool
-        Whether the scene uses the part. Otherwise a new part is unchecked in the Outliner: its
-        lights shine neither in the viewport nor in renders. The user's choice is kept.
+        Whether the scene uses the part. Otherwise a new part is excluded from the view layers: its
+        lights are neither in the viewport nor in renders. An existing part is not changed then.
 
     Returns
     -------

@@ -2,7 +2,8 @@
 
 A copy has the key, the role and at first the material of its original. The first object of a key is
 the original, which is updated when its photo is decomposed again; the others are copies. Once a
-copy has its own material, both have the role "copy", so that they are never taken for the original.
+copy has its own material, both have the role "copy", so that they are not mistaken for the
+original.
 World, sun and camera belong to the original and its copies alike.
 
 Limits: while they share everything, the order of their names decides which one is the original.

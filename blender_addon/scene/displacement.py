@@ -3,8 +3,8 @@ for more or less relief.
 
 The image contains metres toward the viewer, relative to the grid: strength 1 is the recovered
 shape. A pixel at a vertex of the height mesh has that vertex's height, so both shapes agree.
-Before a pinhole camera, grid and displacements are along its rays, as vectors: the object looks the
-same from there at any strength.
+For a pinhole camera, the displacements are vectors along its rays: seen from there, the object
+looks the same at any strength.
 
 Limits: the normals are those of the displaced grid, not the recovered ones.
 """
@@ -30,7 +30,7 @@ def flatten(sheet: MeshGeometry, eye: np.ndarray | None = None) -> MeshGeometry:
     sheet : MeshGeometry
         The visible side of the object, in Blender's axes (y away from the viewer).
     eye : (3,) ndarray, optional
-        Place of a pinhole camera, along whose rays the vertices are moved.
+        Position of a pinhole camera, along whose rays the vertices are moved.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def displacement_heights(result: ResultArrays, size_metres: float) -> np.ndarray
 
 
 def displacement_vectors(result: ResultArrays, size_metres: float, eye: np.ndarray) -> np.ndarray:
-    """Return the displacements of the grid before a pinhole camera.
+    """Return the displacements of the grid for a pinhole camera.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def displacement_vectors(result: ResultArrays, size_metres: float, eye: np.ndarr
     size_metres : float
         Longer side of the object.
     eye : (3,) ndarray
-        The camera's place, see `eye_of`.
+        Position of the camera, see `eye_of`.
 
     Returns
     -------
@@ -94,7 +94,7 @@ def displacement_vectors(result: ResultArrays, size_metres: float, eye: np.ndarr
 
 
 def displacement_map(result: ResultArrays, size_metres: float) -> np.ndarray:
-    """Return what the grid is displaced by; this may run in another thread.
+    """Return the displacements of the grid; may run in another thread.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def displacement_map(result: ResultArrays, size_metres: float) -> np.ndarray:
     Returns
     -------
     (H, W) or (H, W, 3) ndarray
-        Heights, or before a pinhole camera vectors.
+        Heights; vectors for a pinhole camera.
     """
     eye = eye_of(result, size_metres)
     if eye is None:
@@ -117,7 +117,7 @@ def displacement_map(result: ResultArrays, size_metres: float) -> np.ndarray:
 def add_displacement(
     key: str, obj: bpy.types.Object, image: bpy.types.Image, along_rays: bool
 ) -> None:
-    """Add or update the modifier and its texture; an edited strength is kept.
+    """Add or update the modifier and its texture, without changing the strength of an existing one.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
-"""Whether the mesh of an object is still the one that was built: a checksum (CRC-32) of its places
-and faces, stored in the mesh.
+"""Whether the mesh of an object is still the one that was built: a checksum (CRC-32) of vertices and
+faces, stored in the mesh.
 
-Limits: one edit in four thousand million goes unnoticed. UV, attributes and modifiers do not count;
-they are kept, or made again, when the object is updated.
+Limits: one edit in four thousand million goes unnoticed. UV maps, attributes and modifiers are not
+included; an update of the object keeps or replaces them.
 """
 
 import zlib
@@ -15,7 +15,7 @@ from ..datablocks.mesh import MeshArrays
 _BUILT = "isc_built_crc32"
 
 
-def remember_mesh(mesh: bpy.types.Mesh, checksum: str) -> None:
+def store_checksum(mesh: bpy.types.Mesh, checksum: str) -> None:
     """Store the checksum of a mesh as it was built.
 
     Parameters
@@ -23,12 +23,12 @@ def remember_mesh(mesh: bpy.types.Mesh, checksum: str) -> None:
     mesh : bpy.types.Mesh
         The mesh.
     checksum : str
-        As `checksum_of` its arrays.
+        As `mesh_checksum` its arrays.
     """
     mesh[_BUILT] = checksum
 
 
-def checksum_of(arrays: MeshArrays) -> str:
+def mesh_checksum(arrays: MeshArrays) -> str:
     """Return the checksum of a mesh that will be built; this may run in another thread.
 
     Parameters

@@ -36,7 +36,7 @@ from .preparation import BuildOptions, PreparedObject, prepare
 
 _CONSTANT = 0.5 / np.sqrt(np.pi)  # the first spherical harmonic
 _LEAST = 1e-9
-# What of a scene only the first object changes.
+# Options that only the first object has, as they change the scene.
 _SHARED = (
     "own_scene",
     "light_and_camera",
@@ -51,7 +51,7 @@ _SHARED = (
 def prepare_objects(
     results: Sequence[ResultArrays], options: BuildOptions, *, with_photo: bool = False
 ) -> list[PreparedObject]:
-    """Make in advance what takes time of several objects of a photo.
+    """Do the slow part of building several objects of a photo.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def prepare_objects(
     Returns
     -------
     list of PreparedObject
-        The largest object first: scene, light and camera are its own.
+        The largest object first, to which scene, light and camera belong.
     """
     lengths = [result.longest_side / result.crop_scale for result in results]
     step = options.size_metres / max(lengths)
@@ -73,28 +73,30 @@ def prepare_objects(
     name, shadows = options.name or results[0].name, options.own_shadows
     if shadows is None and options.own_scene:
         shadows = False
-    lit, made = _under_one_light(results, first), []
-    for index in sorted(range(len(lit)), key=lambda index: index != first):
+    relit, made = _under_one_light(results, first), []
+    for index in sorted(range(len(relit)), key=lambda index: index != first):
         numbered = f"{name} {results[index].folder.name}"
         own = replace(options, size_metres=step * lengths[index], name=numbered)
         if index != first:
             none: dict[str, Any] = dict.fromkeys(_SHARED, False)
             own = replace(own, own_shadows=shadows, **none)
-        prepared = prepare(lit[index], own, with_photo=with_photo and index == first)
-        offset = offset_of(results[first], results[index], step)
+        prepared = prepare(relit[index], own, with_photo=with_photo and index == first)
+        offset = offset_between(results[first], results[index], step)
         made.append(replace(prepared, offset=offset))
     return made
 
 
-def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[float, float, float]:
-    """Return where an object lies from another one of the same photo.
+def offset_between(
+    first: ResultArrays, other: ResultArrays, step: float
+) -> tuple[float, float, float]:
+    """Return the offset between two objects of the same photo.
 
     Parameters
     ----------
     first, other : ResultArrays
         The objects.
     step : float
-        Metres for a pixel of the photo.
+        Metres per pixel of the photo.
 
     Returns
     -------
@@ -114,7 +116,7 @@ def offset_of(first: ResultArrays, other: ResultArrays, step: float) -> tuple[fl
 def stage_objects(
     prepared: Sequence[PreparedObject], *, photo: bpy.types.Image | None = None
 ) -> Generator[None, None, list[StagedObject]]:
-    """Make the images and the meshes of objects in short steps, see `build.stage_object`.
+    """Create the images and the meshes of objects in short steps, see `build.stage_object`.
 
     Parameters
     ----------
@@ -136,8 +138,8 @@ def stage_objects(
             for one, key in zip(prepared, keys, strict=True):
                 made = yield from stage_object(one, key)
                 staged.append(made)
-            # An undo in the meantime takes away what was made first.
-            complete = all(one.blocks.are_there for one in staged)
+            # An undo in the meantime removes what was created first.
+            complete = all(one.blocks.exist for one in staged)
             if not complete:
                 discard(staged)
         return staged
@@ -164,7 +166,7 @@ def place_objects(
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
 ) -> list[BuiltObject]:
-    """Put objects in a scene as they lie in the photo, in one short call.
+    """Place objects in a scene as they are placed in the photo, in one short call.
 
     Parameters
     ----------
@@ -176,7 +178,7 @@ def place_objects(
     Returns
     -------
     list of BuiltObject
-        In the same order; objects that were there stay where they are.
+        In the same order; existing objects stay where they are.
 
     Raises
     ------
@@ -187,11 +189,11 @@ def place_objects(
     try:
         for one in staged:
             require_placeable(one, scene=scene, photo=photo)
-        built = [place_object(first, scene=scene, photo=photo, room=_room(staged))]
+        built = [place_object(first, scene=scene, photo=photo, bounds=_joint_bounds(staged))]
         place = Matrix.LocRotScale(*built[0].object.matrix_basis.decompose()[:2], None)
         for one in others:
             beside = place @ Matrix.Translation(one.prepared.offset)
-            built.append(place_object(one, scene=built[0].scene, photo=photo, place=beside))
+            built.append(place_object(one, scene=built[0].scene, photo=photo, matrix=beside))
         options = first.prepared.options
         if options.each and options.own_scene:
             _name_scene(built[0])
@@ -207,8 +209,8 @@ def _name_scene(built: BuiltObject) -> None:
         built.scene.name = datablock_name(key.rpartition(" ")[0])
 
 
-def _room(staged: Sequence[StagedObject]) -> np.ndarray:
-    """The lowest and the highest corner (2, 3) of all objects, from the first one's origin."""
+def _joint_bounds(staged: Sequence[StagedObject]) -> np.ndarray:
+    """Minimum and maximum corner (2, 3) of all objects, relative to the first one's origin."""
     corners = []
     for one in staged:
         points = one.prepared.mesh.positions.reshape(-1, 3) + np.array(one.prepared.offset)
@@ -226,7 +228,7 @@ def _under_one_light(results: Sequence[ResultArrays], first: int) -> list[Result
 
 
 def _gain(result: ResultArrays, light: np.ndarray) -> float:
-    """What an object's base color is multiplied with, to be as bright under another light."""
+    """Factor of an object's base color that keeps its brightness under another light."""
     basis = real_sh(result.normal[result.mask].astype(float))
     color = result.base_color[result.mask].astype(float)
     own, under = (
@@ -237,7 +239,7 @@ def _gain(result: ResultArrays, light: np.ndarray) -> float:
 
 
 def _with_gain(result: ResultArrays, gain: float) -> ResultArrays:
-    """The same result with a base color so many times as bright, and a light as many times less."""
+    """The same result with the base color multiplied, and the light divided, by a gain."""
     light = result.mesh_illumination.copy()
     light[0] -= np.float32(np.log(gain) / _CONSTANT)
     codes = srgb_to_linear(np.arange(256) / 255)

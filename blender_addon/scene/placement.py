@@ -1,15 +1,15 @@
-"""Where a new object stands in a scene that is not its own: on the 3D cursor, and seen.
+"""The location of a new object in a shared scene: on the 3D cursor, and visible.
 
 The middle of its base is at the cursor. If another object would enclose it, as the cube of a new
-file would, it stands beside that one instead, to the right, with a gap of a tenth of its own width.
+file would, it is placed to the right of that object, with a gap of a tenth of its own width.
 
 Equation: a surface surrounds a place p by its winding number, with the solid angle of a triangle
 whose corners are a, b and c from p,
 
     w = sum 2 atan2(a.(b x c), |a||b||c| + (a.b)|c| + (b.c)|a| + (c.a)|b|) / (4 pi).
 
-It is 1 in a closed body, 0 outside, and -1 in a room, whose normals point inward; above one half,
-the object encloses the place. Of a large mesh, 1000 faces from all over it stand for the others:
+It is 1 in a closed mesh, 0 outside, and -1 in a room, whose normals point inward; above one half,
+the object encloses the place. A large mesh is represented by 1000 faces from all over it:
 Blender's ray casts first sort all of them, a tenth of a second for 100,000, while the window waits.
 
 Citations: A. Van Oosterom, J. Strackee 1983, doi:10.1109/TBME.1983.325207 (solid angle);
@@ -28,15 +28,15 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-_MOST_FACES = 1000  # of a mesh that are looked at
+_MAX_FACES = 1000  # of a mesh that are used
 _GOLDEN = 0.618034  # its multiples are spread evenly over [0, 1), and follow no order of faces
 _GAP = 0.1
-_MOST_STEPS = 16
+_MAX_STEPS = 16
 _SOLID = {"SOLID", "TEXTURED"}
 
 
-def free_place(
-    obj: bpy.types.Object, scene: bpy.types.Scene, room: np.ndarray | None = None
+def free_location(
+    obj: bpy.types.Object, scene: bpy.types.Scene, bounds: np.ndarray | None = None
 ) -> Vector:
     """Find the location of a new object.
 
@@ -46,9 +46,9 @@ def free_place(
         The object, unrotated; the bounding box of its mesh is used.
     scene : bpy.types.Scene
         The scene with the 3D cursor; its visible meshes can be in the way.
-    room : (2, 3) ndarray, optional
-        The lowest and the highest corner of what has to find a place, from the object's origin;
-        those of its mesh if None.
+    bounds : (2, 3) ndarray, optional
+        Minimum and maximum corner of what is placed, relative to the object's origin; those of its
+        mesh if None.
 
     Returns
     -------
@@ -57,12 +57,12 @@ def free_place(
     """
     points = np.empty((len(obj.data.vertices), 3), np.float32)
     obj.data.vertices.foreach_get("co", points.ravel())
-    points = points if room is None else room
+    points = points if bounds is None else bounds
     low, high = Vector(points.min(0)), Vector(points.max(0))
     middle = (low + high) / 2
     place = scene.cursor.location - Vector((middle.x, middle.y, low.z))
     others = [other for other in scene.objects if other != obj and _is_solid(other)]
-    for _ in range(_MOST_STEPS):
+    for _ in range(_MAX_STEPS):
         enclosing = next((other for other in others if _encloses(other, place + middle)), None)
         if enclosing is None:
             break
@@ -71,7 +71,7 @@ def free_place(
 
 
 def _bounds(points: Iterable[Vector]) -> tuple[Vector, Vector]:
-    """The lowest and the highest corner of a box around points."""
+    """Minimum and maximum corner of the bounding box of points."""
     columns = list(zip(*points, strict=True))
     return Vector([min(column) for column in columns]), Vector([max(column) for column in columns])
 
@@ -93,7 +93,7 @@ def _encloses(obj: bpy.types.Object, place: Vector) -> bool:
 
 
 def _winding_number(obj: bpy.types.Object, place: Vector) -> float:
-    """How often the surface of an object surrounds a place."""
+    """The winding number of an object's surface around a point."""
     mesh = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
     triangles, weight = _sample(mesh)
     center = np.array(obj.matrix_world.inverted_safe() @ place)
@@ -101,11 +101,11 @@ def _winding_number(obj: bpy.types.Object, place: Vector) -> float:
 
 
 def _sample(mesh: bpy.types.Mesh) -> tuple[np.ndarray, float]:
-    """Triangles (T, 3, 3) of some faces, and for how many faces each of these stands."""
+    """Triangles (T, 3, 3) of a sample of the faces, and how many faces each of these represents."""
     count = len(mesh.polygons)
     if not count:  # nothing but edges, or a mesh in Edit Mode
         return np.zeros((0, 3, 3)), 0.0
-    chosen = _spread(count, _MOST_FACES)
+    chosen = _sample_indices(count, _MAX_FACES)
     faces = [mesh.polygons[index].vertices[:] for index in chosen]
     fans = [(face[0], *edge) for face in faces for edge in pairwise(face[1:])]
     points = np.empty((len(mesh.vertices), 3), np.float32)
@@ -114,8 +114,8 @@ def _sample(mesh: bpy.types.Mesh) -> tuple[np.ndarray, float]:
     return points[np.array(fans)], count / len(chosen)
 
 
-def _spread(count: int, most: int) -> list[int]:
-    """Numbers below `count`, all of them or one from each of so many equal parts."""
+def _sample_indices(count: int, most: int) -> list[int]:
+    """Indices below `count`: all of them, or one from each of `most` equal parts."""
     if count <= most:
         return list(range(count))
     number = np.arange(most)

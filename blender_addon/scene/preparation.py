@@ -1,7 +1,6 @@
-"""What of a result is built, and what of that takes time, made in advance: meshes, and the files of
-images.
+"""What is built from a result, and the slow part of building: meshes and the files of images.
 
-Nothing here touches a datablock, so it may run in another thread while the window is used.
+Nothing here accesses a datablock, so it may run in another thread while the window is used.
 """
 
 from dataclasses import dataclass, replace
@@ -24,11 +23,11 @@ from ..datablocks.images import (
 )
 from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arrays
 from ..files.result_arrays import ResultArrays
-from ..materials.coated_surface import coated_surface, coded_normals
+from ..materials.coated_surface import coated_surface, encode_normals
 from ..materials.material import SpecularSettings, SpecularSource
 from .camera import eye_of
 from .displacement import displacement_map, flatten
-from .hand_edits import checksum_of
+from .hand_edits import mesh_checksum
 from .solid_mesh import solid_geometry
 
 # `BuildOptions.own_shadows` of each item of the panel.
@@ -38,7 +37,7 @@ _DEFAULT_ROUGHNESS = 0.5
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """What is built, and which of the user's settings may change.
+    """What is built, and which settings of the user's scene may change.
 
     The field names are part of the JSON text that files store.
 
@@ -51,9 +50,9 @@ class BuildOptions:
         and world, active camera, resolution and view transform change only with the next four
         options.
     set_world, set_camera, set_resolution, set_view_transform : bool
-        What of a shared scene may change.
+        Settings of a shared scene that may change.
     light_and_camera : bool
-        Whether the photo's camera and the estimated sun come along into a shared scene, in a
+        Whether the photo's camera and the estimated sun are added to a shared scene, in a
         collection of their own that is unchecked at first. A new scene always has the camera.
     photo_resolution : bool
         Whether renders have the photo's resolution instead of that of the maps.
@@ -64,7 +63,7 @@ class BuildOptions:
     back : str
         A value of `Back`; "" builds the result's own mesh, whose vertices are pixels.
     triangles : int
-        The most of the visible side of a mesh with a `back`; 0 for two at each pixel.
+        Maximum number on the visible side of a mesh with a `back`; 0 for two per pixel.
     specular_from : str
         Source of the highlights: the fitted "lobe", the photo's specular "image" until light,
         camera or pose change, or "none".
@@ -101,14 +100,14 @@ class BuildOptions:
 
 @dataclass(frozen=True)
 class PreparedObject:
-    """What an object is built of.
+    """What an object is built from.
 
     Attributes
     ----------
     result : ResultArrays
         The result.
     options : BuildOptions
-        What will be built of it.
+        What will be built from it.
     mesh : MeshArrays
         The mesh.
     checksum : str
@@ -118,7 +117,7 @@ class PreparedObject:
     specular : SpecularSettings
         The specular part of the material.
     offset : tuple of float
-        Where it lies from the first object of the same photo; metres in Blender's axes.
+        Offset from the first object of the same photo; metres in Blender's axes.
     """
 
     result: ResultArrays
@@ -133,21 +132,21 @@ class PreparedObject:
 def prepare(
     result: ResultArrays, options: BuildOptions, *, with_photo: bool = False
 ) -> PreparedObject:
-    """Make in advance what takes time.
+    """Do the slow part of building an object.
 
     Parameters
     ----------
     result : ResultArrays
         The result.
     options : BuildOptions
-        What will be built of it.
+        What will be built from it.
     with_photo : bool, optional
         Whether the masked photo of the result becomes an image.
 
     Returns
     -------
     PreparedObject
-        What an object is built of.
+        What the object is built from.
 
     Raises
     ------
@@ -166,7 +165,7 @@ def prepare(
     files["base_color"] = _base_color(result, layer)
     if layer is not None:
         files["plain_base_color"] = _base_color(result, None)
-        files["view_normal"] = replace(coded_file(coded_normals(surface.normal)), space=DATA)
+        files["view_normal"] = replace(coded_file(encode_normals(surface.normal)), space=DATA)
     if result.specular_variation is not None:
         values = result.specular_variation / _peak(result)
         files["specular_variation"] = texture_file(values, DATA)
@@ -180,7 +179,7 @@ def prepare(
         files["displacement"] = map_file(displacement_map(result, options.size_metres), DATA)
     if with_photo:
         files["photo"] = map_file(result.image, COLOR, result.mask)
-    return PreparedObject(result, options, mesh, checksum_of(mesh), files, specular)
+    return PreparedObject(result, options, mesh, mesh_checksum(mesh), files, specular)
 
 
 def require_options(options: BuildOptions) -> None:
@@ -217,7 +216,7 @@ def _geometry(result: ResultArrays, options: BuildOptions) -> tuple[MeshGeometry
 
 
 def _base_color(result: ResultArrays, layer: SpecularLayer | None) -> ImageFile:
-    """The base colour, of what is under a specular layer if there is one."""
+    """The base colour; with a specular layer, that of the surface under it."""
     if (codes := result.texture) is not None:
         return coded_file(codes if layer is None else layer.codes_under(codes))
     color = result.base_color

@@ -1,6 +1,6 @@
 """The mesh with a smooth outline, fewer triangles and a back, from the maps of a result.
 
-Rim and back have confidence 0.
+The confidence is 0 on the rim and on the back.
 """
 
 import numpy as np
@@ -12,14 +12,14 @@ from isc_core.result_files.solids.surface import Solid, before_camera, make_soli
 from isc_core.shading.perspective import view_directions
 
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
-from ..datablocks.quads import joined_squares
+from ..datablocks.quads import joined_quads
 from ..files.result_arrays import ResultArrays
 
 
 def solid_geometry(
     result: ResultArrays, size_metres: float, back: str, triangles: int
 ) -> tuple[MeshGeometry, np.ndarray]:
-    """Return the mesh of a body, and its normal map; this may run in another thread.
+    """Return the solid mesh of an object and its normal map; may run in another thread.
 
     Parameters
     ----------
@@ -30,12 +30,12 @@ def solid_geometry(
     back : str
         A value of `Back`.
     triangles : int
-        The most of the visible side; 0 for two at each pixel.
+        Maximum number on the visible side; 0 for two per pixel.
 
     Returns
     -------
     geometry : MeshGeometry
-        Squares, and triangles where sizes change and along the outline; a normal per vertex.
+        Quads, and triangles where sizes change and along the outline; one normal per vertex.
     normal_map : (H, W, 3) ndarray of float32
         Tangent space, [0, 1] for [-1, 1].
 
@@ -51,7 +51,7 @@ def solid_geometry(
     confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
         to_blender(vertices),
-        *joined_squares(body.faces, body.places),
+        *joined_quads(body.faces, body.places),
         solid.uv(),
         confidence,
         to_blender(solid.normals(vertices)),
@@ -73,7 +73,7 @@ def _solid(result: ResultArrays, back: str, triangles: int) -> Solid:
 def _heights(result: ResultArrays) -> np.ndarray:
     """(H, W): pixels toward the viewer from the mesh's origin, inside the mask.
 
-    Where the result's mesh has a vertex its height is taken, whose spikes at the rim are limited.
+    At a vertex of the result's mesh this is its height, whose spikes at the rim are limited.
     """
     rows, columns = result.vertex_pixel.T
     found = np.zeros(result.mask.shape)

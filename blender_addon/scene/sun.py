@@ -3,8 +3,9 @@
 Equation: shading = E / pi * max(0, n . l) + A, with the irradiance E of the sun perpendicular to
 its direction l, which is Blender's strength of a sun, and the uniform light A of the world.
 
-After `isc refine`, the lamps of the lobe are suns too, beside the environment map, which has their
-diffuse light already: they light highlights alone. Turning one moves its highlight.
+After `isc refine`, the lamps of the lobe are suns, too, in addition to the environment map. The map
+already contains their diffuse light, so they contribute specular light alone. Rotating one moves
+its highlight.
 """
 
 import bpy
@@ -68,7 +69,7 @@ def _ensure_sun(
 def ensure_lamps(
     key: str, collection: bpy.types.Collection, directions: np.ndarray, strengths: np.ndarray
 ) -> list[bpy.types.Object]:
-    """Create or update the lamps of the highlights, and remove those that are left over.
+    """Create or update the lamps of the highlights, and remove surplus ones.
 
     Parameters
     ----------

@@ -256,7 +256,9 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         default=True,
     )
     set_world: BoolProperty(
-        name="World", description="Replace the scene's world by the recovered light", default=False
+        name="World",
+        description="Replace the scene's world with the recovered light",
+        default=False,
     )
     set_camera: BoolProperty(
         name="Camera", description="Make the photo's camera the scene's camera", default=False
@@ -274,7 +276,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     sun: BoolProperty(
         name="Estimated Sun",
         description=(
-            "Add a sun along the main direction of the light, and replace the recovered light by "
+            "Add a sun along the main direction of the light, and replace the recovered light with "
             "uniform light"
         ),
         default=False,

@@ -8,7 +8,7 @@ SEPARATING_MODELS = ("joint", "mdr", "mbp")
 _MARKS = ("highlights", "not_highlights")
 
 
-def why_unused(settings: Any, name: str) -> str:
+def unused_reason(settings: Any, name: str) -> str:
     """Return why a setting has no effect now.
 
     Parameters

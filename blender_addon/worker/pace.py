@@ -1,4 +1,4 @@
-"""Progress in time: which share of a run's time is over, and how many seconds are left.
+"""Progress in time: which fraction of a run's time has passed, and how many seconds are left.
 
 A worker's own fraction counts steps: the solver takes two thirds of it whether the maps are large
 or small. Here the fractions at which its stages begin are mapped to the seconds that the stages
@@ -34,7 +34,7 @@ _SECONDS = {
 }
 _REFINING_SECONDS = 8.0  # at any size; next to nothing where there are no highlights
 _UNSURE_SECONDS = 2.0
-_MOST_UNREPORTED = 0.8  # share of a stage's rest
+_MAX_UNREPORTED = 0.8  # share of a stage's rest
 
 
 @dataclass
@@ -50,7 +50,7 @@ class Pace:
     several : bool
         Whether the worker looks for several objects.
     share : float
-        Share of the time that is over, in [0, 1]; never falls.
+        Fraction of the time that has passed, in [0, 1]; never decreases.
     """
 
     size: int
@@ -62,7 +62,7 @@ class Pace:
     _begun: float | None = field(default=None, init=False)
 
     def at(self, update: WorkerUpdate, elapsed: float) -> WorkerUpdate:
-        """Put an update in time.
+        """Add the times to an update.
 
         Parameters
         ----------
@@ -85,7 +85,7 @@ class Pace:
         if update.fraction != self._fraction:
             self._fraction, self._since = update.fraction, elapsed
         slowness = max(1.0, spent / done) if done > 0 else 1.0
-        waited = min((elapsed - self._since) / slowness, _MOST_UNREPORTED * (end - done))
+        waited = min((elapsed - self._since) / slowness, _MAX_UNREPORTED * (end - done))
         if (over := done + waited) > 0 or usual:
             left = (total - over) * (spent + usual) / (over + usual)
             self.share = max(self.share, elapsed / (elapsed + left))

@@ -5,7 +5,7 @@ not load, and may crash, while Blender's window has to stay responsive. `python 
 --progress json` therefore runs in its own process with an explicit environment. A thread reads its
 output, and `WorkerProcess.poll` returns the latest state.
 
-However the worker ends, it leaves nothing but a complete result. When cancelled, it cleans up
+However the worker ends, it leaves only a complete result or nothing. When cancelled, it cleans up
 itself. When killed, its unfinished files are removed here. When Blender dies, the end of its
 standard input makes the worker stop.
 
@@ -65,7 +65,7 @@ class WorkerUpdate:
     seconds_left : float or None
         Estimate of the time until the end; None if unknown.
     part : (int, int) or None
-        Which of several objects the worker is at, from 1 on, and how many there are.
+        Number of the present object, from 1, and number of objects; None for a single one.
     """
 
     stage: str = ""

@@ -9,8 +9,8 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.datablocks.images import DATA, SRGB, map_file, new_image, own_file  # noqa: E402
-from blender_addon.datablocks.staging import completed  # noqa: E402
+from blender_addon.datablocks.images import DATA, SRGB, map_file, new_image, unmodified_file  # noqa: E402
+from blender_addon.datablocks.staging import run_to_end  # noqa: E402
 from blender_addon.files.result_arrays import ResultArrays, read_result  # noqa: E402
 from blender_addon.materials.color_bake import ColorEdit, color_source, edited_file  # noqa: E402
 from blender_addon.materials.edit_nodes import dichromatic_node, surface_node  # noqa: E402
@@ -48,7 +48,7 @@ def test_what_an_undo_took_away_is_made_again(result: ResultArrays) -> None:
     running = stage_object(prepare(result, SHARED, with_photo=True), "bump")
     next(running)
     bpy.data.images.remove(bpy.data.images[-1])
-    staged = completed(running)
+    staged = run_to_end(running)
     built = place_object(staged)
     textures = [node.image for node in built.material.node_tree.nodes if node.type == "TEX_IMAGE"]
     assert textures and all(image is not None for image in textures)
@@ -63,7 +63,7 @@ def test_a_scene_that_refuses_it_stays_as_it_was(result: ResultArrays) -> None:
     before = census()
     bpy.context.view_layer.objects.active = obj
     bpy.ops.object.mode_set(mode="EDIT")
-    staged = completed(running)
+    staged = run_to_end(running)
     with pytest.raises(InputError, match="return to Object Mode"):
         place_object(staged)
     assert census() == before
@@ -106,12 +106,12 @@ def test_blender_reads_the_maps_as_they_are(blender: Any, shape: tuple[int, ...]
 
 def test_a_painted_image_is_baked_from_its_pixels(result: ResultArrays) -> None:
     image = bpy.data.images[f"{build_object(result, SHARED).object.name}_basecolor"]
-    edit, stored = ColorEdit(hue=0.7), own_file(image)
+    edit, stored = ColorEdit(hue=0.7), unmodified_file(image)
     assert stored and image.colorspace_settings.name == SRGB
     by_file, pixels = edited_file(color_source(image), edit), np.full(4 * 64 * 88, 0.5, np.float32)
     image.pixels.foreach_set(pixels)
     image.update()
-    assert not own_file(image)
+    assert not unmodified_file(image)
     by_pixels = edited_file(color_source(image), edit)
     assert by_file is not None and by_pixels is not None
     assert by_pixels.data != by_file.data

@@ -18,7 +18,7 @@ from blender_addon.operators.modal import WorkerOperator, advance_run  # noqa: E
 from blender_addon.runs import run_steps  # noqa: E402
 from blender_addon.runs.active_run import active_run, begin_run, cancel_active_run  # noqa: E402
 from blender_addon.runs.request import MethodSettings  # noqa: E402
-from blender_addon.runs.run_steps import ResultPlace, decompose_steps, mask_steps  # noqa: E402
+from blender_addon.runs.run_steps import ResultDestination, decompose_steps, mask_steps  # noqa: E402
 from blender_addon.runs.worker_run import (  # noqa: E402
     ImportSteps,
     RunOutput,
@@ -271,7 +271,7 @@ def photo_file(tmp_path: Path) -> ImageSource:
 
 
 def steps_of(photo: ImageSource, folder: Path, environment: WorkerEnvironment) -> RunSteps:
-    place = ResultPlace(folder)
+    place = ResultDestination(folder)
     return decompose_steps(photo, None, None, MethodSettings(), place, 0, environment)
 
 
@@ -346,7 +346,7 @@ sys.exit(2)
         None,
         None,
         MethodSettings(),
-        ResultPlace(folder),
+        ResultDestination(folder),
         0,
         fake_core(tmp_path, code),
     )
@@ -505,7 +505,7 @@ atexit.register(unregister_last)
 blender_addon.register()
 from blender_addon.runs.worker_run import RunOutput, WorkerRun, begin_run
 from blender_addon.runs.request import MethodSettings
-from blender_addon.runs.run_steps import ResultPlace, decompose_steps
+from blender_addon.runs.run_steps import ResultDestination, decompose_steps
 from blender_addon.files.image_source import ImageSource
 from blender_addon.worker.commands import WorkerEnvironment
 search, cache = Path({str(environment.search[0])!r}), Path({str(tmp_path / "cache")!r})
@@ -513,7 +513,8 @@ environment = WorkerEnvironment(Path(sys.executable), (search,), cache)
 folder = Path({str(tmp_path / "run")!r})
 folder.mkdir()
 picture = ImageSource("cup", path=Path({str(tmp_path / "cup.png")!r}))
-steps = decompose_steps(picture, None, None, MethodSettings(), ResultPlace(folder), 0, environment)
+place = ResultDestination(folder)
+steps = decompose_steps(picture, None, None, MethodSettings(), place, 0, environment)
 run = begin_run(WorkerRun("Decompose cup", steps, lambda *_: "", folder))
 end = time.monotonic() + 30
 while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exists():

@@ -215,7 +215,7 @@ def test_the_color_of_the_light_reaches_the_worker(
             None,
             None,
             method,
-            run_steps.ResultPlace(tmp_path),
+            run_steps.ResultDestination(tmp_path),
             0,
             WorkerEnvironment(Path("python"), (tmp_path,), tmp_path),
         )

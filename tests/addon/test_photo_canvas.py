@@ -11,7 +11,7 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.operators.mask import ISC_OT_draw_box  # noqa: E402 (after the skip)
-from blender_addon.operators.photo_operators import StrokeOnPhoto, spread  # noqa: E402
+from blender_addon.operators.photo_operators import StrokeOnPhoto, points_along  # noqa: E402
 
 SIZE = (200, 100)
 
@@ -33,7 +33,7 @@ class Stroke(StrokeOnPhoto):
     def report(self, kind: set[str], text: str) -> None:
         self.reports.append(text)
 
-    def take(self, settings: Any, points: Sequence[str]) -> None:
+    def use_points(self, settings: Any, points: Sequence[str]) -> None:
         self.taken += points
 
     def follow(self, *events: tuple[str, str, tuple[int, int] | None]) -> list[set[str]]:
@@ -88,17 +88,17 @@ def test_what_ends_a_stroke_without_points(
 def test_points_are_few_apart_and_on_the_path(seed: int) -> None:
     rng = np.random.default_rng(seed)
     path = [(int(x), int(y)) for x, y in np.cumsum(rng.integers(-1, 4, (300, 2)), 0)]
-    chosen = spread(path, (1000, 1000))
+    chosen = points_along(path, (1000, 1000))
     away = [min(hypot(a[0] - b[0], a[1] - b[1]) for b in path) for a in chosen]
     assert max(away) < 3 and (chosen[0], chosen[-1]) == (path[0], path[-1]) and len(chosen) == 8
     assert all(hypot(a[0] - b[0], a[1] - b[1]) > 5 for a in chosen for b in chosen if a != b)
-    assert spread([], SIZE) == [] and spread([(3, 4)] * 5, SIZE) == [(3, 4)]
+    assert points_along([], SIZE) == [] and points_along([(3, 4)] * 5, SIZE) == [(3, 4)]
 
 
 def test_a_fast_stroke_has_points_between_its_events() -> None:
-    assert spread([(0, 0), (70, 0)], (100, 100)) == [(10 * k, 0) for k in range(8)]
-    assert spread([(0, 0), (3, 0)], (100, 100)) == [(0, 0), (3, 0)]
-    assert spread([(0, 0), (1, 0)], (100, 100)) == [(0, 0)]
+    assert points_along([(0, 0), (70, 0)], (100, 100)) == [(10 * k, 0) for k in range(8)]
+    assert points_along([(0, 0), (3, 0)], (100, 100)) == [(0, 0), (3, 0)]
+    assert points_along([(0, 0), (1, 0)], (100, 100)) == [(0, 0)]
 
 
 def test_a_box_is_drawn_between_both_ends_of_the_path() -> None:

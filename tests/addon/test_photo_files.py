@@ -11,7 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.datablocks.staging import completed  # noqa: E402 (after the skip)
+from blender_addon.datablocks.staging import run_to_end  # noqa: E402 (after the skip)
 from blender_addon.files.image_export import (  # noqa: E402
     export_image,
     export_mask,
@@ -62,7 +62,7 @@ def pixels_of(image: Any) -> np.ndarray:
 
 def given(image: Any, folder: Path) -> tuple[Path, str]:
     picture = inspect_image(image)
-    return completed(export_image(picture, folder / "photo")), picture.transfer
+    return run_to_end(export_image(picture, folder / "photo")), picture.transfer
 
 
 def known_file(path: Path, kind: type, channels: int = 3) -> np.ndarray:
@@ -165,7 +165,7 @@ def test_alpha_is_exported_straight(tmp_path: Path, kind: type) -> None:
     )
     cv2.imwrite(str(tmp_path / "a.png"), stored)
     image = bpy.data.images.load(str(tmp_path / "a.png"))
-    path = completed(export_image(inspect_image(image, as_pixels=True), tmp_path / "photo"))
+    path = run_to_end(export_image(inspect_image(image, as_pixels=True), tmp_path / "photo"))
     got = read_raster(path)
     peak = float(np.iinfo(kind).max)
     light_of = got.values if kind == np.uint16 else srgb_to_linear(got.values / 255)
@@ -249,7 +249,7 @@ def test_a_painted_mask_fits_the_photo(tmp_path: Path) -> None:
     white[..., 3] = 1
     white[2:5, 3:9] = 1
     image.pixels.foreach_set(white[::-1].ravel())
-    path = completed(export_mask(inspect_image(image, as_pixels=True), tmp_path / "mask"))
+    path = run_to_end(export_mask(inspect_image(image, as_pixels=True), tmp_path / "mask"))
     np.testing.assert_array_equal(np.load(path), white[..., 0] > 0)
 
 
@@ -280,7 +280,7 @@ def test_a_mask_is_scaled_by_pixel_centres() -> None:
 
 def test_a_mask_of_another_size_is_scaled_on_demand(tmp_path: Path) -> None:
     photo, mask = generated(), generated("mask", width=9, height=20)
-    path = completed(
+    path = run_to_end(
         export_mask(inspect_image(mask, as_pixels=True), tmp_path / "mask", tuple(photo.size))
     )
     assert np.load(path).shape == (HEIGHT, WIDTH)
@@ -335,7 +335,7 @@ def test_an_image_removed_in_the_meantime_is_reported(tmp_path: Path) -> None:
     steps = export_image(inspect_image(image), tmp_path / "photo")
     bpy.data.images.remove(image)
     with pytest.raises(InputError, match="was removed or resized in the meantime"):
-        completed(steps)
+        run_to_end(steps)
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
@@ -343,7 +343,7 @@ def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
         InputError,
         match=r"cannot write .* \(No such file or directory\): choose another cache folder",
     ):
-        completed(export_image(inspect_image(generated()), tmp_path / "nowhere" / "photo"))
+        run_to_end(export_image(inspect_image(generated()), tmp_path / "nowhere" / "photo"))
 
 
 def test_names_of_any_letters_reach_the_worker(tmp_path: Path) -> None:
@@ -359,7 +359,7 @@ def test_the_worker_reads_image_and_mask(tmp_path: Path) -> None:
     shape[5:25, 8:30] = 1
     mask.pixels.foreach_set(shape[::-1].ravel())
     photo_path, transfer = given(image, tmp_path)
-    mask_path = completed(export_mask(inspect_image(mask), tmp_path / "mask"))
+    mask_path = run_to_end(export_mask(inspect_image(mask), tmp_path / "mask"))
     photo = read_photo(photo_path, mask_path, transfer)
     np.testing.assert_array_equal(photo.mask, shape[..., 0] > 0)
     np.testing.assert_allclose(photo.image, srgb_to_linear(pixels_of(image)[..., :3]), atol=1e-6)

@@ -163,7 +163,7 @@ def test_with_a_window_baking_waits_until_the_slider_rests(
         patch.setattr(live_edits, "bpy", SimpleNamespace(app=app, data=bpy.data))
         for value in (0.9, 0.8, 0.7):
             node.inputs["Value"].default_value = value
-            live_edits.settle_edits(built.material)
+            live_edits.write_edits(built.material)
             (link,) = surface.inputs["Base Color"].links
             assert link.from_node == node and len(started) == 1
         rendering = "RENDER"
@@ -204,7 +204,7 @@ def test_a_material_of_an_earlier_version_is_left_as_it_is(addon: Any) -> None:
     node.node_tree = group
     tree.links.new(node.outputs["Surface"], output.inputs["Surface"])
     node.inputs["Hue"].default_value = 0.2
-    live_edits.settle_edits(material)
+    live_edits.write_edits(material)
     live_edits.prepare_export()
     live_edits.finish_export()
     assert dichromatic_node(material) == node and surface_node(material) is None

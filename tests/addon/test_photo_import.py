@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import menus  # noqa: E402 (after the skip)
 from blender_addon.operators import photo_import  # noqa: E402
-from blender_addon.operators.photo_canvas import fitted  # noqa: E402
+from blender_addon.operators.photo_canvas import fit_rectangle  # noqa: E402
 from blender_addon.operators.photo_operators import PhotoOperator, shown_photo  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from tests.addon.scene_fixture import bump  # noqa: E402
@@ -118,7 +118,7 @@ def test_create_is_greyed_out_without_a_photo(addon: Any) -> None:
 
 def test_a_photo_is_laid_over_the_view_in_its_shape() -> None:
     for size, room in (((400, 100), (800, 600)), ((100, 400), (800, 600))):
-        left, bottom, width, height = fitted(size, room)
+        left, bottom, width, height = fit_rectangle(size, room)
         assert width / height == pytest.approx(size[0] / size[1])
         assert max(width / room[0], height / room[1]) == pytest.approx(0.9)
         assert (2 * left + width, 2 * bottom + height) == pytest.approx(room)

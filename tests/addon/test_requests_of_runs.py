@@ -45,7 +45,7 @@ def test_a_confirmed_update_has_the_size_that_was_asked_for(
     context = SimpleNamespace(window=addon.context.window or object())
     for name, size in (("isc.redo", {"max_size": 1024}), ("isc.decompose", {})):
         vars(operator).update(bl_idname=name, **size)
-        assert decompose._Overwrites.invoke(operator, context, None) == {"CANCELLED"}
+        assert decompose._OverwriteMixin.invoke(operator, context, None) == {"CANCELLED"}
     assert started == [{"overwrite": True, "max_size": 1024}, {"overwrite": True}]
 
 

@@ -9,12 +9,12 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.datablocks.staging import completed  # noqa: E402 (after the skip)
+from blender_addon.datablocks.staging import run_to_end  # noqa: E402 (after the skip)
 from blender_addon.files.image_source import ImageSource  # noqa: E402
 from blender_addon.files.result_cache import ResultCache, content_key  # noqa: E402
 from blender_addon.runs import run_steps  # noqa: E402
 from blender_addon.runs.request import MethodSettings  # noqa: E402
-from blender_addon.runs.run_steps import ResultPlace, decompose_steps  # noqa: E402
+from blender_addon.runs.run_steps import ResultDestination, decompose_steps  # noqa: E402
 from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment  # noqa: E402
 from blender_addon.worker.process import WorkerState, WorkerUpdate  # noqa: E402
@@ -110,8 +110,8 @@ def test_a_second_run_starts_no_worker(
     cache = ResultCache(tmp_path / "cache", 1 << 30)
 
     def run(number: int, method: MethodSettings) -> RunOutput:
-        place = ResultPlace(tmp_path / str(number), cache, keep)
-        return completed(decompose_steps(photo, None, None, method, place, 0, environment))
+        place = ResultDestination(tmp_path / str(number), cache, keep)
+        return run_to_end(decompose_steps(photo, None, None, method, place, 0, environment))
 
     outputs = [run(n, MethodSettings(samples=n)) for n in range(2)]
     assert len(jobs) == 1, "how it is rendered does not count"

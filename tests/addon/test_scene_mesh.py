@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from blender_addon.datablocks.quads import joined_squares
+from blender_addon.datablocks.quads import joined_quads
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.result_files.mesh.options import MeshOptions
 from tests.addon.scene_fixture import write_result
@@ -162,7 +162,7 @@ def test_halves_of_squares_become_quads_and_split_into_them_again(seed: int) -> 
     faces = np.concatenate([first, second, beside])
     faces = np.array([np.roll(face, rng.integers(3)) for face in rng.permutation(faces)])
     places = np.stack(np.indices((rows, columns)), -1).reshape(-1, 2).astype(float)
-    corners, starts = joined_squares(faces, np.concatenate([places, [[-0.7, 1.2]]]))
+    corners, starts = joined_quads(faces, np.concatenate([places, [[-0.7, 1.2]]]))
     sizes = np.diff(np.append(starts, len(corners)))
     assert sizes.tolist() == [4] * len(a) + [3] * 2
     quads = corners[: 4 * len(a)].reshape(-1, 4)

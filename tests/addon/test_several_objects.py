@@ -14,7 +14,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.datablocks.staging import completed  # noqa: E402
+from blender_addon.datablocks.staging import run_to_end  # noqa: E402
 from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators import decompose as operators  # noqa: E402
 from blender_addon.operators import result  # noqa: E402
@@ -282,7 +282,7 @@ def test_objects_lie_as_in_the_photo_under_one_light(blender: Any, tmp_path: Pat
     assert max(one.base_color.max() for one in (first, second)) <= max(
         one.base_color.max() for one in results
     )
-    left, right = (one.object for one in place_objects(completed(stage_objects(prepared))))
+    left, right = (one.object for one in place_objects(run_to_end(stage_objects(prepared))))
     step = 0.5 / results[0].longest_side
     offset = right.location - left.location
     expected = (results[1].origin - results[0].origin)[:2] * step
@@ -299,7 +299,7 @@ def test_one_pinhole_camera_sees_each_object_where_the_photo_does(
         save(perspective_scene.bump_before_camera(), tmp_path / folder, arrays=True)
     results = [read_result(one) for one in object_folders(tmp_path)]
     prepared = prepare_objects(results, BuildOptions(name="pair", each=True))
-    built = place_objects(completed(stage_objects(prepared)))
+    built = place_objects(run_to_end(stage_objects(prepared)))
     assert abs(built[1].object.location.y) < 1e-3, "in one plane across the view"
     for one, seen in zip(built, results, strict=True):
         off = seen_pixels(replace(one, camera=built[0].camera), evaluated_vertices(one))
@@ -313,7 +313,7 @@ def test_staging_does_not_need_the_photo_again(blender: Any, tmp_path: Path) -> 
     photo = blender.data.images.new("pair.png", 8, 8)
     options = BuildOptions(name="pair", each=True, own_scene=False)
     prepared = prepare_objects(several_results(tmp_path), options)
-    for one in place_objects(completed(stage_objects(prepared, photo=photo)), photo=photo):
+    for one in place_objects(run_to_end(stage_objects(prepared, photo=photo)), photo=photo):
         one.object["isc_source_image"] = photo
         one.object.data["mine"] = 1
     steps = stage_objects(prepared, photo=photo)
@@ -321,6 +321,6 @@ def test_staging_does_not_need_the_photo_again(blender: Any, tmp_path: Path) -> 
     again = photo.copy()
     photo.user_remap(again)
     blender.data.images.remove(photo)
-    built = place_objects(completed(steps), photo=again)
+    built = place_objects(run_to_end(steps), photo=again)
     assert [one.object.name for one in built] == ["pair 1", "pair 2"]
     assert [one.object.data.get("mine") for one in built] == [1, 1]

@@ -52,7 +52,7 @@ def test_undo_in_any_order_frees_no_image_that_is_used(
     from blender_addon.scene import BuildOptions, build_object
 
     # As in a window, where colours come later.
-    monkeypatch.setattr(live_edits, "settle_edits", apply_edits)
+    monkeypatch.setattr(live_edits, "write_edits", apply_edits)
     rng = np.random.default_rng(seed)
     build_object(result, BuildOptions())
     addon.ops.ed.undo_push(message="start")

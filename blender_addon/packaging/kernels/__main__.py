@@ -1,8 +1,8 @@
 """`python -m blender_addon.packaging.kernels`: compile the kernels into the source tree.
 
 The libraries for this machine (or with `--all` those for all) are put where `isc_core` looks for
-them: an editable installation then uses one, and a wheel that is built here contains them. Others
-that lie there are removed.
+them: an editable installation then uses one, and a wheel that is built here contains them. Other
+libraries there are removed.
 """
 
 import argparse
