@@ -55,9 +55,10 @@ class _Main(_Panel):
     def draw(self, context: Any) -> None:
         """Draw photo, mask, preset and button; during a run its progress."""
         settings, running = context.scene.isc, active_run() is not None
-        if scene_before(context.scene) is not None:
-            name = scene_before(context.scene).name
-            self.layout.operator("isc.return_to_scene", text=f"Back to {name}", icon="LOOP_BACK")
+        before = scene_before(context.scene)
+        if before is not None:
+            text = f"Back to {before.name}"
+            self.layout.operator("isc.return_to_scene", text=text, icon="LOOP_BACK")
         photo = self.layout.column()
         photo.enabled = not running
         photo.label(text="Photo")

@@ -177,7 +177,7 @@ class ISC_OT_recolour(_NodeEdit, bpy.types.Operator):
 
     bl_idname = "isc.recolour"
     bl_label = "Recolor"
-    bl_description = "Change hue, saturation and value of the object's reflectance"
+    bl_description = "Change hue, saturation and value of the object's base color"
 
     hue: FloatProperty(
         name="Hue",

@@ -1,5 +1,5 @@
-"""Whether the mesh of an object is still the one that was built: a checksum (CRC-32) of vertices and
-faces, stored in the mesh.
+"""Whether the mesh of an object is still the one that was built: a checksum (CRC-32) of its
+vertices and faces, stored in the mesh.
 
 Limits: one edit in four thousand million goes unnoticed. UV maps, attributes and modifiers are not
 included; an update of the object keeps or replaces them.
