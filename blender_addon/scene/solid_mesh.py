@@ -45,13 +45,13 @@ def solid_geometry(
         If the object is too thin for a mesh, or the size is not positive.
     """
     solid = _solid(result, back, triangles)
-    body = solid.mesh
+    mesh = solid.mesh
     vertices = _placed(result, solid) * metres_per_pixel(result, size_metres)
-    rows, columns = body.pixels.T
-    confidence = np.where(body.front, result.confidence[rows, columns], 0.0)
+    rows, columns = mesh.pixels.T
+    confidence = np.where(mesh.front, result.confidence[rows, columns], 0.0)
     geometry = MeshGeometry(
         to_blender(vertices),
-        *joined_quads(body.faces, body.places),
+        *joined_quads(mesh.faces, mesh.places),
         solid.uv(),
         confidence,
         to_blender(solid.normals(vertices)),

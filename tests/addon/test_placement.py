@@ -75,7 +75,7 @@ def test_the_cube_of_a_new_file_does_not_enclose_it(result: ResultArrays, size: 
         lambda: setattr(cube(2, (0, 0, 0)), "display_type", "WIRE"),
     ],
 )
-def test_rooms_tables_and_hidden_things_leave_it_on_the_cursor(
+def test_rooms_tables_and_hidden_objects_leave_it_on_the_cursor(
     result: ResultArrays, prepare: Any
 ) -> None:
     prepare()
@@ -126,7 +126,7 @@ def test_a_second_object_stands_beside_the_first(result: ResultArrays) -> None:
     assert low[0] > high[0]
 
 
-def test_what_has_no_surface_surrounds_nothing(blender: Any) -> None:
+def test_a_mesh_without_faces_surrounds_nothing(blender: Any) -> None:
     obj = cube(2, (0, 0, 0))
     blender.ops.object.mode_set(mode="EDIT")
     assert abs(_winding_number(obj, Vector())) < 1.001, "whatever Blender shows of it"

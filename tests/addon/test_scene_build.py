@@ -188,7 +188,7 @@ def test_names_that_start_alike_are_different_objects(blender: Any, result: Resu
     assert build(result, name="x" * 300).object == first.object
 
 
-def test_renamed_things_are_found(blender: Any, result: ResultArrays) -> None:
+def test_renamed_datablocks_are_found(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     for part, name in (
         (built.object, "vase"),
@@ -388,7 +388,7 @@ def link(bpy: Any, path: Path, kind: str, name: str) -> Any:
     return getattr(into, kind)[0]
 
 
-def test_linked_things_are_refused_and_nothing_changes(
+def test_linked_datablocks_are_refused_and_nothing_changes(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     name = build(result).collection.name

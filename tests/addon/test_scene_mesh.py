@@ -79,7 +79,7 @@ def manifold(mesh: Any) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("back", ["flat", "rounded", "mirrored"])
-def test_the_body_is_closed(blender: Any, bump_folder: Path, back: str) -> None:
+def test_the_solid_mesh_is_closed(blender: Any, bump_folder: Path, back: str) -> None:
     result = read_result(bump_folder)
     assert not manifold(build(result, back="open").object.data)
     closed = build(result, back=back, triangles=900).object.data
@@ -105,7 +105,9 @@ def crossing_faces(mesh: Any) -> int:
     return sum(a < b and not corners[a] & corners[b] for a, b in pairs)
 
 
-def test_the_front_of_the_body_keeps_heights_and_normals(blender: Any, bump_folder: Path) -> None:
+def test_the_front_of_the_solid_mesh_keeps_heights_and_normals(
+    blender: Any, bump_folder: Path
+) -> None:
     """Where there is a vertex at each pixel, all but the rim is the result's own mesh."""
     result = read_result(bump_folder)
     mesh = build(result, back="rounded", triangles=0).object.data
@@ -132,7 +134,7 @@ def test_the_front_of_the_body_keeps_heights_and_normals(blender: Any, bump_fold
     assert np.degrees(off).max() < 2, "normals are means over the triangles of a vertex"
 
 
-def test_the_body_has_few_triangles_and_a_normal_map(blender: Any, bump_folder: Path) -> None:
+def test_the_solid_mesh_has_few_triangles_and_a_normal_map(blender: Any, bump_folder: Path) -> None:
     result = read_result(bump_folder)
     many = len(build(result, back="open", triangles=0).object.data.polygons)
     built = build(result, back="open", triangles=many // 2)
@@ -190,7 +192,7 @@ def test_a_full_mesh_is_a_grid_of_quads(blender: Any, bump_folder: Path, back: s
     )
 
 
-def test_the_body_can_be_subdivided(blender: Any, bump_folder: Path) -> None:
+def test_the_solid_mesh_can_be_subdivided(blender: Any, bump_folder: Path) -> None:
     built = build(read_result(bump_folder), back="rounded", triangles=0)
     before = volume(built.object.data)
     built.object.modifiers.new("finer", "SUBSURF").levels = 1

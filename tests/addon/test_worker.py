@@ -386,7 +386,7 @@ def test_an_unresponsive_worker_is_killed_with_its_children(
     assert others(tmp_path) == []
 
 
-def test_a_killed_worker_leaves_the_things_that_are_done(tmp_path: Path, fake_core: Maker) -> None:
+def test_a_killed_worker_leaves_completed_results(tmp_path: Path, fake_core: Maker) -> None:
     out = tmp_path / "out"
     (out / ".3.11111111.partial").mkdir(parents=True)
     folders = "(output / '1').mkdir()\n(output / '.2.0a1b2c3d.partial').mkdir()\n"

@@ -2,7 +2,7 @@
 
 Each takes arrays as objects and numbers as numbers, compares the types of the arrays, and calls the
 kernel's body with what Numba's calling convention wants: a place for the result, one for an error,
-and for each array seven things, most of which kernels do not use.
+and for each array seven values, most of which kernels do not use.
 """
 
 from isc_core.numerics.kernel_types import Array, Scalar
