@@ -9,9 +9,9 @@ from itertools import pairwise
 from math import floor, hypot
 from typing import Any
 
-import gpu
+import gpu  # type: ignore[import-not-found]
 import numpy as np
-from gpu_extras.batch import batch_for_shader
+from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from ..runs.active_run import poll_idle
 from .photo_canvas import PhotoCanvas

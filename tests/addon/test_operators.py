@@ -29,7 +29,7 @@ from blender_addon.runs.request import parse_points, request_from_settings  # no
 from blender_addon.runs.worker_run import WorkerRun  # noqa: E402
 from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
-from blender_addon.settings import preferences, presets, properties  # noqa: E402
+from blender_addon.settings import choices, preferences, presets, properties  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.decomposition.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
@@ -171,10 +171,10 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
 
 
 def test_the_panel_offers_all_models_separators_and_illuminations() -> None:
-    assert {item[0] for item in properties.MODELS} == set(MODELS)
-    offered = {item[0] for item in properties.SEPARATORS}
+    assert {item[0] for item in choices.MODELS} == set(MODELS)
+    offered = {item[0] for item in choices.SEPARATORS}
     assert BEST in offered and offered <= set(METHODS)
-    assert {item[0] for item in properties.ILLUMINATIONS} == set(ILLUMINATIONS)
+    assert {item[0] for item in choices.ILLUMINATIONS} == set(ILLUMINATIONS)
 
 
 def test_every_property_and_operator_has_a_tooltip(addon: Any) -> None:
@@ -220,12 +220,12 @@ def test_settings_are_saved_with_the_file(addon: Any, tmp_path: Path) -> None:
 
 def test_numbers_of_enumeration_items_never_change() -> None:
     """Files store them."""
-    for items in (properties.MODELS, properties.SEPARATORS, properties.OWN_SHADOWS_ITEMS):
+    for items in (choices.MODELS, choices.SEPARATORS, choices.OWN_SHADOWS_ITEMS):
         assert [item[3] for item in items] == list(range(len(items)))
-    assert [item[0] for item in properties.OWN_SHADOWS_ITEMS] == ["auto", "on", "off"]
-    assert [item[0] for item in properties.SPECULAR_SOURCES] == ["lobe", "image", "none"]
-    assert [item[0] for item in properties.MODELS][:4] == ["joint", "mdr", "mbp", "sirfs"]
-    assert [item[0] for item in properties.SEPARATORS][:3] == ["isc", "network", "sparse_coding"]
+    assert [item[0] for item in choices.OWN_SHADOWS_ITEMS] == ["auto", "on", "off"]
+    assert [item[0] for item in choices.SPECULAR_SOURCES] == ["lobe", "image", "none"]
+    assert [item[0] for item in choices.MODELS][:4] == ["joint", "mdr", "mbp", "sirfs"]
+    assert [item[0] for item in choices.SEPARATORS][:3] == ["isc", "network", "sparse_coding"]
 
 
 def test_a_request_is_kept_as_text() -> None:

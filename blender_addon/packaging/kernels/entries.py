@@ -2,7 +2,7 @@
 
 Each takes arrays as objects and numbers as numbers, compares the types of the arrays, and calls the
 kernel's body with what Numba's calling convention wants: a place for the result, one for an error,
-and for each array seven values, most of which kernels do not use.
+and for each array seven things, most of which kernels do not use.
 """
 
 from isc_core.numerics.kernel_types import Array, Scalar
@@ -34,7 +34,7 @@ def _entry(version: Version) -> str:
         f"const array *a{k}" if isinstance(one, Array) else f"{C_TYPES[one.code]} a{k}"
         for k, one in enumerate(types)
     )
-    parameters = ", ".join(_parameters(one) for one in types)
+    bodys = ", ".join(_parameters(one) for one in types)
     passed = ", ".join(_passed(one, f"a{k}") for k, one in enumerate(types))
     checks = "".join(
         f"    if (!fits(a{k}, '{one.code[0]}', {one.code[1]}, {one.axes}, {one.contiguous:d}))\n"
@@ -46,7 +46,7 @@ def _entry(version: Version) -> str:
     unused = "" if version.signature.result else "    void *unused = 0;\n"
     place = "result" if version.signature.result else "&unused"
     return (
-        f"int32_t {version.symbol}_body(void *, void **, {parameters});\n"
+        f"int32_t {version.symbol}_body(void *, void **, {bodys});\n"
         f"EXPORT int {version.symbol}({result} *result, {taken})\n"
         "{\n"
         f"{checks}{unused}"
