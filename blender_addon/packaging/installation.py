@@ -202,7 +202,7 @@ def begin_run() -> Any:
     """Start a run as the button does, without a window."""
     request = extension_module("runs.request").request_from_settings(bpy.data.scenes[0])
     run = extension_module("operators.decompose").create_decompose_run(bpy.context, request)
-    return extension_module("runs.worker_run").begin_run(run)
+    return extension_module("runs.active_run").begin_run(run)
 
 
 def poll_run(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
@@ -280,7 +280,7 @@ def check_object() -> None:
         obj for obj in bpy.data.objects if obj.type == "MESH" and obj.get("isc_key") == "photo"
     ]
     check(len(found) == 1, f"one object of the photo, not {[obj.name for obj in found]}")
-    built = extension_module("scene.build").find_built(found[0])
+    built = extension_module("scene.built_object").find_built(found[0])
     check(built is not None and len(built.object.data.vertices) > 500, "the object is complete")
     check(
         built.scene.camera == built.camera and built.scene.world == built.world,
