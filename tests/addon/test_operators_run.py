@@ -503,7 +503,8 @@ def unregister_last():
     blender_addon.unregister()  # Blender 4.5 does not exit while an add-on is registered
 atexit.register(unregister_last)
 blender_addon.register()
-from blender_addon.runs.worker_run import RunOutput, WorkerRun, begin_run
+from blender_addon.runs.active_run import begin_run
+from blender_addon.runs.worker_run import RunOutput, WorkerRun
 from blender_addon.runs.request import MethodSettings
 from blender_addon.runs.run_steps import ResultDestination, decompose_steps
 from blender_addon.files.image_source import ImageSource
