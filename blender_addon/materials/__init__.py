@@ -1,1 +1,1 @@
-"""The material of an object: its nodes, edits of color and gloss, and the photo's highlights."""
+"""The material of an object: its nodes, edits of colour and gloss, and the photo's highlights."""

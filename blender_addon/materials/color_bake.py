@@ -94,7 +94,7 @@ class ColorSource:
 
     @property
     def values(self) -> np.ndarray:
-        """(H, W, 3), row 0 at the top: codes, or linear values where the colors have none."""
+        """(H, W, 3), row 0 at the top: codes, or linear values where the colours have none."""
         if (codes := self.codes) is not None:
             return codes
         assert self.pixels is not None

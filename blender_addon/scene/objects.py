@@ -4,16 +4,16 @@ Problem: each result has its own scale, origin and light. In one scene, the obje
 
 Equation: a pixel of the photo has one length everywhere, so that objects stand in one plane across
 the view: their depths are not known. With s_i(n) the shading that light i gives a normal n, and b_i
-the base color that goes with it, diffuse light is b_i s_i. Multiplying b_i by g_i and dividing
+the base colour that goes with it, diffuse light is b_i s_i. Multiplying b_i by g_i and dividing
 light i by it changes nothing. Under the light of the largest object, 0, object i is as bright as in
 the photo where
 
     g_i / g_0 = sum_n b_i s_i(n) / sum_n b_i s_0(n),
 
-summed over its pixels; the largest g is 1, so that no base color exceeds what it was.
+summed over its pixels; the largest g is 1, so that no base colour exceeds what it was.
 
 Limits: one number for each object. Where the lights that were recovered differ in direction or
-color, shading differs from the photo's.
+colour, shading differs from the photo's.
 """
 
 from collections.abc import Generator, Sequence
@@ -228,7 +228,7 @@ def _under_one_light(results: Sequence[ResultArrays], first: int) -> list[Result
 
 
 def _gain(result: ResultArrays, light: np.ndarray) -> float:
-    """Factor of an object's base color that keeps its brightness under another light."""
+    """Factor of an object's base colour that keeps its brightness under another light."""
     basis = real_sh(result.normal[result.mask].astype(float))
     color = result.base_color[result.mask].astype(float)
     own, under = (
@@ -239,7 +239,7 @@ def _gain(result: ResultArrays, light: np.ndarray) -> float:
 
 
 def _with_gain(result: ResultArrays, gain: float) -> ResultArrays:
-    """The same result with the base color multiplied, and the light divided, by a gain."""
+    """The same result with the base colour multiplied, and the light divided, by a gain."""
     light = result.mesh_illumination.copy()
     light[0] -= np.float32(np.log(gain) / _CONSTANT)
     codes = srgb_to_linear(np.arange(256) / 255)
