@@ -24,6 +24,7 @@ from ..imaging.srgb import srgb_codes, srgb_to_linear
 from ..io.atomic import new_file
 from ..io.printable_names import readable
 from ..scene.decomposition import Decomposition, Separation
+from ..scene.diagnostics import LobeDiagnostics, LobeStatus
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.spherical_harmonics import real_sh
 from .error_colors import SCALE, error_colors
@@ -403,14 +404,16 @@ def _title(d: Decomposition) -> tuple[str, str]:
     if diagnostics.converged is not None:
         parts.append("converged" if diagnostics.converged else "stopped early")
     if d.brdf is not None:
-        parts.append(_gloss(d.brdf))
+        parts.append(_gloss(d.brdf, diagnostics.lobe))
     if diagnostics.warnings:
         parts.append("unreliable, see status.warnings")
     return name, "   ·   ".join(parts)
 
 
-def _gloss(fit: LobeFit) -> str:
+def _gloss(fit: LobeFit, lobe: LobeDiagnostics | None) -> str:
     """Summary of the fit; roughness as in Blender and glTF."""
+    if lobe is not None and lobe.status == LobeStatus.HIDDEN:
+        return "highlights hidden by clipping"
     if fit.blender_roughness is None:
         return (
             "no highlights" if fit.outcome == LobeFitOutcome.NO_SPECULAR else "gloss undetermined"

@@ -20,7 +20,9 @@ from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from isc_core.scene.diagnostics import (
     AssumptionWarning,
     Diagnostics,
+    LobeDiagnostics,
     LobeFitOutcome,
+    LobeStatus,
     WarningKind,
 )
 from isc_core.scene.expected_error import ExpectedError
@@ -351,3 +353,16 @@ def test_the_title_has_the_fitted_lobe() -> None:
     assert drawn_subtitle(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask))).endswith(
         "no highlights"
     )
+
+
+def test_the_title_says_that_clipping_hides_the_highlights() -> None:
+    """As the command line does: a matt object and a clipped one are told apart."""
+    d = ball()
+    nothing = LobeFit.without_lobe("ggx", LobeFitOutcome.NO_SPECULAR, d.specular.shape)
+    for status, said in (
+        (LobeStatus.NO_HIGHLIGHTS, "no highlights"),
+        (LobeStatus.HIDDEN, "highlights hidden by clipping"),
+    ):
+        lobe = LobeDiagnostics(status, LobeFitOutcome.NO_SPECULAR)
+        provenance = replace(d.provenance, diagnostics=Diagnostics(lobe=lobe))
+        assert drawn_subtitle(replace(d, brdf=nothing, provenance=provenance)).endswith(said)
