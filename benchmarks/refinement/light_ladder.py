@@ -33,6 +33,7 @@ from scipy.optimize import nnls
 
 from isc_core.evaluation.metrics import geometric_mean, scaled_mse
 from isc_core.progress import Monitor
+from isc_core.refinement.working_scale import working_scale
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import (
     directions,
@@ -43,6 +44,7 @@ from isc_core.shading.environment_map import (
 from synth.capture.truth import render_truth
 from synth.refine.light_objective import shading_of
 from synth.refine.refine import RefineOptions, fit_environment
+from synth.refine.surface import Surface
 from synth.refine.transport import Transport, light_transport
 from synth.rendering import RenderOptions
 from synth.scene.lights import DirectionalLight
@@ -139,7 +141,7 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
     wanted = truth["shading"][mask].astype(float)
     light = resampled(truth["environment"], _ROWS).reshape(-1, 3).astype(float)
     true_shape = replace(start, normal=truth["normal"], height=truth["height"])
-    of_truth, of_start = (light_transport(d, _ROWS) for d in (true_shape, start))
+    of_truth, of_start = (transport_of(d) for d in (true_shape, start))
     recovered = environment_from_shading(start.illumination, _ROWS, viewer=start.viewer)
     old = start.shading[mask].astype(float)
     first = Step("start", old, recovered.reshape(-1, 3).astype(float), of_start, diffuse)
@@ -147,14 +149,30 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
     yield replace(first, name="shape", transport=of_truth)
     yield _under("truth", light, of_truth, true_diffuse)
     yield _under("a", nearest(of_truth, wanted), of_truth, true_diffuse)
-    fit = fit_environment(true_shape, of_truth, options, Monitor())
+    fit = fit_environment(true_shape, working_scale(true_shape), of_truth, options, Monitor())
     kept = fit.after < fit.before and fit.explains_better
     yield Step("b", fit.shading, fit.radiance, of_truth, diffuse, kept)
     yield _under("known albedo", nearest(of_start, wanted), of_start, diffuse)
     yield _under("known light", light, of_start, diffuse)
-    fit = fit_environment(start, of_start, options, Monitor())
+    fit = fit_environment(start, working_scale(start), of_start, options, Monitor())
     kept = fit.after < fit.before and fit.explains_better
     yield Step("c", fit.shading, fit.radiance, of_start, diffuse, kept)
+
+
+def transport_of(d: Decomposition) -> Transport:
+    """Return the transport to the pixels of a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+        At its working scale: the object is at most 192 pixels long.
+
+    Returns
+    -------
+    Transport
+    """
+    surface = Surface(d)
+    return light_transport(surface, surface.points(), _ROWS)
 
 
 def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:
@@ -172,7 +190,8 @@ def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:
     """
     grey = shading.mean(axis=1)
     some = np.random.default_rng(0).choice(len(grey), min(_POINTS, len(grey)), replace=False)
-    found, _ = nnls(transport.shadowed[some].astype(float), grey[some])
+    direct = grey - transport.indirect.mean(axis=1)
+    found, _ = nnls(transport.shadowed[some].astype(float), direct[some])
     return np.asarray(found[:, None] * shading.mean(axis=0) / grey.mean())
 
 
@@ -234,7 +253,8 @@ def blocked(step: Step) -> float:
 
 
 def _under(name: str, radiance: np.ndarray, transport: Transport, diffuse: np.ndarray) -> Step:
-    return Step(name, shading_of(transport.shadowed, radiance), radiance, transport, diffuse)
+    shading = shading_of(transport.shadowed, radiance, transport.indirect)
+    return Step(name, shading, radiance, transport, diffuse)
 
 
 def main() -> None:

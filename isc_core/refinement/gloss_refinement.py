@@ -236,6 +236,8 @@ def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decompos
     shading[mask] = np.exp(np.einsum("nk,kc->nc", basis, light))
     if d.visibility is not None:
         shading *= d.visibility
+    if d.indirect is not None:
+        shading += d.indirect
     return replace(
         d, normal=normal, height=new_height.astype(np.float32), shading=shading, illumination=light
     )

@@ -5,9 +5,9 @@ A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomp
 that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, if the
 mask was found in the photo or is soft. With a fitted lobe, `maps.exr` has another layer, `lobe`:
 the specular image predicted by the fit; `expected_error` has the expected errors, if known. A
-refined result has another layer, `visibility`, and its light as `environment.exr`. A separation's
-folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
-completely or not at all (see `io.atomic`).
+refined light has other layers, `visibility` and `indirect`, and its image as `environment.exr`. A
+separation's folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder
+appears completely or not at all (see `io.atomic`).
 """
 
 import json
@@ -52,7 +52,7 @@ LAYERS = {
     "confidence": "Y",
 }
 LOBE = {"lobe": "RGB"}
-VISIBILITY = {"visibility": "RGB"}
+REFINED_LIGHT = {"visibility": "RGB", "indirect": "RGB"}
 EXPECTED_ERROR = ("expected_error.normal", "expected_error.reflectance")
 SINGLE = {
     "diffuse": "RGB",
@@ -128,8 +128,9 @@ def save(
         channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
     if (error := decomposition.expected_error) is not None:
         channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
-    if decomposition.visibility is not None:
-        channels |= _channels({"visibility": decomposition.visibility}, VISIBILITY)
+    for name, letters in REFINED_LIGHT.items():
+        if (layer := getattr(decomposition, name)) is not None:
+            channels |= _channels({name: layer}, {name: letters})
     if broken := sorted(_broken(channels)):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     # The pool is inside the folder's block, so that its files are finished, or have failed, before
@@ -231,7 +232,8 @@ def load(folder: Path | str) -> Decomposition:
         brdf=_brdf(description, channels, folder),
         expected_error=_expected_error(channels, folder / "maps.exr"),
         camera=_camera(description, folder),
-        visibility=_visibility(channels, folder / "maps.exr"),
+        visibility=_refined_light("visibility", channels, folder / "maps.exr"),
+        indirect=_refined_light("indirect", channels, folder / "maps.exr"),
         environment=_environment(folder / ENVIRONMENT),
     )
 
@@ -468,11 +470,11 @@ def _expected_error(channels: Mapping[str, np.ndarray], path: Path) -> ExpectedE
     return ExpectedError(*(maps[name] for name in EXPECTED_ERROR))
 
 
-def _visibility(channels: Mapping[str, np.ndarray], path: Path) -> np.ndarray | None:
-    """None if the result was not refined."""
-    if "visibility.R" not in channels:
+def _refined_light(name: str, channels: Mapping[str, np.ndarray], path: Path) -> np.ndarray | None:
+    """A layer of `REFINED_LIGHT`; None if the light was not refined."""
+    if f"{name}.R" not in channels:
         return None
-    return np.asarray(_layers(channels, VISIBILITY, path)["visibility"])
+    return np.asarray(_layers(channels, {name: REFINED_LIGHT[name]}, path)[name])
 
 
 def _environment(path: Path) -> np.ndarray | None:

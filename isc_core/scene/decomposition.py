@@ -2,7 +2,7 @@
 
 Inside the mask `image = diffuse + specular + residual`, `diffuse = reflectance * shading` (both to
 1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), and normals have unit
-length. With a `visibility`, as after `isc refine`, `shading = exp(SH(normal)) * visibility`.
+length. After `isc refine --light`, `shading = exp(SH(normal)) * visibility + indirect`.
 `result_files.result_folder` writes and reads their files.
 """
 
@@ -92,7 +92,7 @@ class IdentityErrors:
         tests = (
             (self.image, 1e-5, "image = diffuse + specular + residual"),
             (self.shading_product, 1e-5, "diffuse = reflectance * shading"),
-            (self.sh, 1e-4, "shading = exp(SH(normal)) * visibility"),
+            (self.sh, 1e-4, "shading = exp(SH(normal)) * visibility + indirect"),
             (self.normal_length, 1e-4, "normals of length 1"),
         )
         return tuple(
@@ -132,8 +132,11 @@ class Decomposition:
     camera : Camera or None
         Pinhole camera of the maps; None for an orthographic view.
     visibility : (H, W, 3) ndarray of float32 or None
-        Shading over exp(SH(normal)): cast shadows, and what no such light can say; > 0, may exceed
-        1; 1 outside the mask. None: 1 everywhere.
+        Direct shading over exp(SH(normal)): cast shadows, and what no such light can say; > 0, may
+        exceed 1; 1 outside the mask. None: 1 everywhere.
+    indirect : (H, W, 3) ndarray of float32 or None
+        Shading by light that the visible surface itself reflects; at least 0; 0 outside the mask.
+        None: 0 everywhere.
     environment : (rows, 2 rows, 3) ndarray of float32 or None
         Radiance of the light, see `shading.environment_map`; None where only the coefficients are
         known.
@@ -155,6 +158,7 @@ class Decomposition:
     expected_error: ExpectedError | None = None
     camera: Camera | None = None
     visibility: np.ndarray | None = None
+    indirect: np.ndarray | None = None
     environment: np.ndarray | None = None
 
     @property
@@ -204,6 +208,8 @@ class Decomposition:
             expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
             if self.visibility is not None:
                 expected = expected * self.visibility[self.mask]
+            if self.indirect is not None:
+                expected = expected + self.indirect[self.mask]
         return IdentityErrors(
             image=_worst(inside["image"] - layers) / scale,
             shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"])

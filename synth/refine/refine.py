@@ -1,8 +1,9 @@
 """`refine`: fits a light with the cast shadows of the recovered shape, if that improves the result.
 
-Equation: see the package. With the new shading S = T E, the light of the result is the best fit L
-of log shading without shadows, visibility = S / exp(SH(normal; L)), and reflectance = diffuse / S,
-so that every identity of a result holds.
+Equation: see the package. The light is fitted at the working scale of the gloss (the object at most
+192 pixels long), and its shading S = T E + I computed for every pixel. The light of the result is
+the best fit L of log shading without shadows, visibility = (S - I) / exp(SH(normal; L)), indirect =
+I, and reflectance = diffuse / S, so that every identity of a result holds.
 
 Limits: see the package.
 """
@@ -16,7 +17,8 @@ from isc_core.errors import InputError
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
 from isc_core.refinement.held_out import held_out_blocks, pixels_of
-from isc_core.refinement.reflectance_terms import terms_of
+from isc_core.refinement.reflectance_terms import terms_of, with_diffuse
+from isc_core.refinement.working_scale import WorkingScale, working_scale
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import environment_from_shading
 from isc_core.shading.spherical_harmonics import real_sh
@@ -26,7 +28,10 @@ from ..scene.variant import load_mitsuba
 from .held_out import BLOCK, EVERY, explains_better
 from .light_field import LightField
 from .light_objective import LightObjective, shading_of
+from .surface import Surface
 from .transport import Transport, light_transport
+
+_PIXELS = 20000  # of the result, whose transport is in memory at a time
 
 
 @dataclass(frozen=True)
@@ -108,8 +113,10 @@ def refine(
     """
     options, monitor = options or RefineOptions(), monitor or Monitor()
     _check(d)
-    transport = light_transport(d, options.rows, monitor.part(0, 0.3))
-    fit = fit_environment(d, transport, options, monitor.part(0.3, 1.0))
+    scale, surface = working_scale(d), Surface(d)
+    points = surface.points_at(scale)
+    transport = light_transport(surface, points, options.rows, monitor.part(0, 0.3))
+    fit = fit_environment(d, scale, transport, options, monitor.part(0.3, 0.7))
     kept = fit.after < fit.before and fit.explains_better
     note = {
         "kept": kept,
@@ -118,7 +125,7 @@ def refine(
         "variant": str(load_mitsuba().variant()),
         **options.__dict__,
     }
-    result = _refined(d, transport, fit.radiance, fit.shading) if kept else d
+    result = _refined(d, surface, fit.radiance, monitor.part(0.7, 1.0)) if kept else d
     return Refinement(_noted(result, note), kept, fit.before, fit.after)
 
 
@@ -130,7 +137,7 @@ class EnvironmentFit:
     ----------
     radiance : (J, 3) ndarray
     shading : (N, 3) ndarray
-        Of the mask's pixels.
+        Of the working scale's pixels.
     before, after : float
         The objective.
     explains_better : bool
@@ -145,15 +152,21 @@ class EnvironmentFit:
 
 
 def fit_environment(
-    d: Decomposition, transport: Transport, options: RefineOptions, monitor: Monitor
+    d: Decomposition,
+    scale: WorkingScale,
+    transport: Transport,
+    options: RefineOptions,
+    monitor: Monitor,
 ) -> EnvironmentFit:
     """Fit an environment to the reflectance terms, better than the start or not.
 
     Parameters
     ----------
     d : Decomposition
+    scale : WorkingScale
+        Of the result.
     transport : Transport
-        Of its shape.
+        To the points of that scale.
     options : RefineOptions
     monitor : Monitor
 
@@ -169,10 +182,13 @@ def fit_environment(
     start = environment_from_shading(d.illumination, options.rows, viewer=d.viewer)
     field = LightField.around(np.maximum(start, 1e-4 * start.mean()))
     terms, gain = terms_of(d)
-    blocks = held_out_blocks(d.shading.mean(axis=2), BLOCK, EVERY, options.seed, d.mask)
-    weight = (d.mask & ~pixels_of(blocks, BLOCK, d.mask.shape)).astype(float)
-    objective = LightObjective(terms, field, gain * transport.shadowed, weight, options.strictness)
-    x, old = np.zeros(field.size), gain * d.shading[d.mask].astype(float)
+    mask = scale.mask
+    terms = with_diffuse(terms, scale.diffuse, mask, gain)
+    blocks = held_out_blocks(scale.shading.mean(axis=2), BLOCK, EVERY, options.seed, mask)
+    weight = (mask & ~pixels_of(blocks, BLOCK, mask.shape)).astype(float)
+    direct, indirect = gain * transport.shadowed, gain * transport.indirect
+    objective = LightObjective(terms, field, direct, indirect, weight, options.strictness)
+    x, old = np.zeros(field.size), gain * scale.shading[mask]
 
     def each(step: int, loss: float) -> None:
         monitor.report("fitting the light", min(step / options.steps, 1.0), f"loss {loss:.3f}")
@@ -180,7 +196,7 @@ def fit_environment(
     limits = LbfgsOptions(iterations=options.steps, loss_tolerance=1e-4)
     after = minimise(objective, x, limits, NumpyAlgebra(), each).loss
     radiance = field.radiance(x)
-    shading = shading_of(transport.shadowed, radiance)
+    shading = shading_of(transport.shadowed, radiance, transport.indirect)
     return EnvironmentFit(
         radiance,
         shading,
@@ -198,26 +214,42 @@ def _check(d: Decomposition) -> None:
 
 
 def _refined(
-    d: Decomposition, transport: Transport, radiance: np.ndarray, shading: np.ndarray
+    d: Decomposition, surface: Surface, radiance: np.ndarray, monitor: Monitor
 ) -> Decomposition:
-    normal = d.normal[d.mask].astype(float)
-    illumination, _ = fit_light(normal, shading_of(transport.unshadowed, radiance))
-    smooth = np.exp(np.einsum("nk,kc->nc", real_sh(normal), illumination))
-    visibility = np.ones(d.shading.shape, np.float32)
-    visibility[d.mask] = shading / smooth
-    new_shading = np.zeros_like(d.shading)
-    new_shading[d.mask] = shading
-    reflectance = np.zeros_like(d.reflectance)
-    reflectance[d.mask] = d.diffuse[d.mask] / new_shading[d.mask]
+    """The result under a new light."""
     rows = int(np.sqrt(len(radiance) / 2))
+    points, parts = surface.points(), []
+    for first in range(0, len(points), _PIXELS):
+        part = points[first : first + _PIXELS]
+        monitor.report("rendering the light", first / len(points))
+        transport = light_transport(surface, part, rows)
+        open_sky, direct = (
+            np.einsum("nj,jc->nc", each, radiance)
+            for each in (transport.unshadowed, transport.shadowed)
+        )
+        parts.append((open_sky, direct, transport.indirect))
+    open_sky, direct, indirect = (np.concatenate(each) for each in zip(*parts, strict=True))
+    direct = np.maximum(direct, 1e-3 * direct.mean())
+    normal = points.normal
+    illumination, _ = fit_light(normal, np.maximum(open_sky, 1e-3 * open_sky.mean()))
+    smooth = np.exp(np.einsum("nk,kc->nc", real_sh(normal), illumination))
+    shading = direct + indirect
     return replace(
         d,
-        shading=new_shading,
-        reflectance=reflectance,
+        shading=_map(d.mask, shading),
+        reflectance=_map(d.mask, d.diffuse[d.mask] / shading),
         illumination=illumination,
-        visibility=visibility,
+        visibility=_map(d.mask, direct / smooth, outside=1.0),
+        indirect=_map(d.mask, indirect),
         environment=radiance.reshape(rows, 2 * rows, 3).astype(np.float32),
     )
+
+
+def _map(mask: np.ndarray, inside: np.ndarray, outside: float = 0.0) -> np.ndarray:
+    """A map (H, W, 3) of float32 from the values (N, 3) of the mask's pixels."""
+    values = np.full((*mask.shape, 3), outside, np.float32)
+    values[mask] = inside
+    return values
 
 
 def _noted(d: Decomposition, note: dict[str, Any]) -> Decomposition:

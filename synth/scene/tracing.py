@@ -37,12 +37,15 @@ class Hits:
         Unit, interpolated between vertices, turned toward the ray's origin.
     uv : (M, 2) ndarray
         Texture coordinates.
+    front : (M,) ndarray of bool
+        Whether the ray meets the side from which the corners of the face are counter-clockwise.
     """
 
     valid: np.ndarray
     position: np.ndarray
     normal: np.ndarray
     uv: np.ndarray
+    front: np.ndarray
 
 
 class Tracer:
@@ -82,7 +85,8 @@ class Tracer:
             One entry per ray.
         """
         if not len(origins):  # Dr.Jit aborts the process on empty arrays
-            return Hits(np.zeros(0, bool), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
+            none, vectors = np.zeros(0, bool), np.zeros((0, 3))
+            return Hits(none, vectors, vectors, np.zeros((0, 2)), none)
         columns = (
             self._scalar_hits(origins, directions)
             if self._scalar
@@ -93,7 +97,8 @@ class Tracer:
         length = np.linalg.norm(normal, axis=1, keepdims=True)
         normal = normal / np.where(length > 0, length, 1)
         normal = np.where((normal * directions).sum(1, keepdims=True) > 0, -normal, normal)
-        return Hits(valid, columns[:, 1:4], normal, columns[:, 7:9])
+        front = np.einsum("mk,mk->m", columns[:, 9:], directions) < 0
+        return Hits(valid, columns[:, 1:4], normal, columns[:, 7:9], front)
 
     def blocked(
         self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float
@@ -133,20 +138,20 @@ class Tracer:
         hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
         # Component by component: the conversion of a whole vector is a kernel that is compiled anew
         # for every number of rays.
-        parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv]
+        parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv, *hit.n]
         drjit.eval(parts)
         columns = np.stack([np.array(part, dtype=float) for part in parts], axis=1)
         return columns * columns[:, :1]
 
     def _scalar_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         mi = load_mitsuba()
-        columns = np.zeros((len(origins), 9))
+        columns = np.zeros((len(origins), 12))
         for row, (origin, direction) in enumerate(
             zip(_rows(origins), _rows(directions), strict=True)
         ):
             hit = self.scene.ray_intersect(mi.Ray3f(origin, direction))
             if hit.is_valid():
-                columns[row] = (1, *hit.p, *hit.sh_frame.n, *hit.uv)
+                columns[row] = (1, *hit.p, *hit.sh_frame.n, *hit.uv, *hit.n)
         return columns
 
 

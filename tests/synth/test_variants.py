@@ -7,11 +7,10 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from synth.refine.transport import light_transport
 from synth.rendering import Lit, Renderer, RenderOptions, light_surface
 from synth.scene.variant import CUDA, LLVM, SCALAR, usable_variants
 from tests.synth.small_scenes import lights, materials, seen, skittle, variant
-from tests.synth.test_refine import dome
+from tests.synth.test_refine import dome, transport_of
 
 MISSING = {
     CUDA: "needs a graphics card with CUDA and OptiX, whose driver Dr.Jit can load",
@@ -76,11 +75,13 @@ def test_variants_trace_the_same_shadows(other: str) -> None:
     found = []
     for name in (LLVM, other):
         with variant(name):
-            found.append(light_transport(dome(wall=True), 8))
+            found.append(transport_of(dome(wall=True)))
     np.testing.assert_array_equal(found[0].unshadowed, found[1].unshadowed)
     hidden = [each.shadowed < each.unshadowed for each in found]
     assert hidden[0].mean() > 0.01
     assert (hidden[0] != hidden[1]).mean() < 1e-3
+    assert found[0].indirect.max() > 0
+    assert np.abs(found[0].indirect - found[1].indirect).mean() < 1e-3 * found[0].indirect.mean()
 
 
 @pytest.mark.parametrize("light", ["directional", "panel", "environment"])

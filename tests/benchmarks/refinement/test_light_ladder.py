@@ -7,9 +7,8 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from benchmarks.refinement.light_ladder import Step, blocked, nearest, scores
+from benchmarks.refinement.light_ladder import Step, blocked, nearest, scores, transport_of
 from synth.refine.light_objective import shading_of
-from synth.refine.transport import light_transport
 from tests.synth.test_refine import dome
 
 ROWS = 16
@@ -20,8 +19,8 @@ LIGHT = np.random.default_rng(3).uniform(0.1, 1, (2 * ROWS**2, 1)) * np.array([[
 def step(request: pytest.FixtureRequest) -> Step:
     """A dome, and a floor with a wall, under a known light."""
     d = dome(32, wall=request.param)
-    transport = light_transport(d, ROWS)
-    shading = shading_of(transport.shadowed, LIGHT)
+    transport = transport_of(d)
+    shading = shading_of(transport.shadowed, LIGHT, transport.indirect)
     return Step("wall" if request.param else "dome", shading, LIGHT, transport, 0.5 * shading)
 
 
@@ -29,7 +28,8 @@ def step(request: pytest.FixtureRequest) -> Step:
 def test_the_nearest_environment_has_the_given_shading(step: Step) -> None:
     found = nearest(step.transport, step.shading)
     assert found.min() >= 0
-    np.testing.assert_allclose(shading_of(step.transport.shadowed, found), step.shading, rtol=0.01)
+    shading = shading_of(step.transport.shadowed, found, step.transport.indirect)
+    np.testing.assert_allclose(shading, step.shading, rtol=0.01)
 
 
 def test_only_a_wall_blocks_light(step: Step) -> None:
@@ -58,7 +58,7 @@ def test_the_truth_has_no_error_and_a_turned_light_has(step: Step) -> None:
     assert np.all(found[:4] < 1e-5)
     assert found[4] > 60
     turned = LIGHT.reshape(ROWS, 2 * ROWS, 3)[:, ::-1].reshape(-1, 3)
-    shading = shading_of(step.transport.shadowed, turned)
+    shading = shading_of(step.transport.shadowed, turned, step.transport.indirect)
     other = scores(Step("", shading, turned, step.transport, 0.5 * step.shading), mask, truth)
     assert np.all(other[:4] > found[:4])
     assert other[4] < found[4]
