@@ -182,17 +182,17 @@ def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:
     ----------
     transport : Transport
     shading : (N, 3) ndarray
-        Its colour is the same everywhere.
+        The direct part has the same colour everywhere.
 
     Returns
     -------
     (J, 3) ndarray
     """
-    grey = shading.mean(axis=1)
+    direct = shading - transport.indirect
+    grey = direct.mean(axis=1)
     some = np.random.default_rng(0).choice(len(grey), min(_POINTS, len(grey)), replace=False)
-    direct = grey - transport.indirect.mean(axis=1)
-    found, _ = nnls(transport.shadowed[some].astype(float), direct[some])
-    return np.asarray(found[:, None] * shading.mean(axis=0) / grey.mean())
+    found, _ = nnls(transport.shadowed[some].astype(float), grey[some])
+    return np.asarray(found[:, None] * direct.mean(axis=0) / grey.mean())
 
 
 def scores(step: Step, mask: np.ndarray, truth: dict[str, np.ndarray]) -> np.ndarray:
