@@ -12,7 +12,7 @@ runs in batches on the device without synchronisation.
 Limits: those of `training.masks.pasting` and `training.masks.backgrounds`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -24,6 +24,9 @@ from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
 from .backgrounds import SHARES as BACKGROUND_SHARES
 from .backgrounds import BackgroundDraws, Backgrounds, draw_backgrounds
+from .bands import Bands, draw_bands, painted
+from .defocus import Defocus, defocused, draw_defocus
+from .difficulty import SIMPLE, Difficulty
 from .hints import HintDraws, draw_hints, hint_maps, hinted
 from .ingredients import LENGTH, SIDE
 from .packs import Ingredients
@@ -103,6 +106,10 @@ class CompositeDraw(TensorBatch):
     cameras : Cameras
     object_variation, background_variation : ObjectVariation, BackgroundVariation or None
         None: without variation.
+    defocus : Defocus or None
+        None: all backgrounds are sharp.
+    bands : Bands or None
+        None: on no object.
     """
 
     scenes: Scenes
@@ -112,6 +119,8 @@ class CompositeDraw(TensorBatch):
     cameras: Cameras
     object_variation: ObjectVariation | None = None
     background_variation: BackgroundVariation | None = None
+    defocus: Defocus | None = None
+    bands: Bands | None = None
 
 
 @dataclass(frozen=True)
@@ -130,6 +139,8 @@ class CompositeDraws:
         Shares of plain backgrounds, and of backgrounds with a table.
     varied : bool
         Vary objects and backgrounds, see `variation`.
+    difficulty : Difficulty
+        Shares of difficult photos.
     """
 
     size: int
@@ -137,6 +148,7 @@ class CompositeDraws:
     shares: tuple[float, ...] = SHARES
     backgrounds: tuple[float, float] = BACKGROUND_SHARES
     varied: bool = False
+    difficulty: Difficulty = SIMPLE
 
     def __call__(self, rng: np.random.Generator) -> CompositeDraw:
         """Draw a batch.
@@ -150,12 +162,12 @@ class CompositeDraws:
         CompositeDraw
             On the CPU.
         """
-        scenes, objects = draw_scenes(rng, self.size, self.shares)
+        scenes, objects = draw_scenes(rng, self.size, self.shares, self.difficulty)
         object_variation, of_backgrounds = None, None
         if self.varied:
             objects, object_variation = varied_objects(objects, rng)
             of_backgrounds = draw_background_variation(rng, self.size)
-        return CompositeDraw(
+        drawn = CompositeDraw(
             scenes,
             objects,
             draw_backgrounds(rng, self.size, self.backgrounds),
@@ -164,6 +176,12 @@ class CompositeDraws:
             object_variation,
             of_backgrounds,
         )
+        # numbers of difficult photos come last, and only for these: all others stay the same
+        if share := self.difficulty.defocused:
+            drawn = replace(drawn, defocus=draw_defocus(rng, self.size, share))
+        if share := self.difficulty.banded:
+            drawn = replace(drawn, bands=draw_bands(rng, len(objects), share))
+        return drawn
 
 
 def _draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
@@ -229,12 +247,16 @@ class Composites:
         """
         levels = self._rows_of(self._cutouts.levels(drawn.objects.length * self._factor))
         layers = self._rows_of(drawn.objects.layer)
+        focus = {} if drawn.defocus is None else self._rows_of(_first_in_focus(drawn, len(layers)))
         drawn = drawn.to(self._device)
         frame, light = frames(drawn.scenes.shape, self._side), self._background(drawn)
         covers = light.new_zeros(len(light), max(len(layers), 1), *light.shape[2:])
         if layers:
             foreground, cover = self._cutouts.placed(drawn.objects, levels, self._side)
-            _paste(light, covers, foreground, cover, drawn, layers)
+            if drawn.bands is not None:
+                foreground = painted(foreground, drawn.objects, drawn.bands)
+            _paste(light, covers, foreground, cover, drawn, layers, focus)
+        _defocus(light, drawn, focus.get(len(layers)))
         mask, hints, count = _ground_truth(covers * frame, frame, drawn)
         return Composite(_photographed(light, frame, drawn.cameras), frame, hints, mask, count)
 
@@ -277,10 +299,12 @@ def _paste(
     cover: torch.Tensor,
     drawn: CompositeDraw,
     layers: dict[int, torch.Tensor],
+    focus: dict[int, torch.Tensor],
 ) -> None:
     """Paste objects into the light, in place; `covers` (B, T, H, W) receives the visible parts."""
     shade, varied = shadows(cover, drawn.objects), drawn.object_variation
     for k, rows in layers.items():
+        _defocus(light, drawn, focus.get(k))
         photos, over, front = drawn.objects.photo[rows], cover[rows], foreground[rows]
         behind = light[photos]
         if varied is not None:
@@ -290,6 +314,20 @@ def _paste(
         covers[photos, k] = over[:, 0]
 
 
+def _first_in_focus(drawn: CompositeDraw, layers: int) -> torch.Tensor:
+    """The layer (B,) of the first target; without one, the number of layers; -1: all is sharp."""
+    objects, radius = drawn.objects, drawn.defocus.radius  # type: ignore[union-attr]
+    first = torch.full((len(radius),), layers)
+    first.scatter_reduce_(0, objects.photo[objects.target], objects.layer[objects.target], "amin")
+    return torch.where(radius > 0, first, -1)
+
+
+def _defocus(light: torch.Tensor, drawn: CompositeDraw, photos: torch.Tensor | None) -> None:
+    """Blur the light of some photos, in place."""
+    if drawn.defocus is not None and photos is not None:
+        light[photos] = defocused(light[photos], drawn.defocus.chosen(photos))
+
+
 def _ground_truth(
     covers: torch.Tensor, frame: torch.Tensor, drawn: CompositeDraw
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
@@ -297,7 +335,8 @@ def _ground_truth(
     objects, given = drawn.objects, drawn.hints.given
     alone = torch.zeros(covers.shape[:2], dtype=torch.bool, device=covers.device)
     alone[objects.photo, objects.layer] = objects.target
-    marked = hinted(covers, alone, drawn.hints)
+    single = drawn.scenes.count == int(Count.ONE)
+    marked = hinted(covers, alone, single, drawn.hints)
     some = torch.where(given[:, None], marked, alone)
     mask = (covers * some[..., None, None]).sum(1, keepdim=True).clamp(max=1)
     hints = hint_maps(mask[:, 0] > 0.5, frame[:, 0] > 0, drawn.hints)

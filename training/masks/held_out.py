@@ -22,6 +22,7 @@ from isc_core.photo import read_photo
 from ..networks.scene_batches import read_world
 from ..world.files import Split
 from .composites import CompositeDraws, Composites
+from .difficulty import SIMPLE, Difficulty
 from .ingredients import cut_out, lit_cutouts, panoramas_in
 from .packs import Ingredients
 
@@ -103,7 +104,11 @@ def masked_cutout(path: Path) -> np.ndarray:
 
 
 def held_out_composites(
-    ingredients: Ingredients, count: Count, number: int, seed: int
+    ingredients: Ingredients,
+    count: Count,
+    number: int,
+    seed: int,
+    difficulty: Difficulty = SIMPLE,
 ) -> Iterator[HeldOut]:
     """Compose photos.
 
@@ -115,13 +120,16 @@ def held_out_composites(
     number : int
         Of photos.
     seed : int
+    difficulty : Difficulty
+        Shares of difficult photos.
 
     Yields
     ------
     HeldOut
     """
     shares = tuple(float(kind == count) for kind in Count)
-    compose = Composites(ingredients, CompositeDraws(_BATCH, hinted=0, shares=shares), SIDE)
+    draw = CompositeDraws(_BATCH, hinted=0, shares=shares, difficulty=difficulty)
+    compose = Composites(ingredients, draw, SIDE)
     rng, made = np.random.default_rng([seed, int(count)]), 0
     torch.manual_seed(seed)
     while made < number:

@@ -87,7 +87,9 @@ def draw_hints(rng: np.random.Generator, number: int, share: float, most: int) -
     )
 
 
-def hinted(covers: torch.Tensor, target: torch.Tensor, draws: HintDraws) -> torch.Tensor:
+def hinted(
+    covers: torch.Tensor, target: torch.Tensor, single: torch.Tensor, draws: HintDraws
+) -> torch.Tensor:
     """Choose the objects that hints select.
 
     Parameters
@@ -96,19 +98,24 @@ def hinted(covers: torch.Tensor, target: torch.Tensor, draws: HintDraws) -> torc
         Visible part of each object.
     target : (B, T) bool tensor
         Targets without hints.
+    single : (B,) bool tensor
+        The targets of the photo are the parts of one object.
     draws : HintDraws
 
     Returns
     -------
     (B, T) bool tensor
-        At most one per photo; none if the hints lie on the background.
+        At most one object per photo, with all of its parts; none if the hints lie on the
+        background.
     """
     seen = (covers > 0.5).sum((2, 3)) > _MIN_PIXELS
-    alone = target & (target.sum(1, keepdim=True) == 1)
+    alone = target & single[:, None]
     preferred = draws.preferred[:, : covers.shape[1]] + 2 * (alone & draws.same[:, None])
     preferred = torch.where(seen, preferred, -1)
     best = preferred == preferred.amax(1, keepdim=True)
-    return best & seen & ~draws.background[:, None]
+    best = best & seen
+    best = best | (alone & (best & alone).any(1, keepdim=True))
+    return best & ~draws.background[:, None]
 
 
 def hint_maps(truth: torch.Tensor, inside: torch.Tensor, draws: HintDraws) -> torch.Tensor:

@@ -28,10 +28,12 @@ from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
 from .composites import CompositeDraws, Composites
+from .difficulty import DIFFICULT
 from .ingredients import SETS
 from .mask_module import MaskNetworkModule
 from .packs import SUFFIX, Ingredients
 
+_SHARES = (0.19, 0.53, 0.28)  # of scenes without an object, with one, with several
 SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
 
 
@@ -60,7 +62,9 @@ def main() -> None:
         network.begin(weights)
     except InputError as error:
         parser.error(str(error))
-    draw = CompositeDraws(options.batch, arguments.hinted, varied=True)
+    draw = CompositeDraws(
+        options.batch, arguments.hinted, _SHARES, varied=True, difficulty=DIFFICULT
+    )
     compose = Composites(training, draw, arguments.side, options.device)
     measured = Composites(held_out, CompositeDraws(options.batch), arguments.side, options.device)
     schedule = replace(SCHEDULE, rate=arguments.rate)

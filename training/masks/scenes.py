@@ -2,6 +2,8 @@
 
 Problem: photos show no object, one in front of or beside others, several side by side, or a pile.
 
+`targets` makes compound objects, and objects that the frame cuts.
+
 Limits: a scene of one object has others only in its background, at most half as long, or cut by
 its frame.
 """
@@ -15,7 +17,9 @@ from isc_core.networks.mask_network import Count
 
 from ..world.random_draws import log_uniforms
 from ..world.tensor_batch import TensorBatch
+from .difficulty import SIMPLE, Difficulty
 from .ingredients import LENGTH, SIDE
+from .targets import MOST_PARTS, Parts, cut_by_frame, draw_parts
 
 SHARES = (0.17, 0.58, 0.25)  # of scenes without an object, with one, with several
 MAX_OBJECTS = 8  # objects of a scene
@@ -23,6 +27,8 @@ _REFERENCE = 0.2  # of the frame: in scenes without a target, objects are at mos
 _PILES = 0.35  # share of piles among scenes with several objects
 _OTHERS = (0.42, 0.2, 0.16, 0.12, 0.1)  # shares of scenes with 0 to 4 other objects
 _SHAPES = np.array([(1, 0.75), (0.75, 1), (1, 1), (1, 2 / 3), (2 / 3, 1), (1, 0.5625)])
+_FAT = 0.4  # parts of compound objects are not among the thinnest cut-outs
+_SAME_LIGHT = 0.5  # share of compound objects whose parts are about equally bright
 _GRIDS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns, rows
 
 
@@ -54,7 +60,8 @@ class PastedObjects(TensorBatch):
     photo, layer : (N,) int64 tensor
         Index of the photo, and number of objects behind this one in it.
     target : (N,) bool tensor
-        Whether the mask without hints contains it.
+        Whether the mask without hints contains it: the parts of a compound object, or all of
+        several objects.
     cutout : (N,) tensor
         Index as a fraction of the number of cut-outs, in [0, 1).
     length : (N,) tensor
@@ -118,7 +125,10 @@ class _Places:
 
 
 def draw_scenes(
-    rng: np.random.Generator, number: int, shares: tuple[float, ...] = SHARES
+    rng: np.random.Generator,
+    number: int,
+    shares: tuple[float, ...] = SHARES,
+    difficulty: Difficulty = SIMPLE,
 ) -> tuple[Scenes, PastedObjects]:
     """Draw scenes.
 
@@ -129,6 +139,8 @@ def draw_scenes(
         Of photos.
     shares : tuple of float
         Of scenes with no object, one and several.
+    difficulty : Difficulty
+        Shares of compound targets, and of those that the frame cuts.
 
     Returns
     -------
@@ -139,7 +151,8 @@ def draw_scenes(
     shape = _SHAPES[rng.integers(len(_SHAPES), size=number)]
     level = 0.2 * np.exp(rng.normal(0, 0.5, number))
     count = rng.choice(len(shares), number, p=shares)
-    at_most_one, several = _one_or_none(rng, shape, count == Count.ONE), _several(rng, shape)
+    at_most_one = _one_or_none(rng, shape, count == Count.ONE, difficulty)
+    several = _several(rng, shape)
     crowded = (count == Count.SEVERAL)[:, None]
     photo, layer = np.nonzero(np.where(crowded, several.present, at_most_one.present))
 
@@ -151,6 +164,8 @@ def draw_scenes(
     objects = _objects(rng, chosen("size"), level[photo])
     objects |= {"photo": photo, "layer": layer}
     objects |= {"target": chosen("target"), "place": chosen("place")}
+    if difficulty.compound:
+        _match_parts(rng, objects, count)
     scenes = {"shape": shape, "level": level, "count": count}
     return Scenes.of(scenes), PastedObjects.of(objects)
 
@@ -180,7 +195,25 @@ def _objects(
     }
 
 
-def _one_or_none(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray) -> _Places:
+def _match_parts(
+    rng: np.random.Generator, objects: dict[str, np.ndarray], count: np.ndarray
+) -> None:
+    """Choose cut-outs and light of the parts of compound objects, in place."""
+    photo = objects["photo"]
+    part = objects["target"] & (count[photo] == Count.ONE)
+    part &= np.bincount(photo[part], minlength=len(count))[photo] > 1
+    first = np.full(len(count), -1)
+    rows = np.flatnonzero(part)[::-1]
+    first[photo[rows]] = rows
+    same = part & (rng.random(len(count)) < _SAME_LIGHT)[photo]
+    light = objects["gain"][first[photo]] * np.exp(rng.normal(0, 0.2, (len(photo), 1)))
+    objects["gain"] = np.where(same[:, None], light, objects["gain"])
+    objects["cutout"] = np.where(part, _FAT + (1 - _FAT) * objects["cutout"], objects["cutout"])
+
+
+def _one_or_none(
+    rng: np.random.Generator, shape: np.ndarray, single: np.ndarray, difficulty: Difficulty
+) -> _Places:
     """Objects in the background or cut by the frame; the target, if there is one, in front."""
     number, short = len(shape), SIDE * shape.min(axis=1)
     length = np.minimum(SIDE * log_uniforms(rng, 0.27, 0.95, number), 1.1 * short)
@@ -200,11 +233,35 @@ def _one_or_none(rng: np.random.Generator, shape: np.ndarray, single: np.ndarray
     place = np.where(cut[..., None], edge * (shape[:, None] + off[..., None]), inside)
     others = rng.choice(len(_OTHERS), number, p=_OTHERS)
     rows = np.flatnonzero(single)
+    middle = _middle(rng, shape, length)
+    if difficulty.cut:
+        replaced = rng.random(number) < difficulty.cut
+        drawn = cut_by_frame(rng, shape, SIDE)
+        length = np.where(replaced, drawn[0], length)
+        middle = np.where(replaced[:, None], drawn[1], middle)
     size[rows, others[rows]] = length[rows]
-    place[rows, others[rows]] = _middle(rng, shape, length)[rows]
-    slots = np.arange(MAX_OBJECTS)
-    target = single[:, None] & (slots == others[:, None])
+    place[rows, others[rows]] = middle[rows]
+    slots, parts = np.arange(MAX_OBJECTS), np.ones(number, int)
+    if difficulty.compound:
+        drawn_parts = draw_parts(rng, number)
+        compound = single & (rng.random(number) < difficulty.compound)
+        parts = np.where(compound, np.minimum(drawn_parts.number, MAX_OBJECTS - others), 1)
+        _place_parts(size, place, np.where(compound, parts, 0), others, drawn_parts)
+    target = single[:, None] & (slots >= others[:, None]) & (slots < (others + parts)[:, None])
     return _Places(size, place, target | (slots < others[:, None]), target)
+
+
+def _place_parts(
+    size: np.ndarray, place: np.ndarray, number: np.ndarray, first: np.ndarray, parts: Parts
+) -> None:
+    """Replace the objects (B, MAX_OBJECTS) at index `first` by `number` parts each, in place."""
+    rows = np.arange(len(size))
+    length, middle = size[rows, first], place[rows, first]
+    for k in range(MOST_PARTS):
+        some = rows[k < number]
+        at = (some, first[some] + k)
+        size[at] = length[some] * parts.length[some, k]
+        place[at] = middle[some] + parts.place[some, k] * (length[some] / SIDE)[:, None]
 
 
 def _middle(rng: np.random.Generator, shape: np.ndarray, length: np.ndarray) -> np.ndarray:

@@ -56,7 +56,8 @@ def test_hints_select_one_visible_object() -> None:
     covers = torch.zeros(300, 3, 16, 16)
     covers[:, 0, :8], covers[:, 2, 8:] = 1, 1  # the second is hidden
     target = torch.tensor([True, False, False]).expand(300, 3)
-    found = hinted(covers, target, drawn)
+    single = torch.ones(300, dtype=torch.bool)
+    found = hinted(covers, target, single, drawn)
     assert torch.equal(found.any(1), ~drawn.background) and int(found.sum(1).max()) == 1
     assert not bool(found[:, 1].any())
     assert 0.65 < float(found[:, 0].float().mean()) < 0.85  # .94 (.6 + .4 / 2)
