@@ -1,14 +1,15 @@
 """How good are masks that are found automatically? Measured on composites of held-out objects.
 
   python -m benchmarks.decomposition.automatic_mask WORLD --panoramas DIR [--photos DIR]
-  [--weights NPZ] [--count N] [--sheet JPG] [--json FILE]
+  [--weights NPZ] [--count N] [--difficult N] [--sheet JPG] [--json FILE]
 
 WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
 one object show bodies that no fit has seen, the other half the masked photos of real objects in
 --photos; both stand before crops of panoramas that no fit has seen. As many photos again show
 nothing, or several objects. Refusals are wrong where one object is shown, and more so where its
 mask would have been right, with an overlap of .5; acceptances where none or several are shown.
-Intervals are those of resampled photos.
+--difficult adds photos of one object of each difficult kind, and defocused ones of none. Intervals
+are those of resampled photos.
 
 Limits: bodies and panoramas are soft at this size, and the light on an object is not that of its
 background. Several photos show the same of the real objects.
@@ -30,12 +31,21 @@ from isc_core.masking.finder import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
+from training.masks.difficulty import Difficulty
 from training.masks.held_out import HeldOut, held_out_composites, held_out_ingredients
+from training.masks.packs import Ingredients
 
 _TILE = 140  # pixels of the sheet's pictures
 _SHOWN = 20
 _SEED = 5
 _RIGHT = 0.5  # overlap of a mask that is right
+_KINDS = {
+    "compound": Difficulty(compound=1),
+    "cut by the frame": Difficulty(cut=1),
+    "before a defocused background": Difficulty(defocused=1),
+    "with bands": Difficulty(banded=1),
+}
+_NOTHING = "nothing, defocused"
 
 
 @dataclass(frozen=True)
@@ -88,7 +98,8 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     Parameters
     ----------
     groups : dict of str to list of MaskScore
-        "bodies" and "photos" show one object each, the others none or several.
+        "bodies", "photos" and the difficult kinds show one object each, the others none or
+        several.
 
     Returns
     -------
@@ -100,6 +111,7 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     rows, figures = list[tuple[str, list[MaskScore]]](), dict[str, object]()
     rows += [(name, groups[name]) for name in single]
     rows.append(("all of one object", [one for name in single for one in groups[name]]))
+    rows += [(name, groups[name]) for name in _KINDS if name in groups]
     lines = [
         "| shown | photos | IoU, median | 10th percentile | of those accepted "
         "| refused | refused of right ones |",
@@ -119,9 +131,10 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
             "confidence": [round(one.found.confidence, 4) for one in found],
         }
     lines += ["", "| shown | photos | accepted |", "|---|---|---|"]
-    others = [name for name in groups if name not in single]
-    whole = [*((name, groups[name]) for name in others)]
-    whole.append(("no single object", [one for name in others for one in groups[name]]))
+    others = [name for name in groups if name not in (*single, *_KINDS)]
+    whole = [(name, groups[name]) for name in others]
+    simple = [one for name in others if name != _NOTHING for one in groups[name]]
+    whole.append(("no single object, in focus", simple))
     for name, found in whole:
         lines.append(f"| {name} | {len(found)} | {_share([one.accepted for one in found])} |")
         figures[name] = {"confidence": [round(one.found.confidence, 4) for one in found]}
@@ -186,6 +199,34 @@ def _outlined(codes: np.ndarray, mask: np.ndarray, colour: tuple[int, int, int])
     return np.where(edge[..., None], np.array(colour, np.uint8), codes)
 
 
+def score_difficult(
+    bodies: Ingredients, number: int, network: MaskNetwork | None
+) -> dict[str, list[MaskScore]]:
+    """Find the masks of difficult composites.
+
+    Parameters
+    ----------
+    bodies : Ingredients
+    number : int
+        Of composites of each kind.
+    network : MaskNetwork or None
+
+    Returns
+    -------
+    dict of str to list of MaskScore
+        By kind.
+    """
+    kinds = [(name, Count.ONE, difficulty) for name, difficulty in _KINDS.items()]
+    kinds.append((_NOTHING, Count.NONE, Difficulty(defocused=1)))
+    return {
+        name: [
+            score_mask(photo, network)
+            for photo in held_out_composites(bodies, count, number, _SEED + 10 + k, difficulty)
+        ]
+        for k, (name, count, difficulty) in enumerate(kinds)
+    }
+
+
 def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(
@@ -197,6 +238,7 @@ def main() -> None:
     add("--photos", type=Path, metavar="DIR", help="masked photos of real objects")
     add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
     add("--count", type=int, default=200, help="photos of one object (default: %(default)s)")
+    add("--difficult", type=int, default=0, help="of each difficult kind (default: none)")
     add("--sheet", type=Path, metavar="JPG", help="where to draw 20 of them")
     add("--json", type=Path, help="file to write")
     given = parser.parse_args()
@@ -222,6 +264,8 @@ def main() -> None:
     for name, count in (("nothing", Count.NONE), ("several", Count.SEVERAL)):
         photos = held_out_composites(bodies, count, given.count // 2, _SEED)
         groups[name] = [score_mask(photo, network) for photo in photos]
+    if given.difficult:
+        groups |= score_difficult(bodies, given.difficult, network)
     text, figures = report(groups)
     print(text)
     if given.json:
