@@ -5,9 +5,10 @@ surroundings, should be refused, not masked.
 
 Equation: logistic regression. The log odds of a correct mask are w_0 + w_1 l(p_1) + w_2 l(p_2) +
 w_3 l(o) + w_4 l(f_1) + w_5 l(f_2). l(p) = log(p / (1 - p)). p_1 and p_2 are the probabilities of
-one object in both passes, o is the overlap of the passes, and f is the decisiveness of a pass, 1 -
-2 (sum c (1 - c)) / (sum c) for the coverage c: 1 if every pixel is certain, 0 if all have even
-odds. w is fitted (`training.masks.mask_calibration`).
+one object in both passes; if the mask is in one piece, of one or several: objects that touch, or an
+object of several paints. o is the overlap of the passes, and f is the decisiveness of a pass, 1 - 2
+(sum c (1 - c)) / (sum c) for the coverage c: 1 if every pixel is certain, 0 if all have even odds.
+w is fitted (`training.masks.mask_calibration`).
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines", 1999.
 
@@ -29,7 +30,7 @@ _OVERLAP = 3  # index of the overlap among the features
 
 
 def confidence_features(
-    first: CropPrediction, second: CropPrediction, before: np.ndarray
+    first: CropPrediction, second: CropPrediction, before: np.ndarray, in_one_piece: bool
 ) -> np.ndarray:
     """Return the features of the confidence.
 
@@ -39,15 +40,18 @@ def confidence_features(
         Of the whole photo, and of a crop.
     before : (height, width) ndarray
         Coverage of that crop in the first pass.
+    in_one_piece : bool
+        Whether the mask is.
 
     Returns
     -------
     (FEATURES,) ndarray
         1, and log odds.
     """
+    counts = [Count.ONE, Count.SEVERAL] if in_one_piece else [Count.ONE]
     probabilities = [
-        float(first.counts[Count.ONE]),
-        float(second.counts[Count.ONE]),
+        float(first.counts[counts].sum()),
+        float(second.counts[counts].sum()),
         _overlap(before, second.cover),
         _decisiveness(first.cover),
         _decisiveness(second.cover),

@@ -8,7 +8,7 @@ Equation: without hints, a mask is used if its confidence (`confidence`) is at l
 hints, the user decides, and a mask is used at any confidence.
 
 Limits: the thresholds were chosen on composites, see docs/methods/automatic_mask.md. Objects that
-touch are found as one.
+touch are found as one, and used as one.
 """
 
 from dataclasses import dataclass, field, replace

@@ -189,9 +189,15 @@ def _second_pass(
     if hints.box is not None:
         spread = (second.cover > 0.5).sum() < _MIN_PREDICTED * (cover >= 0.5).sum()
         cover = np.zeros_like(cover) if spread and not hints.points else _cut(cover, hints.box)
-    features = confidence_features(first, second, first.cover[crop.slices])
+    whole = _is_one_piece(first.cover > 0.5) and _is_one_piece(cover >= 0.5)
+    features = confidence_features(first, second, first.cover[crop.slices], whole)
     confidence = confidence_of(features, network.confidence_weights)
     return FoundMask(cover, confidence, first.counts, features)
+
+
+def _is_one_piece(mask: np.ndarray) -> bool:
+    """Whether a mask has one component; small ones do not count."""
+    return bool(mask.any()) and len(connected_components(mask)) == 1
 
 
 def _cut(cover: np.ndarray, box: Box) -> np.ndarray:

@@ -2,14 +2,16 @@
 
   python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
 
-Equation: ridge logistic regression of "the photo shows one object, and the overlap (IoU) of the
-mask is at least .5" on the features of `isc_core.masking.confidence`. Photos are those of part A of
-`training.masks.held_out`; part B is the test set. The program prints a table of thresholds.
+Equation: ridge logistic regression of "the mask is correct" on the features of
+`isc_core.masking.confidence`. A mask of one object is correct if its overlap (IoU) is at least .5.
+A mask of several is correct if it is in one piece, and its overlap with all of them is at least .7:
+a pile. Photos are those of part A of `training.masks.held_out`; part B is the test set. Two of
+three photos of one object are difficult. The program prints a table of thresholds.
 
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
 regularized likelihood methods", 1999.
 
-Limits: as many photos of one object as of none and several together.
+Limits: three photos of one object for two of none or several.
 """
 
 import argparse
@@ -24,10 +26,23 @@ from isc_core.masking.finder import shows_several
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 
+from .difficulty import SIMPLE, Difficulty
 from .held_out import HeldOut, held_out_composites, held_out_ingredients
 
 _RIDGE, _STEPS = 0.1, 50
-_MIN_OVERLAP = 0.5  # of a correct mask
+_MIN_OVERLAP = {Count.ONE: 0.5, Count.SEVERAL: 0.7}  # of a correct mask
+_KINDS = (  # of photos, and their shares
+    (Count.ONE, SIMPLE, 1 / 4),
+    (Count.ONE, Difficulty(compound=1), 1 / 12),
+    (Count.ONE, Difficulty(cut=1), 1 / 12),
+    (Count.ONE, Difficulty(defocused=1), 1 / 12),
+    (Count.ONE, Difficulty(banded=1), 1 / 12),
+    (Count.NONE, SIMPLE, 1 / 8),
+    (Count.NONE, Difficulty(defocused=1), 1 / 16),
+    (Count.SEVERAL, SIMPLE, 1 / 6),
+    (Count.SEVERAL, Difficulty(defocused=1, banded=0.3), 1 / 16),
+)
+_FIRST_SEED = 40
 _THRESHOLDS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7)
 
 
@@ -76,8 +91,9 @@ def observed(
         truth = photo.cover >= 0.5
         overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
         rows.append(found.features)
-        correct.append(photo.count == Count.ONE and overlap >= _MIN_OVERLAP)
         single.append(bool(found.mask.any()) and not shows_several(found.mask))
+        alone = photo.count == Count.ONE or single[-1]
+        correct.append(alone and overlap >= _MIN_OVERLAP.get(photo.count, np.inf))
     return np.array(rows), np.array(correct), np.array(single)
 
 
@@ -100,11 +116,16 @@ def main() -> None:
         network = MaskNetwork.read(given.weights)
     except InputError as error:
         parser.error(str(error))
-    numbers = ((Count.ONE, 2), (Count.NONE, 4), (Count.SEVERAL, 4))
     photos = [
         photo
-        for kind, part in numbers
-        for photo in held_out_composites(ingredients, kind, given.count // part, given.seed + 1)
+        for k, (count, difficulty, share) in enumerate(_KINDS)
+        for photo in held_out_composites(
+            ingredients,
+            count,
+            round(given.count * share),
+            given.seed + _FIRST_SEED + k,
+            difficulty,
+        )
     ]
     features, correct, single = observed(photos, network)
     weights = logistic_weights(features, correct)
@@ -115,8 +136,9 @@ def main() -> None:
         used = single & (confidence >= limit)
         print(
             f"{limit:.2f}: refuses {(~used)[one].mean():.1%} of single objects, "
-            f"{(~used)[correct].mean():.1%} of correct masks; accepts {used[~one].mean():.1%} "
-            "without a single object"
+            f"{(~used)[one & correct].mean():.1%} of correct masks; accepts "
+            f"{used[~one].mean():.1%} without a single object, "
+            f"{(used & ~correct)[~one].mean():.1%} that are no piles"
         )
     with new_file(given.output) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **{**arrays, "sureness": weights.astype(np.float32)})

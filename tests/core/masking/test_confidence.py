@@ -23,7 +23,7 @@ def prediction(inside: float, outside: float) -> CropPrediction:
 
 def test_features_are_one_and_five_log_odds() -> None:
     certain = prediction(0.99, 0.01)
-    features = confidence_features(certain, certain, certain.cover)
+    features = confidence_features(certain, certain, certain.cover, False)
     assert features.shape == (FEATURES,) and features[0] == 1
     assert features[1] == pytest.approx(np.log(9)) == features[2]
     assert features[3] > 5, "both passes are equal"
@@ -32,10 +32,20 @@ def test_features_are_one_and_five_log_odds() -> None:
 def test_passes_that_differ_or_are_vague_have_lower_features() -> None:
     certain, vague = prediction(0.99, 0.01), prediction(0.6, 0.3)
     other = CropPrediction(np.roll(certain.cover, 8, axis=1), COUNTS)
-    same = confidence_features(certain, certain, certain.cover)
-    assert confidence_features(certain, other, certain.cover)[3] < same[3]
-    assert (confidence_features(vague, vague, vague.cover)[4:] < same[4:]).all()
+    same = confidence_features(certain, certain, certain.cover, False)
+    assert confidence_features(certain, other, certain.cover, False)[3] < same[3]
+    assert (confidence_features(vague, vague, vague.cover, False)[4:] < same[4:]).all()
     assert (features_without_object(certain)[2:] < same[2:]).all()
+
+
+def test_touching_objects_and_several_paints_do_not_count_against_a_mask_in_one_piece() -> None:
+    certain = CropPrediction(prediction(0.99, 0.01).cover, np.array([0.05, 0.15, 0.8]))
+    apart, together = (
+        confidence_features(certain, certain, certain.cover, whole) for whole in (False, True)
+    )
+    assert apart[1] == pytest.approx(np.log(0.15 / 0.85)) == apart[2]
+    assert together[1] == pytest.approx(np.log(19)) == together[2]
+    assert (apart[3:] == together[3:]).all()
 
 
 def test_the_confidence_is_a_probability() -> None:
@@ -46,7 +56,7 @@ def test_the_confidence_is_a_probability() -> None:
 
 def test_a_replacement_that_differs_lowers_the_overlap_alone() -> None:
     certain = prediction(0.99, 0.01)
-    features = confidence_features(certain, certain, certain.cover)
+    features = confidence_features(certain, certain, certain.cover, False)
     same = (certain.cover > 0.5).astype(np.float32)
     other = np.roll(same, 8, axis=1)
     assert features_of_replacement(features, certain.cover, certain.cover) == pytest.approx(
