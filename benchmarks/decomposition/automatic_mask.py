@@ -39,6 +39,7 @@ _TILE = 140  # pixels of the sheet's pictures
 _SHOWN = 20
 _SEED = 5
 _RIGHT = 0.5  # overlap of a mask that is right
+_WHOLE = 0.7  # overlap of a mask that contains a whole pile
 _KINDS = {
     "compound": Difficulty(compound=1),
     "cut by the frame": Difficulty(cut=1),
@@ -70,6 +71,12 @@ class MaskScore:
     def accepted(self) -> bool:
         """Whether the mask would be used."""
         return not refusal_reason(self.found)
+
+    @property
+    def harmful(self) -> bool:
+        """Whether it would be used, and is no mask of a whole pile in one piece."""
+        pile = self.photo.count == Count.SEVERAL and self.overlap >= _WHOLE
+        return self.accepted and not pile
 
 
 def score_mask(photo: HeldOut, network: MaskNetwork | None) -> MaskScore:
@@ -130,13 +137,14 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
             "overlap": overlap.round(4).tolist(),
             "confidence": [round(one.found.confidence, 4) for one in found],
         }
-    lines += ["", "| shown | photos | accepted |", "|---|---|---|"]
+    lines += ["", "| shown | photos | accepted | of these, no whole piles |", "|---|---|---|---|"]
     others = [name for name in groups if name not in (*single, *_KINDS)]
     whole = [(name, groups[name]) for name in others]
     simple = [one for name in others if name != _NOTHING for one in groups[name]]
     whole.append(("no single object, in focus", simple))
     for name, found in whole:
-        lines.append(f"| {name} | {len(found)} | {_share([one.accepted for one in found])} |")
+        shares = [_share([getattr(one, key) for one in found]) for key in ("accepted", "harmful")]
+        lines.append(f"| {name} | {len(found)} | {shares[0]} | {shares[1]} |")
         figures[name] = {"confidence": [round(one.found.confidence, 4) for one in found]}
     seconds = np.median([one.seconds for found in groups.values() for one in found])
     lines += ["", f"median time of a mask: {seconds:.2f} s"]

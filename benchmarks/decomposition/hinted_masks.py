@@ -1,6 +1,7 @@
 """How good are masks that points and boxes make, and is their confidence what it says?
 
-  python -m benchmarks.decomposition.hinted_masks PHOTOS --panoramas DIR [--count N] [--json FILE]
+  python -m benchmarks.decomposition.hinted_masks PHOTOS --panoramas DIR [--weights NPZ]
+  [--count N] [--json FILE]
 
 Composites of masked photos of real objects before crops of panoramas that no fit has seen, half of
 them with other objects beside. One object is the target. A box around it leaves up to 15 % on each
@@ -27,6 +28,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
+from isc_core.networks.mask_network import MaskNetwork
 from training.masks.composites import CompositeDraws, Composites
 from training.masks.held_out import SIDE, masked_cutout
 from training.masks.ingredients import panoramas_in
@@ -129,7 +131,9 @@ def _some(where: np.ndarray, rng: np.random.Generator, count: int) -> tuple[Poin
     return tuple((int(columns[k]), int(rows[k])) for k in rng.integers(len(rows), size=count))
 
 
-def score_masks(photos: Path, panoramas: Path, count: int) -> list[MaskScore]:
+def score_masks(
+    photos: Path, panoramas: Path, count: int, network: MaskNetwork | None = None
+) -> list[MaskScore]:
     """Make masks from hints of each kind on composites.
 
     Parameters
@@ -137,6 +141,8 @@ def score_masks(photos: Path, panoramas: Path, count: int) -> list[MaskScore]:
     photos, panoramas : Path
     count : int
         Of composites.
+    network : MaskNetwork, optional
+        By default the shipped one.
 
     Returns
     -------
@@ -144,15 +150,17 @@ def score_masks(photos: Path, panoramas: Path, count: int) -> list[MaskScore]:
     """
     rng = np.random.default_rng([_SEED, 1])
     return [
-        MaskScore(kind, *_score(light, truth, drawn_hints(truth, kind, rng)))
+        MaskScore(kind, *_score(light, truth, drawn_hints(truth, kind, rng), network))
         for light, truth in composites(photos, panoramas, count)
         for kind in KINDS
     ]
 
 
-def _score(light: np.ndarray, truth: np.ndarray, hints: Hints) -> tuple[float, float]:
+def _score(
+    light: np.ndarray, truth: np.ndarray, hints: Hints, network: MaskNetwork | None
+) -> tuple[float, float]:
     try:
-        found = find_mask(light, hints)
+        found = find_mask(light, hints, network)
     except InputError:
         return 0.0, 0.0
     return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.confidence
@@ -211,11 +219,13 @@ def main() -> None:
     add = parser.add_argument
     add("photos", type=Path, metavar="PHOTOS", help="folder of photos on black or transparent")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
+    add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
     add("--count", type=int, default=100, help="composites (default: %(default)s)")
     add("--json", type=Path, metavar="FILE", help="write every mask's figures")
     given = parser.parse_args()
     try:
-        found = score_masks(given.photos, given.panoramas, given.count)
+        network = None if given.weights is None else MaskNetwork.read(given.weights)
+        found = score_masks(given.photos, given.panoramas, given.count, network)
     except InputError as error:
         parser.error(str(error))
     print(report(found))
