@@ -13,6 +13,7 @@ import torch
 from isc_core.networks.mask_network import SIDE as FRAME
 from isc_core.networks.mask_network import Count, channels_of
 from training.masks.composites import CompositeDraws, Composites, frames
+from training.masks.difficulty import DIFFICULT, SIMPLE
 from training.masks.ingredients import LENGTH, cut_out
 from training.masks.mask_module import MaskNetworkModule, network_channels
 from training.masks.scenes import MAX_OBJECTS
@@ -96,7 +97,8 @@ def test_training_lowers_the_loss_on_white_objects() -> None:
 @pytest.mark.parametrize("varied", [False, True])
 def test_composition_does_not_read_values_from_the_device(varied: bool) -> None:
     # tensors of the device "meta" have shapes only: reading a value raises
-    draw = CompositeDraws(6, 0.5, varied=varied)
+    difficulty = DIFFICULT if varied else SIMPLE
+    draw = CompositeDraws(6, 0.5, varied=varied, difficulty=difficulty)
     compose = Composites(ingredients(), draw, 64, "meta")
     batch = compose.composed(draw(np.random.default_rng(0)))
     wanted = Composites(ingredients(), draw, 64)(np.random.default_rng(0))

@@ -15,7 +15,8 @@ from training.masks.bands import draw_bands, painted
 from training.masks.composites import CompositeDraws, Composites
 from training.masks.defocus import defocused, draw_defocus
 from training.masks.difficulty import DIFFICULT, SIMPLE, Difficulty
-from training.masks.scenes import MAX_OBJECTS, SIDE, draw_scenes
+from training.masks.ingredients import SIDE
+from training.masks.scenes import MAX_OBJECTS, draw_scenes
 from training.masks.targets import MOST_PARTS, cut_by_frame, draw_parts
 
 from .white_shapes import ingredients
@@ -36,7 +37,7 @@ def test_a_compound_target_is_one_object_with_one_mask() -> None:
     parts = torch.bincount(objects.photo[objects.target])
     assert int(parts.min()) == 2 and int(parts.max()) == MOST_PARTS
     assert int(objects.layer.max()) < MAX_OBJECTS and (scenes.count == int(Count.ONE)).all()
-    batch = compose(Difficulty(compound=1), 40)(np.random.default_rng(1))
+    batch = compose(Difficulty(compound=1), 24)(np.random.default_rng(1))
     assert (batch.count == int(Count.ONE)).all()
     pieces = []
     for mask in batch.mask[:, 0].numpy():
@@ -58,9 +59,9 @@ def test_parts_fill_the_square_of_their_object() -> None:
 
 
 def test_hints_on_a_part_select_the_whole_compound() -> None:
-    made, rng = compose(Difficulty(compound=1), 30, hinted=1), np.random.default_rng(3)
-    draw = CompositeDraws(30, 1, ONE, (0, 0), difficulty=Difficulty(compound=1))(rng)
-    same = torch.ones(30, dtype=torch.bool)
+    made, rng = compose(Difficulty(compound=1), 8, hinted=1), np.random.default_rng(3)
+    draw = CompositeDraws(8, 1, ONE, (0, 0), difficulty=Difficulty(compound=1))(rng)
+    same = torch.ones(8, dtype=torch.bool)
     on_target = replace(draw, hints=replace(draw.hints, background=~same, same=same))
     unhinted = replace(draw, hints=replace(draw.hints, given=~same))
     hinted = replace(on_target, hints=replace(on_target.hints, given=same))
@@ -79,7 +80,7 @@ def test_targets_are_cut_by_one_or_two_sides() -> None:
     border[[0, -1]] = border[:, [0, -1]] = True
 
     def touching(difficulty: Difficulty) -> float:
-        batch = compose(difficulty, 40)(np.random.default_rng(5))
+        batch = compose(difficulty, 24)(np.random.default_rng(5))
         inside = torch.nn.functional.avg_pool2d(batch.frame, 3, 1, 1) > 0.99
         return float((batch.mask * ~inside > 0.5).flatten(1).any(1).float().mean())
 
