@@ -15,6 +15,10 @@ and w = 0 the orthographic one, in which the back is the mirror image of the fro
 at the outline is stretched infinitely. In between, colours extend behind the outline, and print
 next to it is repeated farther behind: 30 deg behind the outline r' is .79 a instead of .67.
 
+The outermost pixels of a photo often show a shadow, or are mixed with the background. So r' is
+scaled by 1 - m / a: the sides begin m pixels inside the outline, .02 of the object's length, but at
+most a / 4.
+
 Citation: J. P. Snyder, "Map projections: a working manual", U.S. Geological Survey Professional
 Paper 1395 (1987), doi:10.3133/pp1395, sections 20 and 25.
 
@@ -29,6 +33,8 @@ from .cross_section import CrossSection
 
 _THINNEST = 3.0  # pixels: lower limit of a in e
 _EVEN = 0.4  # w
+_LEFT_OUT = 0.02  # m, of the object's longer side
+_MOST_LEFT_OUT = 0.25  # of a
 
 
 def folded_positions(
@@ -66,6 +72,8 @@ def folded_positions(
     whole = np.pi / 2 + np.arcsin(np.sqrt(1 / np.maximum(across, _THINNEST)))
     share = np.arctan2(radius, depth) / whole
     folded = across * (_EVEN * share + (1 - _EVEN) * np.sin(np.pi / 2 * share))
+    left_out = _LEFT_OUT * (np.ptp(pixels, axis=0).max() + 1)
+    folded *= 1 - np.minimum(left_out / np.maximum(across, 1e-9), _MOST_LEFT_OUT)
     # On the axis, where the direction is only rounding error, the position is kept.
     length = np.maximum(np.maximum(np.hypot(*toward.T), radius), 1e-9)
     return np.asarray(places + ((radius - folded) / length)[:, None] * toward)
