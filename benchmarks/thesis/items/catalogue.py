@@ -297,6 +297,7 @@ CHARACTERISTICS = (
     ),
     CharacteristicEntry("camera", "f", "pixels", "image", "camera", "a focal length", "camera"),
     CharacteristicEntry("visibility", "V", "", "image", "visibility", "H, W, RGB", "visibility"),
+    CharacteristicEntry("indirect", "I", "shading", "image", "indirect", "H, W, RGB", "indirect"),
     CharacteristicEntry(
         "environment", "E", "radiance", "camera", "environment", "rows, columns, RGB", "environment"
     ),
