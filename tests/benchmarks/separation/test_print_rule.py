@@ -1,6 +1,9 @@
 """The fit of the rule of print, on regions of known weights, and the sets of bodies."""
 
 import numpy as np
+import pytest
+
+pytest.importorskip("torch")
 
 from benchmarks.separation.print_rule import Regions, cross_validated_losses, fitted, loss_line
 from benchmarks.separation.print_set import Part, part_of

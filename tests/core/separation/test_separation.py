@@ -261,6 +261,7 @@ def test_the_command_finds_the_toolbox_figures(shared: Path, tmp_path: Path, met
         method,
         "--variant",
         "sihr",
+        "--whole",
         "--quiet",
     ]
     assert main([*command, "-o", str(tmp_path / "out")]) == 0
