@@ -22,8 +22,10 @@ def test_the_stretch_of_a_sphere() -> None:
         for back in (Back.ROUNDED, Back.MIRRORED)
     }
     for body in found.values():
-        median, most, share = body["front"]
-        assert median == pytest.approx(2, rel=0.05) and share == pytest.approx(0.25, abs=0.04)
-        assert most > 7
+        assert body["front"][0] == pytest.approx(2, rel=0.05)
+    mirrored, rounded = (found[back]["front"] for back in (Back.MIRRORED, Back.ROUNDED))
+    assert mirrored[2] == pytest.approx(0.25, abs=0.04) and mirrored[1] > 7
+    # On the last strip the texture runs back to where the sides begin: less of it is stretched.
+    assert rounded[1:] < mirrored[1:] and rounded[2] < 0.22
     assert found[Back.MIRRORED]["back"][2] > 0.2
     assert found[Back.ROUNDED]["back"][2] < 0.1
