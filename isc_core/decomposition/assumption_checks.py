@@ -5,14 +5,15 @@ Problem: for a mirror, for glass, or under several lamps a model also finds albe
 that reproduce the photo, but wrong ones.
 
 Equation: `networks.scene_network` gives the probabilities of a mirror, of glass and of several
-lamps. Above a threshold the confidence is multiplied by the remaining probability of an opaque
-object under one lamp, and the diagnostics get a warning. Warnings also cover clipping of much of
-the object, and a mask too ragged for a mesh.
+lamps. Above a threshold the diagnostics get a warning. With that about several lamps, the
+confidence is multiplied by the remaining probability of one lamp. Warnings also cover clipping of
+much of the object, and a mask too ragged for a mesh.
 
 Citation: see `networks.scene_network`.
 
-Limits: measured in docs/methods/assumption_checks.md. Strongly coloured light is covered by
-`illuminant.gamut`.
+Limits: measured in docs/methods/assumption_checks.md. On photos by people, the warning about
+mirrors and glass is wrong more often than right, so it does not change the confidence. Strongly
+coloured light is covered by `illuminant.gamut`.
 """
 
 from dataclasses import replace
@@ -29,7 +30,7 @@ from .task import SceneEstimate
 _MUCH_CLIPPED = 0.1  # of the object; single highlights are smaller
 _MUCH_DOUBTFUL = 0.005  # of the light: a highlight of a hundredth of the object
 _RAGGED = 0.5  # of the mask outside blocks of 2 x 2 pixels, which no mesh covers
-MIRROR_OR_GLASS_THRESHOLD = 0.3  # probability of a mirror or glass
+MIRROR_OR_GLASS_THRESHOLD = 0.5  # probability of a mirror or glass
 SEVERAL_LAMPS_THRESHOLD = 0.6  # probability of several lamps
 _LEAST = 0.1  # of the confidence remains
 _COLOURED = 0.5  # of it remains in light of too strong a colour
@@ -122,12 +123,13 @@ def confidence_factor(diagnostics: Diagnostics) -> float:
     Returns
     -------
     float
-        The probability of an opaque object under one lamp, at least .1; half of that where light or
-        object have too strong a colour. 1 where the assumptions hold.
+        The probability of one lamp, at least .1, where there is a warning about several; half of
+        that where light or object have too strong a colour. 1 where these assumptions hold.
     """
-    checked = (WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS)
-    probable = [one.value or 0.0 for one in diagnostics.warnings if one.kind in checked]
-    share = max(float(np.prod([1 - value for value in probable])), _LEAST)
+    several = [
+        one.value or 0.0 for one in diagnostics.warnings if one.kind is WarningKind.SEVERAL_LIGHTS
+    ]
+    share = max(1 - max(several, default=0.0), _LEAST)
     strong = diagnostics.light_colour is not None and diagnostics.light_colour.outcome.too_strong
     return share * (_COLOURED if strong else 1.0)
 

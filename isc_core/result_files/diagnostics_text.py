@@ -67,7 +67,7 @@ _LOBE_STATUS = {
 }
 _WARNINGS = {
     WarningKind.MIRROR_OR_GLASS: (
-        "it looks transparent or like a mirror: dull it with matting spray, or use an opaque object"
+        "it may be a mirror or transparent (often wrong): if so, dull it with matting spray"
     ),
     WarningKind.SEVERAL_LIGHTS: (
         "several lights, or a shadow of another object: use one light with nothing in front of it"

@@ -154,7 +154,7 @@ class WarningKind(StrEnum):
     Attributes
     ----------
     MIRROR_OR_GLASS
-        The object looks like a mirror or transparent; the value is the probability.
+        The object may be a mirror or transparent; the value is the probability.
     SEVERAL_LIGHTS
         There seem to be several lights; the value is the probability.
     CLIPPED

@@ -193,6 +193,29 @@ def _draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
     return Cameras.of(arrays)
 
 
+@dataclass(frozen=True)
+class PastedScenes:
+    """Objects on backgrounds, before the camera.
+
+    Attributes
+    ----------
+    light : (B, 3, SIDE, SIDE) tensor
+    frame : (B, 1, SIDE, SIDE) tensor
+        1 inside the photo.
+    covers : (B, T, SIDE, SIDE) tensor
+        Visible parts of the layers.
+    foreground : (N, 3, SIDE, SIDE) tensor
+        Light of each object, multiplied by its coverage.
+    cover : (N, 1, SIDE, SIDE) tensor
+    """
+
+    light: torch.Tensor
+    frame: torch.Tensor
+    covers: torch.Tensor
+    foreground: torch.Tensor
+    cover: torch.Tensor
+
+
 class Composites:
     """Draws photos, and composes them on one device.
 
@@ -245,20 +268,39 @@ class Composites:
         Composite
             On the device.
         """
+        scene, drawn = self.pasted(drawn), drawn.to(self._device)
+        light, frame = scene.light, scene.frame
+        mask, hints, count = _ground_truth(scene.covers * frame, frame, drawn)
+        photo = as_photographed(light, frame, drawn.cameras, light)
+        return Composite(photo, frame, hints, mask, count)
+
+    def pasted(self, drawn: CompositeDraw) -> PastedScenes:
+        """Paste the objects of a draw on its backgrounds.
+
+        Parameters
+        ----------
+        drawn : CompositeDraw
+            On the CPU.
+
+        Returns
+        -------
+        PastedScenes
+            On the device.
+        """
         levels = self._rows_of(self._cutouts.levels(drawn.objects.length * self._factor))
         layers = self._rows_of(drawn.objects.layer)
         focus = {} if drawn.defocus is None else self._rows_of(_first_in_focus(drawn, len(layers)))
         drawn = drawn.to(self._device)
         frame, light = frames(drawn.scenes.shape, self._side), self._background(drawn)
         covers = light.new_zeros(len(light), max(len(layers), 1), *light.shape[2:])
+        foreground, cover = light.new_zeros(0, *light.shape[1:]), light[:0, :1]
         if layers:
             foreground, cover = self._cutouts.placed(drawn.objects, levels, self._side)
             if drawn.bands is not None:
                 foreground = painted(foreground, drawn.objects, drawn.bands)
             _paste(light, covers, foreground, cover, drawn, layers, focus)
         _defocus(light, drawn, focus.get(len(layers)))
-        mask, hints, count = _ground_truth(covers * frame, frame, drawn)
-        return Composite(_photographed(light, frame, drawn.cameras), frame, hints, mask, count)
+        return PastedScenes(light, frame, covers, foreground, cover)
 
     def _rows_of(self, numbers: torch.Tensor) -> dict[int, torch.Tensor]:
         """The rows in which each number occurs, found on the CPU, moved to the device."""
@@ -344,11 +386,30 @@ def _ground_truth(
     return mask, hints, count
 
 
-def _photographed(light: torch.Tensor, frame: torch.Tensor, cameras: Cameras) -> torch.Tensor:
-    """Apply white balance, exposure and the camera; 0 outside the frame."""
-    light = light * cameras.balance[..., None, None]
-    grey = cameras.grey[:, None, None, None]
-    light = torch.where(grey, light.mean(1, keepdim=True), light)
-    light = light * exposed(light, frame, cameras.exposure)
+def as_photographed(
+    light: torch.Tensor, frame: torch.Tensor, cameras: Cameras, metered: torch.Tensor
+) -> torch.Tensor:
+    """Apply white balance, exposure and the camera.
+
+    Parameters
+    ----------
+    light : (B, 3, H, W) tensor
+    frame : (B, 1, H, W) tensor
+    cameras : Cameras
+    metered : (B, 3, H, W) tensor
+        Light that determines the exposure.
+
+    Returns
+    -------
+    (B, 3, H, W) tensor
+        0 outside the frame.
+    """
+
+    def balanced(light: torch.Tensor) -> torch.Tensor:
+        light = light * cameras.balance[..., None, None]
+        grey = cameras.grey[:, None, None, None]
+        return torch.where(grey, light.mean(1, keepdim=True), light)
+
+    light = balanced(light) * exposed(balanced(metered), frame, cameras.exposure)
     values = {name: part for name, part in vars(cameras).items() if part.ndim == 1}
     return photographed(light, torch.ones_like(frame), values) * frame

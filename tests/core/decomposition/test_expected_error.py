@@ -103,7 +103,7 @@ def test_the_confidence_sorts_as_the_error_does(
 def test_violated_assumptions_lower_the_confidence_and_not_its_order(
     scene: Decomposition, seen: ScenePrediction
 ) -> None:
-    warned = Diagnostics(warnings=(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.7),))
+    warned = Diagnostics(warnings=(AssumptionWarning(WarningKind.SEVERAL_LIGHTS, 0.7),))
     assert confidence_factor(warned) == pytest.approx(0.3)
     assert confidence_factor(Diagnostics()) == 1
     doubtful = replace(scene, provenance=replace(scene.provenance, diagnostics=warned))
