@@ -102,13 +102,13 @@ def _limit_outermost(image: np.ndarray, mask: np.ndarray) -> None:
     size = _downscaled(inside.shape, _LIMITED)
     small, share = resampled(part, size), resampled(inside.astype(np.float32), size)
     inner = ndimage.binary_erosion(share >= 0.5, border_value=1)
-    at = np.ix_((np.arange(height) * size[0]) // height, (np.arange(width) * size[1]) // width)
-    outermost = inside & ~inner[at]
-    shown, window = inner[..., None], (3, 3, 1)
-    least = ndimage.minimum_filter(np.where(shown, small, np.inf), window)[at][outermost]
-    most = ndimage.maximum_filter(np.where(shown, small, -np.inf), window)[at][outermost]
-    seen, none = part[outermost], np.isinf(least)
-    part[outermost] = np.where(none, seen, np.clip(seen, least, most))
+    at = (np.arange(height) * size[0]) // height, (np.arange(width) * size[1]) // width
+    rows, columns = np.nonzero(inside & ~inner[np.ix_(*at)])
+    shown, window, near = inner[..., None], (3, 3, 1), (at[0][rows], at[1][columns])
+    least = ndimage.minimum_filter(np.where(shown, small, np.inf), window)[near]
+    most = ndimage.maximum_filter(np.where(shown, small, -np.inf), window)[near]
+    seen = part[rows, columns]
+    part[rows, columns] = np.where(np.isinf(least), seen, np.clip(seen, least, most))
 
 
 def _means(image: np.ndarray, weight: np.ndarray) -> np.ndarray:
