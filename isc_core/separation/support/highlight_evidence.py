@@ -13,7 +13,9 @@ C = max I - min I, the log odds that removing s lowers the squared error are
 where means are weighted by s^2 and q, at most 1/2, is the slope of C against m over the region's
 flanks and a ring around it. White light raises all channels alike: where m rises, C stays. White
 paint replaces the paint around it: where m rises, C falls. Clipped pixels would show a falling C in
-either case; they and their neighbours are left out. Grey paint has no chroma to decide by. The s of
+either case; they and their neighbours are left out. Where they are more than three quarters of the
+flanks, the slope is that of the ring alone: on matt paint, shading raises C and m there, so a
+positive q then counts as 0. Grey paint has no chroma to decide by. The s of
 a region is kept where the odds exceed `odds`; otherwise the image is restored, bit for bit. Marks
 of a user decide about the nearest region.
 
@@ -47,6 +49,7 @@ _RING = 0.02  # distance of the ring, of the object's diagonal
 _LEAST, _FEWEST = 6, 3  # pixels: of a region that can be classified, of its flanks
 _MOST_RATIO = 6.0  # of mean y over mean b
 _SLOPES = (-1.0, 0.5)  # of C against m: above, shading does more than light
+_CLEAR = 0.25  # of a region's flanks: with fewer unclipped pixels the slope is the ring's
 WEIGHTS = (-2.14, 0.706, 2.099, 4.585)
 
 
@@ -110,13 +113,13 @@ def highlight_evidence(
         if inside.sum() < _LEAST:
             continue
         numbers.append(k)
-        compared, ring = _surroundings(inside, removed[wide], mask[wide], clear[wide], reach)
+        compared, ring, shown = _surroundings(inside, removed[wide], mask[wide], clear[wide], reach)
         weight = np.square(removed[wide]) * inside
         form = log_ratio[wide], ratio_scale[wide]
         found.append(
             [
                 *_form_and_saturation(weight, diffuse[wide], *form, dark),
-                _chroma_rise(image[wide], compared, ring, dark),
+                _chroma_rise(image[wide], compared, ring, dark, rises=shown),
             ]
         )
     return Evidence(labels, np.array(numbers, int), np.array(found).reshape(-1, len(WEIGHTS) - 1))
@@ -124,8 +127,10 @@ def highlight_evidence(
 
 def _surroundings(
     inside: np.ndarray, removed: np.ndarray, mask: np.ndarray, clear: np.ndarray, reach: int
-) -> tuple[np.ndarray, np.ndarray]:
-    """Flanks and ring of a region together, without clipped pixels, and the ring; (h, w) bool."""
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Flanks and ring of a region together, without clipped pixels, and the ring, (h, w) bool; and
+    whether enough of the flanks is not clipped.
+    """
     peak = float(np.quantile(removed[inside], 0.95))
     core = inside & (removed > _CORE * peak)
     near = ndimage.binary_dilation(core, iterations=reach)
@@ -133,9 +138,11 @@ def _surroundings(
     if ring.sum() < _LEAST - 1:
         ring = mask & ~core
     ring = ring if ring.any() else mask
-    flanks = inside & (removed > _FLANK * peak) & clear
+    sides = inside & (removed > _FLANK * peak)
+    flanks = sides & clear
+    shown = bool(flanks.sum() >= _CLEAR * sides.sum())
     both = (flanks if flanks.sum() >= _FEWEST else core) | ring
-    return both & clear if (both & clear).sum() >= _LEAST else both, ring
+    return both & clear if (both & clear).sum() >= _LEAST else both, ring, shown
 
 
 def _form_and_saturation(
@@ -152,14 +159,19 @@ def _form_and_saturation(
     return ratio, paint / max(float(weight.sum()), 1e-12)
 
 
-def _chroma_rise(image: np.ndarray, compared: np.ndarray, ring: np.ndarray, dark: float) -> float:
-    """The last number of a region: q, limited, times the saturation of the ring."""
+def _chroma_rise(
+    image: np.ndarray, compared: np.ndarray, ring: np.ndarray, dark: float, *, rises: bool
+) -> float:
+    """The last number of a region: q, limited, times the saturation of the ring; q above 0 counts
+    only if `rises`.
+    """
     image = image.astype(float)
     low = smallest(image)
     light, chroma = low[compared], (largest(image) - low)[compared]
     light = light - light.mean()
     slope = float((light * chroma).sum()) / max(float(np.square(light).sum()), (1e-3 * dark) ** 2)
-    return float(np.clip(slope, *_SLOPES)) * float(np.median(_saturation(image, dark)[ring]))
+    limited = float(np.clip(slope, _SLOPES[0], _SLOPES[1] if rises else 0.0))
+    return limited * float(np.median(_saturation(image, dark)[ring]))
 
 
 def _saturation(image: np.ndarray, dark: float) -> np.ndarray:

@@ -199,6 +199,20 @@ def test_a_clipped_core_does_not_make_a_highlight_look_like_paint() -> None:
     assert slope(photo, diffuse, mask, clipped) > 0
 
 
+@pytest.mark.parametrize(("exposure", "hidden"), [(1.0, False), (2.1, True)])
+def test_shading_beside_a_clipped_region_does_not_speak_for_a_highlight(
+    exposure: float, hidden: bool
+) -> None:
+    matt, _, mask = ball()
+    level = np.where(mask, matt.max(axis=2) / matt.max(), 0)
+    photo = np.minimum(exposure * matt, 1)
+    clipped = (photo >= 1).any(axis=2) & mask
+    bright = np.clip((level - 0.95) / 0.05, 0, 1)[..., None]
+    assert clipped.any() == hidden
+    rise = slope(photo, (1 - 0.5 * bright) * photo, mask, clipped)
+    assert rise == 0 if hidden else rise > 0.4
+
+
 def test_the_exposure_does_not_matter() -> None:
     photo, diffuse, mask = ball(stripe=0.2, gloss=0.4)
     seen = form(photo, diffuse)
