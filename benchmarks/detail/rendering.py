@@ -1,4 +1,7 @@
-"""Photos of bodies with relief of one paint, and of smooth bodies with print; exact normals.
+"""Photos of bodies with relief of one paint, of smooth bodies with print, and of bodies with both.
+
+Normals are exact. A body with both has patches, about a fifth of its length wide: some of one paint
+with relief, the others flat with print.
 
 Every pixel is the mean of four points; its true normals are the normalised means of theirs. The
 light is that of `lighting`, the camera one of `cameras`.
@@ -17,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from synth.scene.meshes import Mesh
 from synth.scene.tracing import Hits, Tracer
+from training.world.patterns.canvas import filtered_noise
 from training.world.random_draws import log_uniform
 from training.world.views import camera_rays
 
@@ -24,12 +28,14 @@ from .bodies import SHAPES, Wrap, displaced_normals, draw_wrap, facing, smooth_b
 from .cameras import Camera, photo_of
 from .lighting import Gloss, Lamp, ReachingLight, Room, outgoing_light, reaching_light
 from .print_maps import PrintKind, draw_colour, draw_print
-from .relief_maps import ReliefKind, draw_relief
+from .relief_maps import ReliefKind, ReliefMap, draw_relief
 
 SIDE, LENGTH = 1024, 860  # pixels: of a photo, and of the object in it
 _COARSE = 8  # photo pixels a pixel of the grid on which light is traced
 _OFFSETS = (-0.25, 0.25)  # of the points of a pixel
 _PRINT_SIDE = 0.75  # of a print map, relative to the photo
+_PATCHES = 2.5  # fewest waves a side of the noise that divides a body into patches
+_RAMP = 16  # pixels in which relief begins within a patch
 
 
 class SetKind(StrEnum):
@@ -37,6 +43,7 @@ class SetKind(StrEnum):
 
     RELIEF = "relief"
     PRINT = "print"
+    MIXED = "mixed"
 
 
 @dataclass(frozen=True)
@@ -144,17 +151,39 @@ def _planned(
         "lamps": len(room.lamps),
         "gloss": [gloss.front, gloss.alpha],
     }
-    if kind == SetKind.RELIEF:
+    if kind != SetKind.PRINT:
         pattern = list(ReliefKind)[number % len(ReliefKind)]
         degrees, shares = rng.uniform(5, 16), rng.uniform(0.4, 1, 3)
         slopes = np.tan(np.radians(degrees)) * shares / np.linalg.norm(shares)
         relief = draw_relief(pattern, tuple(slopes.tolist()), rng, side)
         facts |= {"pattern": pattern, "slopes": slopes.tolist()}
-        slope = np.stack([ndimage.spline_filter(one, mode="grid-wrap") for one in relief.slope])
-        return _Plan(mesh, family, room, gloss, slope, draw_colour(rng), facts)
-    paint = list(PrintKind)[number % len(PrintKind)]
-    colours = draw_print(paint, rng, round(_PRINT_SIDE * side))
-    return _Plan(mesh, family, room, gloss, None, colours, facts | {"pattern": paint})
+        steep, paint = relief.slope, draw_colour(rng)
+        if kind == SetKind.MIXED:
+            steep, paint = _with_print(relief, paint, number, rng)
+        slope = np.stack([ndimage.spline_filter(one, mode="grid-wrap") for one in steep])
+        return _Plan(mesh, family, room, gloss, slope, paint, facts)
+    pattern_of_paint = list(PrintKind)[number % len(PrintKind)]
+    colours = draw_print(pattern_of_paint, rng, round(_PRINT_SIDE * side))
+    return _Plan(mesh, family, room, gloss, None, colours, facts | {"pattern": pattern_of_paint})
+
+
+def _with_print(
+    relief: ReliefMap, colour: np.ndarray, number: int, rng: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slopes (2, side, side) of relief in patches, and paint (side, side, 3) with print elsewhere.
+
+    The height is multiplied by a window that falls to 0 within the patch, so that slopes are exact.
+    """
+    side = len(relief.height)
+    noise = filtered_noise(rng, side, 8.0, least=_PATCHES)
+    patch = noise > np.quantile(noise, rng.uniform(0.4, 0.6))
+    inside = ndimage.distance_transform_edt(np.pad(patch, _RAMP, mode="wrap"))
+    inside = inside[_RAMP:-_RAMP, _RAMP:-_RAMP]
+    window = 0.5 - 0.5 * np.cos(np.pi * np.minimum(inside / _RAMP, 1))
+    rise = [np.roll(window, -1, axis) - np.roll(window, 1, axis) for axis in (1, 0)]
+    slope = window * relief.slope + 0.5 * relief.height * np.stack(rise)
+    printed = draw_print(list(PrintKind)[number % len(PrintKind)], rng, side)
+    return slope, np.where(patch[..., None], colour, printed)
 
 
 def _room(radiance: np.ndarray, lamps: bool, rng: np.random.Generator) -> Room:
