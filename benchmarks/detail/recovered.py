@@ -1,7 +1,7 @@
 """How much relief `isc decompose` recovers, and how much it invents on print.
 
   python -m benchmarks.detail.recovered SET --rows FILE [--set NAME=VALUE]... [--solve-size N]
-  [--count N] [--kind relief|print]
+  [--count N] [--kind relief|print|mixed]
   python -m benchmarks.detail.recovered SET --rows FILE --normals DIR
 
 SET is a folder of `benchmarks.detail.sets`, the measure that of `benchmarks.detail.measure`. By
@@ -11,7 +11,8 @@ default the pipeline that users run is measured, with its settings (`--set detai
 continues.
 
 Table: relief, the share of the true energy explained, mean over bodies; print, the mean energy that
-is invented over the mean true energy of the relief bodies; base, the median over bodies of the
+is invented over the mean true energy of the relief bodies; mixed, the share explained on bodies that
+have both; base, the median over bodies of the
 median angle of the overall shape. Intervals are of 2,000 sets of resampled bodies.
 """
 
@@ -152,19 +153,20 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     str
         A Markdown table.
     """
-    relief, printed = (
+    relief, printed, mixed = (
         [row for row in rows if row["body"].startswith(kind)]
-        for kind in (SetKind.RELIEF, SetKind.PRINT)
+        for kind in (SetKind.RELIEF, SetKind.PRINT, SetKind.MIXED)
     )
     lines = [
         "| figure | bodies | " + " | ".join(f"{one} px" for one in OCTAVES) + " | base | seconds |",
         "|---" * (len(OCTAVES) + 4) + "|",
     ]
     rng = np.random.default_rng(0)
-    if relief:
-        explained = np.array([row["explained"] for row in relief])
-        again = explained[rng.integers(len(relief), size=(_RESAMPLED, len(relief)))].mean(1)
-        lines.append(_line("relief: explained", relief, explained.mean(0), again))
+    for title, bodies in (("relief: explained", relief), ("mixed: explained", mixed)):
+        if bodies:
+            explained = np.array([row["explained"] for row in bodies])
+            again = explained[rng.integers(len(bodies), size=(_RESAMPLED, len(bodies)))].mean(1)
+            lines.append(_line(title, bodies, explained.mean(0), again))
     if relief and printed:
         energy = np.array([row["energy"] for row in relief])
         error = np.array([row["error"] for row in printed])
@@ -211,7 +213,7 @@ def main() -> None:
         rows = []
         measure = partial(score_body, estimator=estimator)
         for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
-            shown = "explained" if row["body"].startswith(SetKind.RELIEF) else "error"
+            shown = "error" if row["body"].startswith(SetKind.PRINT) else "explained"
             print(row["body"], shown, *(f"{value:.3g}" for value in row[shown]), flush=True)
             rows.append(row)
     except InputError as error:

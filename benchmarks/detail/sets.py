@@ -1,9 +1,9 @@
-"""Write the measured sets: photos of bodies with relief, and of smooth bodies with print.
+"""Write the measured sets: photos of bodies with relief, of smooth ones with print, and with both.
 
   python -m benchmarks.detail.sets FOLDER --panoramas DIR --part validation|lights|test
   [--camera good|phone] [--count N]
 
-FOLDER gets `relief_NN` and `print_NN`, each with `photo.png` (the mask in alpha) and `truth.npz`.
+FOLDER gets `relief_NN`, `print_NN` and `mixed_NN`, each with `photo.png` (the mask in alpha) and `truth.npz`.
 What is there already is kept. Methods are chosen on `validation` and `lights`, figures reported on
 `test`. Half of the panoramas kept from learning light the bodies of `validation`, half those of
 `test`; all others light the bodies of `validation` once more in `lights`.
@@ -146,7 +146,7 @@ def write_set(
     panoramas : Path
     part : Part
     count : int, optional
-        Bodies with relief, and as many with print.
+        Bodies of each kind.
     camera : Camera, optional
 
     Yields

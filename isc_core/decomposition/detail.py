@@ -15,9 +15,9 @@ average would leave lines along each edge in d, and these are no relief.
 
 From the coarsest level on, the relief R of a level is that which explains d
 (`shading.relief_from_shading`), found from 2 U R of the level before. The height is that of the
-solve plus b R of the finest level; b, which is 0 for paint, is estimated from the whole object
-(`shading.relief_evidence`). On the coarsest level R loses its low frequencies too, so that no level
-moves the overall shape; the light is not changed.
+solve plus b R of the finest level; b, which is 0 for paint, is estimated for each paint of the
+object (`shading.relief_evidence`), block by block, and interpolated linearly. On the coarsest level
+R loses its low frequencies too, so that no level moves the overall shape; the light is not changed.
 
 Citation: see `shading.relief_from_shading`; pyramid: P. J. Burt, E. H. Adelson, IEEE Trans. Comm.
 31, 1983, doi:10.1109/TCOM.1983.1095851; smooth light apart from edges: F. Durand, J. Dorsey, "Fast
@@ -37,6 +37,7 @@ from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
+from scipy import ndimage
 
 from ..imaging.blocks import block_means, means_inside
 from ..imaging.bounding_box import mask_slices
@@ -45,10 +46,19 @@ from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import low_pass, masked_gaussian, masked_low_pass
 from ..imaging.tiles import Place, tiles_of
+from ..imaging.upsampling import enlarged
 from ..imaging.window import Window
 from ..progress import Monitor
 from ..shading.paint_edges import ONE_PAINT, paint_guide, uniformity
-from ..shading.relief_evidence import RULE, Evidence, ReliefRule, evidence_of, mean_evidence
+from ..shading.relief_evidence import (
+    BLOCK,
+    RULE,
+    Evidence,
+    ReliefRule,
+    added_share,
+    block_moments,
+    paint_evidence,
+)
 from ..shading.relief_from_shading import (
     REACH,
     log_shading,
@@ -205,12 +215,10 @@ def fine_relief(
     """
     rule = rule or RULE
     pyramid = Pyramid.of(diffuse, mask, height, light)
-    share = rule.share(pyramid.evidence())
-    if share == 0:
+    added = pyramid.share(rule)
+    if not added.any():
         return np.zeros(mask.shape, np.float32)
-    relief = pyramid.relief(finest, monitor, tile)
-    relief *= np.float32(share)
-    return relief
+    return pyramid.relief(finest, monitor, tile, added)
 
 
 @dataclass(frozen=True)
@@ -265,22 +273,57 @@ class Pyramid:
         return cls(mask, frame, levels, slope, features)
 
     def evidence(self) -> Evidence | None:
-        """Return the evidence for relief of the whole object; None where it is too small."""
-        levels, found = self._from_coarsest(np.stack(self.slope, axis=2)), []
+        """Return the evidence for relief, by blocks of the coarsest level; None where too small."""
+        coarsest, blocks, moments = self.levels[-1], 1, []
+        _, guide = self._without_shading
+        uniform = uniformity(guide, coarsest.mask)
+        levels = self._from_coarsest(np.stack([*self.slope, uniform], axis=2))
         for level, _, smooth in takewhile(lambda one: one[1] <= _MOST_EVIDENCE, levels):
             rows, columns = (slice(0, n) for n in level.mask.shape)
-            right, down = smooth.at((rows, columns))
+            right, down, alike = smooth.at((rows, columns))
             gain = shading_gain((right, down), self.light[:, 0])
-            found.append(evidence_of(level.image / level.mean, level.mask, gain))
-        return mean_evidence(found)
+            image = level.image / level.mean
+            moments.append(block_moments(image, level.mask, gain, alike, blocks))
+            blocks *= 2
+        return paint_evidence(moments, guide, coarsest.mask)
 
-    def relief(self, finest: int, monitor: Monitor | None = None, tile: int = TILE) -> np.ndarray:
+    def share(self, rule: ReliefRule) -> np.ndarray:
+        """Find which share of the relief is added.
+
+        Parameters
+        ----------
+        rule : ReliefRule
+
+        Returns
+        -------
+        (rows, columns) float32 ndarray
+            For blocks of the coarsest level; 0 where the object is too small for evidence.
+        """
+        mask, evidence = self.levels[-1].mask, self.evidence()
+        if evidence is None:
+            return np.zeros(tuple(n // BLOCK for n in mask.shape), np.float32)
+        outside = block_means(mask.astype(np.float32), BLOCK) == 0
+        nearest = ndimage.distance_transform_edt(
+            outside, return_distances=False, return_indices=True
+        )
+        found = added_share(rule.probability(evidence)).astype(np.float32)
+        return np.asarray(found[tuple(nearest)])
+
+    def relief(
+        self,
+        finest: int,
+        monitor: Monitor | None = None,
+        tile: int = TILE,
+        added: np.ndarray | None = None,
+    ) -> np.ndarray:
         """Find the relief, R of the module.
 
         Parameters
         ----------
         finest, monitor, tile
             As for `fine_relief`.
+        added : (rows, columns) ndarray, optional
+            Of `share`, b of the module: the relief is multiplied by it.
 
         Returns
         -------
@@ -306,9 +349,18 @@ class Pyramid:
             if level is coarsest:
                 relief -= _low_frequencies(relief, level.mask, length) * level.mask
             done += share
+        if added is not None:
+            self._multiply(relief, added)
         whole = self.frame.window.put(relief, self.mask.shape)
         whole[~self.mask] = 0
         return whole
+
+    def _multiply(self, relief: np.ndarray, added: np.ndarray) -> None:
+        """Multiply the finest relief by the shares of blocks, interpolated linearly."""
+        side = BLOCK << self.frame.halvings
+        for block in row_blocks(relief.shape):
+            part = relief[block.rows]
+            part *= enlarged(added, part.shape, side, (block.rows.start, 0))
 
     def _from_coarsest(self, maps: np.ndarray) -> Iterator[tuple[Level, float, _Smooth]]:
         """Each level with the object's length and maps of the coarsest, which comes first."""
@@ -319,6 +371,14 @@ class Pyramid:
             if k:
                 smooth = smooth.finer(level.mask.shape)
 
+    @cached_property
+    def _without_shading(self) -> tuple[np.ndarray, np.ndarray]:
+        """Features of log light less log shading (3, h, w) on the coarsest level, and the guide."""
+        level = self.levels[-1]
+        shading = np.stack([log_shading(self.slope, one) for one in self.light.T])
+        left = (_features(level.image, level.mean) - shading) * level.mask
+        return left, paint_guide(level.image / level.mean, level.mask, left[0])
+
     def _smooth_maps(self) -> np.ndarray:
         """What relief needs (h, w, 6) of the coarsest level.
 
@@ -326,9 +386,7 @@ class Pyramid:
         how far there is one paint.
         """
         level = self.levels[-1]
-        shading = np.stack([log_shading(self.slope, one) for one in self.light.T])
-        left = (_features(level.image, level.mean) - shading) * level.mask
-        guide = paint_guide(level.image / level.mean, level.mask, left[0])
+        left, guide = self._without_shading
         sigma = _SIGMA * _PERIOD * self.frame.length / 2**self.frame.halvings
         smoother = CrossBilateral.of(guide, level.mask, sigma, ONE_PAINT)
         low = [_continued(low_pass(one, smoother), level.mask) for one in left]

@@ -20,14 +20,15 @@ SIDE = 215
 
 @pytest.fixture
 def bodies(tmp_path: Path) -> Path:
-    """A set of two plates: one with waves, one without."""
+    """A set of three plates: with waves, without, and with waves on its left half."""
     mask = np.zeros((SIDE, SIDE), bool)
     mask[10:-10, 10:-10] = True
     tilt = 0.2 * np.sin(2 * np.pi / 4 * np.arange(SIDE)) * np.ones((SIDE, 1)) * mask
     flat = np.dstack([0 * tilt, 0 * tilt, mask]).astype(np.float32)
     waves = np.dstack([np.sin(tilt), 0 * tilt, np.cos(tilt)]).astype(np.float32) * mask[..., None]
     codes = np.full((SIDE, SIDE, 3), 128, np.uint8)
-    for kind, normal in ((SetKind.RELIEF, waves), (SetKind.PRINT, flat)):
+    half = np.where(np.arange(SIDE)[:, None] < SIDE // 2, waves, flat)
+    for kind, normal in zip(SetKind, (waves, flat, half), strict=True):
         write_scene(tmp_path, DetailScene(f"{kind}_00", codes, mask, normal, flat, {}))
     return tmp_path
 
@@ -65,7 +66,7 @@ def test_stored_normals_are_scored_and_missing_ones_named(bodies: Path, tmp_path
     folder.mkdir()
     np.save(folder / "relief_00.npy", read_truth(bodies / "relief_00").normal)
     estimate = recovered.stored_normals(folder)
-    relief, printed = (bodies_in(bodies, kind)[0] for kind in SetKind)
+    relief, printed = (bodies_in(bodies, kind)[0] for kind in (SetKind.RELIEF, SetKind.PRINT))
     truth = read_truth(relief)
     assert np.array_equal(estimate(relief, truth), truth.normal)
     with pytest.raises(InputError, match=r"print_00\.npy is missing"):

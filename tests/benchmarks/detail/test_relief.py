@@ -86,8 +86,8 @@ def test_paint_is_a_reflectance(kind: PrintKind) -> None:
 
 @pytest.mark.slow
 def test_relief_bends_normals_and_print_does_not(tmp_path: Path) -> None:
-    relief, printed = (render(kind, 0, 1, [ROOM], SIDE) for kind in SetKind)
-    for scene in (relief, printed):
+    relief, printed, mixed = (render(kind, 0, 1, [ROOM], SIDE) for kind in SetKind)
+    for scene in (relief, printed, mixed):
         assert_allclose(np.linalg.norm(scene.normal[scene.mask], axis=1), 1, atol=1e-5)
         assert not scene.normal[~scene.mask].any()
         assert max(np.ptp(np.nonzero(scene.mask), axis=1)) + 1 == pytest.approx(
@@ -97,6 +97,8 @@ def test_relief_bends_normals_and_print_does_not(tmp_path: Path) -> None:
     assert np.array_equal(printed.normal, printed.smooth)
     cosine = (relief.normal * relief.smooth).sum(2)[relief.mask]
     assert 3 < np.degrees(np.sqrt(np.mean(2 - 2 * np.minimum(cosine, 1)))) < 25
+    bent = np.abs(mixed.normal - mixed.smooth).max(2)[mixed.mask] > 1e-3
+    assert 0.2 < bent.mean() < 0.7
     again = render(SetKind.RELIEF, 0, 1, [ROOM], SIDE)
     assert np.array_equal(again.codes, relief.codes)
     (body,) = bodies_in(tmp_path, SetKind.RELIEF)

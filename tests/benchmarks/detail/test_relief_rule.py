@@ -6,30 +6,47 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
-from benchmarks.detail.relief_rule import SHARES, figures, left_out, logistic_weights
+from benchmarks.detail.relief_rule import left_out, logistic_weights, relief_blocks
+from benchmarks.detail.sets import Truth
+from isc_core.decomposition.detail import Pyramid
 
 
 def test_weights_of_a_known_boundary() -> None:
     rng = np.random.default_rng(0)
     features = rng.normal(size=(400, 2))
     is_relief = rng.random(400) < 1 / (1 + np.exp(-(0.5 + 2 * features[:, 0])))
-    offset, first, second = logistic_weights(features, is_relief)
+    offset, first, second = logistic_weights(features, is_relief, np.ones(400))
     assert abs(offset - 0.5) < 0.4 and abs(first - 2) < 0.5 and abs(second) < 0.4
 
 
+def test_a_weight_of_two_is_the_same_block_twice() -> None:
+    rng = np.random.default_rng(1)
+    features, is_relief = rng.normal(size=(60, 2)), rng.random(60) < 0.5
+    twice = np.arange(60) < 20
+    weighted = logistic_weights(features, is_relief, 1.0 + twice)
+    again = np.concatenate([np.arange(60), np.flatnonzero(twice)])
+    repeated = logistic_weights(features[again], is_relief[again], np.ones(80))
+    assert np.allclose(weighted, repeated)
+
+
 def test_a_body_left_out_does_not_decide_about_itself() -> None:
-    features = np.array([[0.0], [0.1], [1.0], [1.1], [0.05]])
-    is_relief = np.array([False, False, True, True, True])
-    assert left_out(features, is_relief)[4] < 0.5
+    features = np.array([[0.0], [0.1], [1.0], [1.1], [0.05], [0.06]])
+    is_relief = np.array([False, False, True, True, True, True])
+    found = left_out(features, is_relief, np.full(6, 10.0), np.array([0, 0, 1, 1, 2, 2]))
+    assert (found[4:] < 0.5).all()
 
 
-def test_what_is_explained_and_invented_follows_from_the_added_shares() -> None:
-    shares, probability = np.array(SHARES), np.array([0.45, 0.3, 0.6, 0.45])
-    gained = (1 - (1 - shares) ** 2)[:, None]
-    relief = {"explained": gained, "error": 0 * gained, "energy": 2 + 0 * gained}
-    paint = {"explained": 0 * gained, "error": 0.2 * shares[:, None] ** 2, "energy": 0 * gained}
-    rows = [relief, relief, paint, paint]
-    is_relief = np.array([True, True, False, False])
-    explained, invented = figures(rows, probability, is_relief)
-    assert np.allclose(explained, (0.75 + 0) / 2)
-    assert np.allclose(invented, (0.2 + 0.05) / 2 / 2)
+def test_blocks_with_relief_are_where_normals_differ() -> None:
+    mask = np.zeros((400, 400), bool)
+    mask[20:380, 20:380] = True
+    smooth = np.zeros((400, 400, 3), np.float32)
+    smooth[mask] = (0, 0, 1)
+    normal = smooth.copy()
+    normal[20:380, 20:200] = np.array([np.sin(0.1), 0, np.cos(0.1)]) * mask[20:380, 20:200, None]
+    pyramid = Pyramid.of(np.ones((400, 400, 3)), mask, np.zeros(mask.shape), np.zeros((9, 3)))
+    found = relief_blocks(pyramid, Truth(normal, smooth, mask))
+    side = 8 << pyramid.frame.halvings
+    assert found.shape == tuple(n // side for n in pyramid.levels[0].mask.shape)
+    middle = len(found) // 2
+    assert found[middle, 3 : 3 + 130 // side].all()
+    assert not found[middle, -3 - 130 // side :].any()
