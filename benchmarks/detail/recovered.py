@@ -11,9 +11,9 @@ default the pipeline that users run is measured, with its settings (`--set detai
 continues.
 
 Table: relief, the share of the true energy explained, mean over bodies; print, the mean energy that
-is invented over the mean true energy of the relief bodies; mixed, the share explained on bodies that
-have both; base, the median over bodies of the
-median angle of the overall shape. Intervals are of 2,000 sets of resampled bodies.
+is invented over the mean true energy of the relief bodies; mixed, the share explained on bodies
+that have both; base, the median over bodies of the median angle of the overall shape. Intervals are
+of 2,000 sets of resampled bodies.
 """
 
 import argparse
