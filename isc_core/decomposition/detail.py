@@ -49,7 +49,7 @@ from ..imaging.tiles import Place, tiles_of
 from ..imaging.upsampling import enlarged
 from ..imaging.window import Window
 from ..progress import Monitor
-from ..shading.paint_edges import ONE_PAINT, paint_guide, uniformity
+from ..shading.paint_edges import ONE_PAINT, paint_features, paint_guide, uniformity
 from ..shading.relief_evidence import (
     BLOCK,
     RULE,
@@ -275,7 +275,7 @@ class Pyramid:
     def evidence(self) -> Evidence | None:
         """Return the evidence for relief, by blocks of the coarsest level; None where too small."""
         coarsest, blocks, moments = self.levels[-1], 1, []
-        _, guide = self._without_shading
+        left, guide = self._without_shading
         uniform = uniformity(guide, coarsest.mask)
         levels = self._from_coarsest(np.stack([*self.slope, uniform], axis=2))
         for level, _, smooth in takewhile(lambda one: one[1] <= _MOST_EVIDENCE, levels):
@@ -285,7 +285,7 @@ class Pyramid:
             image = level.image / level.mean
             moments.append(block_moments(image, level.mask, gain, alike, blocks))
             blocks *= 2
-        return paint_evidence(moments, guide, coarsest.mask)
+        return paint_evidence(moments, paint_features(left, coarsest.mask), coarsest.mask)
 
     def share(self, rule: ReliefRule) -> np.ndarray:
         """Find which share of the relief is added.

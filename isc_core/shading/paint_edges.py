@@ -11,6 +11,9 @@ is noise), the log light I and the log shading S of the smooth surface. Relief h
 chroma, and changes brightness less than most print does: k is small. With the range e of g over the
 3 x 3 pixels around a pixel, the paint is uniform by exp(-e^2 / (2 w^2)).
 
+Pixels of one paint far from each other are alike in the same features of I - S, that is, without
+the colours of a light that differ across the object.
+
 The numbers were chosen on the validation set of `benchmarks.detail.sets`.
 
 Citation: none; that chroma distinguishes paint from shading is classical: B. V. Funt, M. S. Drew,
@@ -52,8 +55,30 @@ def paint_guide(image: np.ndarray, mask: np.ndarray, contrast: np.ndarray) -> np
     light = np.log(image + np.float32(_DIM))
     chroma = np.where(mask[..., None], light[..., ::2] - light[..., 1:2], 0)
     chroma = masked_gaussian(chroma, mask, _BLUR)
-    brightness = np.float32(_CONTRAST) * np.clip(contrast, -_MOST_CONTRAST, _MOST_CONTRAST)
-    return np.concatenate([chroma, brightness[..., None]], axis=2) * mask[..., None]
+    return np.concatenate([chroma, _brightness(contrast)[..., None]], axis=2) * mask[..., None]
+
+
+def paint_features(contrasts: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Return features in which pixels of one paint are alike across the object.
+
+    Parameters
+    ----------
+    contrasts : (3, H, W) float32 ndarray
+        I - S of the mean light, of log R/G and of log B/G.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        0 outside of the mask.
+    """
+    brightness, *chroma = np.clip(contrasts, -_MOST_CONTRAST, _MOST_CONTRAST)
+    smooth = [masked_gaussian(one, mask, _BLUR) for one in chroma]
+    return np.stack([*smooth, _brightness(brightness)], axis=2) * mask[..., None]
+
+
+def _brightness(contrast: np.ndarray) -> np.ndarray:
+    return np.float32(_CONTRAST) * np.clip(contrast, -_MOST_CONTRAST, _MOST_CONTRAST)
 
 
 def uniformity(guide: np.ndarray, mask: np.ndarray) -> np.ndarray:

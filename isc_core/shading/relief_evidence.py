@@ -16,8 +16,8 @@ block pools those of the whole object with the weights
 
     w_ij = exp(-|c_i - c_j|^2 / (2 * .2^2)) + 8 / N
 
-where c is the mean of the guide of `paint_edges`, and N the number of blocks: blocks of its own
-paint, and a little of the whole object, in case there are few. The evidence of a block are
+where c is the mean of `paint_edges.paint_features`, and N the number of blocks: blocks of its own
+paint, and a little of the whole object, in case there are few. The evidence of a block is
 
     c = correlation of e and b,   r = log (sum w a / sum w a')
 
@@ -57,7 +57,7 @@ _DARK = 0.01  # of the object's mean light
 _LEAST_GAIN = 0.05
 _LEAST_UNIFORM = 0.3  # of a block: below, it consists of edges of paint
 _FEWEST = 30  # blocks
-_PAINT = 0.2  # deviation of the guide within one paint
+_PAINT = 0.2  # deviation of c within one paint
 _OF_ALL = 8.0  # blocks of the whole object that count
 _NOTHING, _ALL = 0.3, 0.6  # probabilities: up to the one nothing is added, from the other all
 _TINY = 1e-8
@@ -108,7 +108,7 @@ class ReliefRule:
         return np.asarray(1 / (1 + np.exp(-np.clip(odds, -30, 30))))
 
 
-RULE = ReliefRule(-1.86, 5.75, 2.22)
+RULE = ReliefRule(-1.95, 5.87, 2.27)
 
 
 def added_share(probability: np.ndarray) -> np.ndarray:
@@ -169,7 +169,7 @@ def block_moments(
 
 
 def paint_evidence(
-    levels: Sequence[np.ndarray], guide: np.ndarray, mask: np.ndarray
+    levels: Sequence[np.ndarray], paint: np.ndarray, mask: np.ndarray
 ) -> Evidence | None:
     """Compute the evidence of each block, from all blocks of its paint.
 
@@ -177,7 +177,7 @@ def paint_evidence(
     ----------
     levels : sequence of (rows, columns, 8) ndarray
         Of `block_moments`, all for the blocks of the coarsest level.
-    guide : (H, W, 3) ndarray
+    paint : (H, W, 3) ndarray
         In which pixels of one paint are alike, on the coarsest level.
     mask : (H, W) bool ndarray
         The object, on the coarsest level.
@@ -187,7 +187,7 @@ def paint_evidence(
     Evidence or None
         0 outside of the object; None where the object is too small.
     """
-    colour, inside = means_inside(guide, mask, BLOCK)
+    colour, inside = means_inside(paint, mask, BLOCK)
     counts = levels[0][..., 0] > 0
     if counts.sum() < _FEWEST:
         return None
