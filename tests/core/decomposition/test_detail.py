@@ -149,3 +149,29 @@ def test_a_known_shape_stays_as_it_is() -> None:
 def test_unusable_detail_is_refused(wrong: int) -> None:
     with pytest.raises(InputError, match=r"--detail .*at most 4096"):
         replace(Settings(), detail=wrong).check()
+
+
+def test_one_paint_has_one_probability_under_lights_of_several_colours() -> None:
+    _, mask, height = ball(240)
+    light = LIGHT + np.outer(np.eye(9)[2], (0.6, 0, -0.6))  # red from one side, blue from the other
+    bumps = np.random.default_rng(4).normal(size=mask.shape) * 0.2
+    diffuse = 0.5 * normals_and_shading(height + bumps, light, mask)[1]
+    evidence = Pyramid.of(diffuse, mask, height, light).evidence()
+    assert evidence is not None
+    spread = np.ptp(evidence.along[evidence.along != 0])
+    assert spread < 0.02
+
+
+def test_two_paints_have_probabilities_of_their_own() -> None:
+    diffuse, mask, height = ball(300)
+    smooth = 0.5 * normals_and_shading(height, LIGHT, mask)[1]
+    left = (np.arange(300) < 150)[:, None]
+    dots = np.exp(0.03 * np.random.default_rng(5).normal(size=(300, 300)))[..., None]
+    both = np.where(left, diffuse, (0.9, 0.5, 0.3) * smooth * dots)
+    evidence = Pyramid.of(both, mask, height, LIGHT).evidence()
+    whole = Pyramid.of(diffuse, mask, height, LIGHT).evidence()
+    assert evidence is not None and whole is not None
+    middle = evidence.along.shape[0] // 2
+    relief, paint = evidence.along[middle, middle - 4], evidence.along[middle, middle + 4]
+    assert relief == pytest.approx(float(whole.along[middle, middle]), abs=0.4)
+    assert relief > paint + 0.3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.shading.paint_edges import paint_guide, uniformity
+from isc_core.shading.paint_edges import paint_features, paint_guide, uniformity
 
 SIDE = 48
 MASK = np.ones((SIDE, SIDE), bool)
@@ -45,3 +45,10 @@ def test_the_outline_is_no_edge() -> None:
     mask = np.zeros_like(MASK)
     mask[10:-10, 10:-10] = True
     assert _uniform((0.5, 0.3, 0.2), (0.5, 0.3, 0.2), mask).min() > 0.99
+
+
+def test_far_colours_count_no_more_than_strong_ones() -> None:
+    far = paint_features(np.full((3, SIDE, SIDE), 9.0, np.float32), MASK)
+    assert far[..., :2] == pytest.approx(2) and far[..., 2] == pytest.approx(0.4)
+    outside = paint_features(np.ones((3, SIDE, SIDE), np.float32), np.zeros_like(MASK))
+    assert not outside.any()
