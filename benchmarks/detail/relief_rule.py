@@ -32,9 +32,8 @@ from isc_core.decomposition.settings import Settings
 from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.errors import InputError
 from isc_core.imaging.blocks import block_means
-from isc_core.imaging.smoothing import masked_gaussian
 from isc_core.photo import read_photo
-from isc_core.shading.relief_evidence import BLOCK, ReliefRule
+from isc_core.shading.relief_evidence import BLOCK, ReliefRule, fine_change
 
 from .body_rows import body_rows
 from .rendering import SetKind
@@ -44,7 +43,6 @@ _RIDGE = 0.1
 _STEPS = 50
 _LEAST_RELIEF = 4e-4
 _MOST_CHANGE = 0.05
-_SMOOTH = 2.0  # pixels
 
 
 def evidence_and_truth(body: Path) -> dict[str, Any]:
@@ -67,7 +65,8 @@ def evidence_and_truth(body: Path) -> dict[str, Any]:
         return {"evidence": [], "is_relief": [], "weight": []}
     inside = block_means(coarsest.mask.astype(np.float64), BLOCK) == 1
     values = np.stack([evidence.correlation[inside], evidence.along[inside]], axis=1)
-    weight = np.minimum(_fine_change(coarsest.image, coarsest.mask)[inside], _MOST_CHANGE)
+    change = fine_change(coarsest.image / coarsest.mean, coarsest.mask)
+    weight = np.minimum(np.sqrt(block_means(change**2, BLOCK)[inside]), _MOST_CHANGE)
     relief = relief_blocks(pyramid, read_truth(body))[inside]
     weight = weight / max(float(weight.sum()), 1e-9)
     return {
@@ -93,13 +92,6 @@ def relief_blocks(pyramid: Pyramid, truth: Truth) -> np.ndarray:
     apart = np.where(truth.mask, 1 - (truth.normal * truth.smooth).sum(axis=2), 0)
     framed = np.ascontiguousarray(pyramid.frame.window.cut(apart, 0))
     return np.asarray(block_means(framed, BLOCK << pyramid.frame.halvings) > _LEAST_RELIEF)
-
-
-def _fine_change(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """RMS (rows, columns) of the fine changes of log brightness in blocks."""
-    light = np.log(np.where(mask, image.mean(axis=2) / image[mask].mean(), 1) + 0.01)
-    change = np.where(mask, light - masked_gaussian(light, mask, _SMOOTH), 0)
-    return np.sqrt(block_means(change**2, BLOCK))
 
 
 def _solved(body: Path) -> Pyramid:

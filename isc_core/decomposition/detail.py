@@ -275,8 +275,7 @@ class Pyramid:
     def evidence(self) -> Evidence | None:
         """Return the evidence for relief, by blocks of the coarsest level; None where too small."""
         coarsest, blocks, moments = self.levels[-1], 1, []
-        left, guide = self._without_shading
-        uniform = uniformity(guide, coarsest.mask)
+        left, _, uniform = self._without_shading
         levels = self._from_coarsest(np.stack([*self.slope, uniform], axis=2))
         for level, _, smooth in takewhile(lambda one: one[1] <= _MOST_EVIDENCE, levels):
             rows, columns = (slice(0, n) for n in level.mask.shape)
@@ -372,12 +371,15 @@ class Pyramid:
                 smooth = smooth.finer(level.mask.shape)
 
     @cached_property
-    def _without_shading(self) -> tuple[np.ndarray, np.ndarray]:
-        """Features of log light less log shading (3, h, w) on the coarsest level, and the guide."""
+    def _without_shading(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Features of log light less log shading (3, h, w) on the coarsest level, the guide
+        (h, w, 3), and how far there is one paint (h, w).
+        """
         level = self.levels[-1]
         shading = np.stack([log_shading(self.slope, one) for one in self.light.T])
         left = (_features(level.image, level.mean) - shading) * level.mask
-        return left, paint_guide(level.image / level.mean, level.mask, left[0])
+        guide = paint_guide(level.image / level.mean, level.mask, left[0])
+        return left, guide, uniformity(guide, level.mask)
 
     def _smooth_maps(self) -> np.ndarray:
         """What relief needs (h, w, 6) of the coarsest level.
@@ -386,11 +388,11 @@ class Pyramid:
         how far there is one paint.
         """
         level = self.levels[-1]
-        left, guide = self._without_shading
+        left, guide, uniform = self._without_shading
         sigma = _SIGMA * _PERIOD * self.frame.length / 2**self.frame.halvings
         smoother = CrossBilateral.of(guide, level.mask, sigma, ONE_PAINT)
         low = [_continued(low_pass(one, smoother), level.mask) for one in left]
-        return np.stack([*self.slope, *low, uniformity(guide, level.mask)], axis=2)
+        return np.stack([*self.slope, *low, uniform], axis=2)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,8 @@ def paint_guide(image: np.ndarray, mask: np.ndarray, contrast: np.ndarray) -> np
     light = np.log(image + np.float32(_DIM))
     chroma = np.where(mask[..., None], light[..., ::2] - light[..., 1:2], 0)
     chroma = masked_gaussian(chroma, mask, _BLUR)
-    return np.concatenate([chroma, _brightness(contrast)[..., None]], axis=2) * mask[..., None]
+    brightness = np.float32(_CONTRAST) * np.clip(contrast, -_MOST_CONTRAST, _MOST_CONTRAST)
+    return np.concatenate([chroma, brightness[..., None]], axis=2) * mask[..., None]
 
 
 def paint_features(contrasts: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -74,11 +75,7 @@ def paint_features(contrasts: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """
     brightness, *chroma = np.clip(contrasts, -_MOST_CONTRAST, _MOST_CONTRAST)
     smooth = [masked_gaussian(one, mask, _BLUR) for one in chroma]
-    return np.stack([*smooth, _brightness(brightness)], axis=2) * mask[..., None]
-
-
-def _brightness(contrast: np.ndarray) -> np.ndarray:
-    return np.float32(_CONTRAST) * np.clip(contrast, -_MOST_CONTRAST, _MOST_CONTRAST)
+    return np.stack([*smooth, np.float32(_CONTRAST) * brightness], axis=2) * mask[..., None]
 
 
 def uniformity(guide: np.ndarray, mask: np.ndarray) -> np.ndarray:

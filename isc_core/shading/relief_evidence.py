@@ -9,7 +9,7 @@ Equation: with y the log luminance less its Gaussian average, the gain g = d log
 the weight v, which is 0 at edges of paint (`paint_edges.uniformity`), the moments of a block of
 8 x 8 pixels are those of
 
-    e = log mean v y^2,   b = log (mean |g| + .05)
+    e = log (mean v y^2 / mean v),   b = log (mean |g| + .05)
 
 and the energies of the changes along and across g, a = mean v |g| (dy / d along g)^2 and a'. Each
 block pools those of the whole object with the weights
@@ -126,6 +126,24 @@ def added_share(probability: np.ndarray) -> np.ndarray:
     return np.clip((probability - _NOTHING) / (_ALL - _NOTHING), 0, 1)
 
 
+def fine_change(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Compute the fine changes of log luminance, y of the module.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear diffuse light over the object's mean.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W) ndarray
+        0 outside of the mask.
+    """
+    luminance = np.log(np.where(mask, image.mean(axis=2), 1) + _DARK)
+    return np.where(mask, luminance - masked_gaussian(luminance, mask, _SMOOTH), 0)
+
+
 def block_moments(
     image: np.ndarray,
     mask: np.ndarray,
@@ -152,9 +170,7 @@ def block_moments(
     (H / 8 / blocks, W / 8 / blocks, 8) ndarray
         The share of blocks that count, their means of e, b, e^2, b^2, e b, a and a'.
     """
-    luminance = np.log(np.where(mask, image.mean(axis=2), 1) + _DARK)
-    change = np.where(mask, luminance - masked_gaussian(luminance, mask, _SMOOTH), 0)
-    size = np.hypot(*gain)
+    change, size = fine_change(image, mask), np.hypot(*gain)
     share = block_means(uniform.astype(np.float64), BLOCK)
     counts = (block_means(mask.astype(np.float64), BLOCK) == 1) & (share > _LEAST_UNIFORM)
     energy = block_means(change**2 * uniform, BLOCK) / np.maximum(share, _LEAST_UNIFORM)
