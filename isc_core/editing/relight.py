@@ -29,6 +29,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.luminance import luminance
+from ..imaging.window import as_map
 from ..lobe_fitting.light_direction import explain_specular
 from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
@@ -217,7 +218,7 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     highlights, note = _highlights(
         d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, rotation
     )
-    diffuse = d.diffuse if untouched else d.reflectance * _as_map(new * factor, d.mask)
+    diffuse = d.diffuse if untouched else d.reflectance * as_map(new * factor, d.mask)
     return edited(d, diffuse, highlights, (note,) if note else ())
 
 
@@ -253,7 +254,7 @@ def _highlights(
             if choice.highlights == "scale"
             else "no lobe is known, so the highlights follow the shading and do not move"
         )
-        return _as_map(present[d.mask] * np.minimum(ratio, _MAX_SCALE), d.mask), note
+        return as_map(present[d.mask] * np.minimum(ratio, _MAX_SCALE), d.mask), note
     lobe = lobe or Lobe()
     view, source = d.view_inside, None if rotation is None else _dominant_light(d)
     if source is None or rotation is None:
@@ -264,10 +265,10 @@ def _highlights(
             if light.coefficients is None
             else "the highlights are rendered in a smooth light, so they are broad"
         )
-        return _as_map(strength * factor * light.lobe(lobe, normals, view), d.mask), note
+        return as_map(strength * factor * light.lobe(lobe, normals, view), d.mask), note
     moved = replace(source, direction=rotation @ source.direction)
     before, after = (
-        _as_map(lobe_under(lobe, normals, one, view), d.mask) for one in (source, moved)
+        as_map(lobe_under(lobe, normals, one, view), d.mask) for one in (source, moved)
     )
     still = (
         _kept_share(source.direction, moved.direction)
@@ -291,13 +292,6 @@ def _dominant_light(d: Decomposition) -> DirectionalLight | None:
     else:
         direction, color = lights[0].direction, lights[0].strength_light
     return DirectionalLight(direction, color / max(float(luminance(color)), 1e-12))
-
-
-def _as_map(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """`values` (N, 3) of the mask's pixels as a map (H, W, 3)."""
-    layer = np.zeros((*mask.shape, 3))
-    layer[mask] = values
-    return layer
 
 
 def _kept_share(before: np.ndarray, after: np.ndarray) -> float:

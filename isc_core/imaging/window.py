@@ -1,4 +1,4 @@
-"""A rectangle that may extend beyond the image: cut out of maps, and pasted back.
+"""Parts of a map, cut out and put back: rectangles that may extend beyond it, pixels of a mask.
 
 Limits: whole pixels.
 """
@@ -8,6 +8,34 @@ from dataclasses import dataclass
 import numpy as np
 
 from .framing import continued
+
+
+def as_map(
+    values: np.ndarray,
+    mask: np.ndarray,
+    outside: float = 0.0,
+    dtype: type[np.floating] | None = None,
+) -> np.ndarray:
+    """Put the values of a mask's pixels back into a map.
+
+    Parameters
+    ----------
+    values : (N, ...) ndarray
+        In the order of `map[mask]`.
+    mask : (H, W) bool ndarray
+        N pixels are set.
+    outside : float, optional
+        Value of the other pixels.
+    dtype : type, optional
+        Of the map; by default that of the values.
+
+    Returns
+    -------
+    (H, W, ...) ndarray
+    """
+    filled = np.full((*mask.shape, *values.shape[1:]), outside, dtype or values.dtype)
+    filled[mask] = values
+    return filled
 
 
 @dataclass(frozen=True)

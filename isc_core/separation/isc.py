@@ -54,6 +54,7 @@ from ..imaging.channels import largest, smallest
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian, weighted_gaussian
 from ..imaging.upsampling import enlarged
+from ..imaging.window import as_map
 from ..networks.scene_network import predict_layers
 from ..progress import Monitor
 from ..scene.decomposition import Separation
@@ -376,7 +377,7 @@ def abstention(
     usable = mask if clipped is None else mask & ~clipped
     photo = _object_maps(*_block_averages(scaled, mask, usable, -(-max(mask.shape) // _MAX_SIDE)))
     ratios = _diffuse_ratios(photo, options)
-    share = _as_map(ratios.places.read(ratios.share), photo.mask)
+    share = as_map(ratios.places.read(ratios.share), photo.mask)
     candidate = _specular(photo.low, photo.chroma, share) * ramp(
         photo.low / photo.base, options.bright
     )
@@ -508,17 +509,10 @@ def _ratio(share: np.ndarray) -> np.ndarray:
     return share / np.maximum(1 - share, np.float32(0.01))
 
 
-def _as_map(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """`values` (n,) of the mask's pixels as a map (H, W), 0 elsewhere."""
-    layer = np.zeros(mask.shape, np.float32)
-    layer[mask] = values
-    return layer
-
-
 def _candidates(photo: _ObjectMaps, ratios: _DiffuseRatios, options: IscOptions) -> _Candidates:
     """Both candidates for s, with their gains."""
     hue_share, usual_chroma = (
-        _as_map(ratios.places.read(table), photo.mask)
+        as_map(ratios.places.read(table), photo.mask)
         for table in (ratios.share, photo.peak * ratios.chroma)
     )
     by_hue = _specular(photo.low, photo.chroma, hue_share)
@@ -678,7 +672,7 @@ def _of_full_size(
         maps = _object_maps(image[wide], mask[wide], mask[wide])
         part = maps.rows(block.own)
         places = _places(ratios.grid, part, factor, first)
-        hue_share = _as_map(places.read(ratios.share), part.mask)
+        hue_share = as_map(places.read(ratios.share), part.mask)
         gain_by_hue, gain_by_place, share = (
             enlarged(layer, part.mask.shape, factor, (first, 0))
             for layer in (candidates.gain_by_hue, candidates.gain_by_place, candidates.share)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.window import as_map
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
 from isc_core.refinement.held_out import held_out_blocks, pixels_of
@@ -236,20 +237,13 @@ def _refined(
     shading = direct + indirect
     return replace(
         d,
-        shading=_map(d.mask, shading),
-        reflectance=_map(d.mask, d.diffuse[d.mask] / shading),
+        shading=as_map(shading, d.mask, dtype=np.float32),
+        reflectance=as_map(d.diffuse[d.mask] / shading, d.mask, dtype=np.float32),
         illumination=illumination,
-        visibility=_map(d.mask, direct / smooth, outside=1.0),
-        indirect=_map(d.mask, indirect),
+        visibility=as_map(direct / smooth, d.mask, outside=1.0, dtype=np.float32),
+        indirect=as_map(indirect, d.mask, dtype=np.float32),
         environment=radiance.reshape(rows, 2 * rows, 3).astype(np.float32),
     )
-
-
-def _map(mask: np.ndarray, inside: np.ndarray, outside: float = 0.0) -> np.ndarray:
-    """A map (H, W, 3) of float32 from the values (N, 3) of the mask's pixels."""
-    values = np.full((*mask.shape, 3), outside, np.float32)
-    values[mask] = inside
-    return values
 
 
 def _noted(d: Decomposition, note: dict[str, Any]) -> Decomposition:
