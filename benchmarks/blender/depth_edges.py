@@ -28,6 +28,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from isc_core.numerics.logistic import logistic_weights
 from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.rim import Rim
@@ -47,7 +48,6 @@ _ENOUGH = 0.25  # of the object's length: pixels on steps, for a body to be turn
 _EDGE, _LINE = 0.3, 0.1  # probability of an edge, and its length by the object's, for a cut
 _SIDE, _FILL = 200, 0.25
 _LIGHT = np.array([0.4, 0.6, 0.7]) / np.linalg.norm([0.4, 0.6, 0.7])
-_ROUNDS, _RIDGE = 12, 1e-3
 
 Mesh = tuple[np.ndarray, np.ndarray]
 
@@ -103,7 +103,7 @@ def _normal_slope(body: SeenBody) -> np.ndarray:
 
 
 def logistic(values: np.ndarray, labels: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
-    """Fit a logistic regression by Newton's method.
+    """Fit a logistic regression on standardised values.
 
     Parameters
     ----------
@@ -120,13 +120,7 @@ def logistic(values: np.ndarray, labels: np.ndarray) -> Callable[[np.ndarray], n
     def design(rows: np.ndarray) -> np.ndarray:
         return np.column_stack([np.ones(len(rows)), (rows - mean) / spread])
 
-    given, weights = design(values), np.zeros(values.shape[1] + 1)
-    for _ in range(_ROUNDS):
-        share = 1 / (1 + np.exp(-given @ weights))
-        curve = (given * (share * (1 - share))[:, None]).T @ given
-        weights += np.linalg.solve(
-            curve + _RIDGE * np.eye(len(weights)), given.T @ (labels - share)
-        )
+    weights = logistic_weights(design(values), labels)
     return lambda rows: np.asarray(design(rows) @ weights)
 
 

@@ -32,6 +32,7 @@ from isc_core.decomposition.settings import Settings
 from isc_core.decomposition.task import DecompositionTask, SolveOptions
 from isc_core.errors import InputError
 from isc_core.imaging.blocks import block_means
+from isc_core.numerics.logistic import logistic_weights
 from isc_core.photo import read_photo
 from isc_core.shading.relief_evidence import BLOCK, ReliefRule, fine_change
 
@@ -39,8 +40,7 @@ from .body_rows import body_rows
 from .rendering import SetKind
 from .sets import PHOTO, Truth, read_truth
 
-_RIDGE = 0.1
-_STEPS = 50
+_RIDGE, _OFFSET_RIDGE = 0.1, 1e-6
 _LEAST_RELIEF = 4e-4
 _MOST_CHANGE = 0.05
 
@@ -103,8 +103,8 @@ def _solved(body: Path) -> Pyramid:
     return Pyramid.of(found.split.diffuse, photo.mask, found.height, found.light)
 
 
-def logistic_weights(features: np.ndarray, is_relief: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """Fit a logistic regression by Newton's method.
+def rule_weights(features: np.ndarray, is_relief: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Fit the weights of the rule.
 
     Parameters
     ----------
@@ -120,14 +120,8 @@ def logistic_weights(features: np.ndarray, is_relief: np.ndarray, weight: np.nda
     """
     inputs = np.column_stack([np.ones(len(features)), features])
     ridge = np.full(inputs.shape[1], _RIDGE)
-    ridge[0] = 1e-6
-    weights = np.zeros(inputs.shape[1])
-    for _ in range(_STEPS):
-        shares = 1 / (1 + np.exp(-np.clip(inputs @ weights, -30, 30)))
-        curvature = (inputs * (weight * shares * (1 - shares))[:, None]).T @ inputs + np.diag(ridge)
-        slope = inputs.T @ (weight * (is_relief - shares)) - ridge * weights
-        weights = weights + np.linalg.solve(curvature, slope)
-    return weights
+    ridge[0] = _OFFSET_RIDGE
+    return logistic_weights(inputs, is_relief, ridge, weight)
 
 
 def left_out(
@@ -150,7 +144,7 @@ def left_out(
     found = np.zeros(len(features))
     for one in np.unique(body):
         other = body != one
-        weights = logistic_weights(features[other], is_relief[other], weight[other])
+        weights = rule_weights(features[other], is_relief[other], weight[other])
         odds = weights[0] + features[~other] @ weights[1:]
         found[~other] = 1 / (1 + np.exp(-np.clip(odds, -30, 30)))
     return found
@@ -193,7 +187,7 @@ def _print_rule(rows: Sequence[Mapping[str, Any]]) -> None:
         total = max(float(weight[of_kind].sum()), 1e-9)
         means = [float((one * weight)[of_kind].sum()) / total for one in (loss, correct)]
         print(f"{kind}: log loss {means[0]:.3f}, told correctly {means[1]:.0%}")
-    weights = logistic_weights(features, is_relief, weight)
+    weights = rule_weights(features, is_relief, weight)
     print(ReliefRule(*(round(float(one), 2) for one in weights)))
 
 

@@ -27,13 +27,14 @@ from scipy import ndimage
 from isc_core.decomposition.joint import detect_residual_highlights
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
+from isc_core.numerics.logistic import logistic_weights
 from isc_core.separation import COLOUR_ALONE, separate
 from isc_core.separation.support.highlight_evidence import WEIGHTS, highlight_evidence
 
 from .print_set import Part, PrintScene, print_scenes
 
 ODDS = (1.5, 2.0, 3.0, 4.0, 6.0)
-_RIDGE, _STEPS = 0.01, 50
+_RIDGE = 0.01
 _FOLDS, _RESAMPLED = 5, 2000
 
 
@@ -102,7 +103,7 @@ def regions_of(scene: PrintScene) -> Regions:
 
 
 def fitted(photos: Sequence[Regions]) -> np.ndarray:
-    """Fit the weights by Newton's method, with a ridge on standardised values.
+    """Fit the weights of standardised values, with a ridge.
 
     Parameters
     ----------
@@ -117,13 +118,8 @@ def fitted(photos: Sequence[Regions]) -> np.ndarray:
     good, share = _good_and_share(photos)
     mean, deviation = values.mean(axis=0), values.std(axis=0)
     rows = np.column_stack([np.ones(len(values)), (values - mean) / deviation])
-    weights = np.zeros(rows.shape[1])
-    penalty = _RIDGE * len(values) * (np.arange(len(weights)) > 0)
-    for _ in range(_STEPS):
-        likely = 1 / (1 + np.exp(-rows @ weights))
-        bend = (rows * (share * likely * (1 - likely))[:, None]).T @ rows + np.diag(penalty)
-        slope = rows.T @ (share * (good - likely)) - penalty * weights
-        weights += np.linalg.solve(bend, slope)
+    ridge = _RIDGE * len(values) * (np.arange(rows.shape[1]) > 0)
+    weights = logistic_weights(rows, good, ridge, share)
     scaled = weights[1:] / deviation
     return np.concatenate([[weights[0] - scaled @ mean], scaled])
 

@@ -25,11 +25,12 @@ from isc_core.io.npy import read_arrays
 from isc_core.masking.finder import shows_several
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
+from isc_core.numerics.logistic import logistic_weights
 
 from .difficulty import SIMPLE, Difficulty
 from .held_out import HeldOut, held_out_composites, held_out_ingredients
 
-_RIDGE, _STEPS = 0.1, 50
+_RIDGE = 0.1
 _MIN_OVERLAP = {Count.ONE: 0.5, Count.SEVERAL: 0.7}  # of a correct mask
 _KINDS = (  # of photos, and their shares
     (Count.ONE, SIMPLE, 1 / 4),
@@ -44,27 +45,6 @@ _KINDS = (  # of photos, and their shares
 )
 _FIRST_SEED = 40
 _THRESHOLDS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7)
-
-
-def logistic_weights(features: np.ndarray, correct: np.ndarray) -> np.ndarray:
-    """Fit a logistic regression by Newton's method.
-
-    Parameters
-    ----------
-    features : (N, K) ndarray
-    correct : (N,) bool ndarray
-
-    Returns
-    -------
-    (K,) ndarray
-    """
-    weights = np.zeros(features.shape[1])
-    for _ in range(_STEPS):
-        share = 1 / (1 + np.exp(-features @ weights))
-        gradient = features.T @ (share - correct) + _RIDGE * weights
-        curvature = (features.T * (share * (1 - share))) @ features
-        weights = weights - np.linalg.solve(curvature + _RIDGE * np.eye(len(weights)), gradient)
-    return weights
 
 
 def observed(
@@ -128,7 +108,7 @@ def main() -> None:
         )
     ]
     features, correct, single = observed(photos, network)
-    weights = logistic_weights(features, correct)
+    weights = logistic_weights(features, correct, _RIDGE)
     print("weights", np.round(weights, 3), "correct", correct.mean())
     confidence = 1 / (1 + np.exp(-features @ weights))
     one = np.array([photo.count for photo in photos]) == Count.ONE

@@ -6,7 +6,7 @@ import pytest
 pytest.importorskip("torch")
 pytest.importorskip("mitsuba")
 
-from benchmarks.detail.relief_rule import left_out, logistic_weights, relief_blocks
+from benchmarks.detail.relief_rule import left_out, relief_blocks, rule_weights
 from benchmarks.detail.sets import Truth
 from isc_core.decomposition.detail import Pyramid
 
@@ -15,7 +15,7 @@ def test_weights_of_a_known_boundary() -> None:
     rng = np.random.default_rng(0)
     features = rng.normal(size=(400, 2))
     is_relief = rng.random(400) < 1 / (1 + np.exp(-(0.5 + 2 * features[:, 0])))
-    offset, first, second = logistic_weights(features, is_relief, np.ones(400))
+    offset, first, second = rule_weights(features, is_relief, np.ones(400))
     assert abs(offset - 0.5) < 0.4 and abs(first - 2) < 0.5 and abs(second) < 0.4
 
 
@@ -23,9 +23,9 @@ def test_a_weight_of_two_is_the_same_block_twice() -> None:
     rng = np.random.default_rng(1)
     features, is_relief = rng.normal(size=(60, 2)), rng.random(60) < 0.5
     twice = np.arange(60) < 20
-    weighted = logistic_weights(features, is_relief, 1.0 + twice)
+    weighted = rule_weights(features, is_relief, 1.0 + twice)
     again = np.concatenate([np.arange(60), np.flatnonzero(twice)])
-    repeated = logistic_weights(features[again], is_relief[again], np.ones(80))
+    repeated = rule_weights(features[again], is_relief[again], np.ones(80))
     assert np.allclose(weighted, repeated)
 
 
