@@ -27,7 +27,7 @@ from isc_core.masking.finder import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count
 from isc_core.photo.decontamination import estimate_foreground, unmixed
-from training.masks.composites import CompositeDraws, Composites, as_photographed
+from training.masks.composites import CompositeDraws, Composites, as_photographed, ground_truth
 from training.masks.held_out import PARTS, held_out_ingredients
 from training.masks.packs import Ingredients
 
@@ -66,9 +66,11 @@ def samples(ingredients: Ingredients, number: int, seed: int, side: int) -> Iter
     shares = tuple(float(kind == Count.ONE) for kind in Count)
     draw, rng = CompositeDraws(_BATCH, hinted=0, shares=shares), np.random.default_rng([seed, 1])
     compose, made = Composites(ingredients, draw, side), 0
+    torch.manual_seed(seed)  # noise of the backgrounds
     while made < number:
         drawn = draw(rng)
-        scene, mask = compose.pasted(drawn), compose.composed(drawn).mask
+        scene = compose.pasted(drawn)
+        mask = ground_truth(scene, drawn)[0]
         continued = scene.light.clone()
         for k in torch.nonzero(drawn.objects.target)[:, 0]:
             covered = (scene.cover[k, 0] > _COVERED).numpy()

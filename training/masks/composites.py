@@ -270,7 +270,7 @@ class Composites:
         """
         scene, drawn = self.pasted(drawn), drawn.to(self._device)
         light, frame = scene.light, scene.frame
-        mask, hints, count = _ground_truth(scene.covers * frame, frame, drawn)
+        mask, hints, count = ground_truth(scene, drawn)
         photo = as_photographed(light, frame, drawn.cameras, light)
         return Composite(photo, frame, hints, mask, count)
 
@@ -370,18 +370,34 @@ def _defocus(light: torch.Tensor, drawn: CompositeDraw, photos: torch.Tensor | N
         light[photos] = defocused(light[photos], drawn.defocus.chosen(photos))
 
 
-def _ground_truth(
-    covers: torch.Tensor, frame: torch.Tensor, drawn: CompositeDraw
+def ground_truth(
+    scene: PastedScenes, drawn: CompositeDraw
 ) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Masks, hints and counts that the network is trained on."""
-    objects, given = drawn.objects, drawn.hints.given
+    """Return what the network is trained on.
+
+    Parameters
+    ----------
+    scene : PastedScenes
+        Of the draw.
+    drawn : CompositeDraw
+        On the same device.
+
+    Returns
+    -------
+    mask : (B, 1, SIDE, SIDE) tensor
+        Coverage by the target.
+    hints : (B, 3, SIDE, SIDE) tensor
+    count : (B,) tensor of int
+        `Count`.
+    """
+    covers, objects, given = scene.covers * scene.frame, drawn.objects, drawn.hints.given
     alone = torch.zeros(covers.shape[:2], dtype=torch.bool, device=covers.device)
     alone[objects.photo, objects.layer] = objects.target
     single = drawn.scenes.count == int(Count.ONE)
     marked = hinted(covers, alone, single, drawn.hints)
     some = torch.where(given[:, None], marked, alone)
     mask = (covers * some[..., None, None]).sum(1, keepdim=True).clamp(max=1)
-    hints = hint_maps(mask[:, 0] > 0.5, frame[:, 0] > 0, drawn.hints)
+    hints = hint_maps(mask[:, 0] > 0.5, scene.frame[:, 0] > 0, drawn.hints)
     count = torch.where(given, marked.any(1) * int(Count.ONE), drawn.scenes.count)
     return mask, hints, count
 
