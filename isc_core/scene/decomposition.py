@@ -15,7 +15,7 @@ from ..photo.camera import Camera
 from ..shading.lights import VIEW
 from ..shading.perspective import object_axis, view_directions
 from ..shading.spherical_harmonics import real_sh
-from .diagnostics import Diagnostics
+from .diagnostics import Abstention, Diagnostics
 from .expected_error import ExpectedError
 from .lobe_fit import LobeFit
 
@@ -32,12 +32,15 @@ class Separation:
         Linear, 0 outside the mask.
     confidence : (H, W) ndarray of float32
         Reliability of the split in [0, 1]; 0 outside the mask.
+    abstention : Abstention or None
+        Why the method `separation.BEST` removed nothing; None otherwise.
     """
 
     diffuse: np.ndarray
     specular: np.ndarray
     residual: np.ndarray
     confidence: np.ndarray
+    abstention: Abstention | None = None
 
 
 @dataclass(frozen=True)

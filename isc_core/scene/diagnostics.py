@@ -29,6 +29,31 @@ class StopReason(StrEnum):
     DIRECT = "direct method"
 
 
+class Abstention(StrEnum):
+    """Why a separation left a photo unchanged.
+
+    Attributes
+    ----------
+    NO_COLOUR
+        All channels are equal.
+    NO_CANDIDATE
+        No pixel is paler than pixels of its hue.
+    NEAR_GREY
+        The object's colours are too pale to tell a highlight from them.
+    NOT_PROVEN
+        There are pale pixels, but they look like reflectance: they have its edges, or run with its
+        colours.
+    PRINT
+        The pale pixels are likelier print than highlights.
+    """
+
+    NO_COLOUR = "no colour"
+    NO_CANDIDATE = "no candidate"
+    NEAR_GREY = "near grey"
+    NOT_PROVEN = "not proven"
+    PRINT = "print"
+
+
 class JointOutcome(StrEnum):
     """What the model joint did beyond MDR.
 

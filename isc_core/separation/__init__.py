@@ -115,12 +115,11 @@ def separate(
         split = _module(method).separate(
             cropped[0], cropped[1], options, clipped=cropped[2], monitor=monitor, **extra
         )
-    return Separation(
-        *(
-            _uncrop(layer, box, mask.shape)
-            for layer in (split.diffuse, split.specular, split.residual, split.confidence)
-        )
+    diffuse, specular, residual, confidence = (
+        _uncrop(layer, box, mask.shape)
+        for layer in (split.diffuse, split.specular, split.residual, split.confidence)
     )
+    return Separation(diffuse, specular, residual, confidence, split.abstention)
 
 
 def variants(method: str) -> tuple[str, ...]:

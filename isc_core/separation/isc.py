@@ -43,7 +43,6 @@ reflectance that fades in smoothly on a coloured object passes for a highlight.
 
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from enum import Enum
 from functools import cached_property
 
 import numpy as np
@@ -58,6 +57,7 @@ from ..imaging.window import as_map
 from ..networks.scene_network import predict_layers
 from ..progress import Monitor
 from ..scene.decomposition import Separation
+from ..scene.diagnostics import Abstention
 from .sparse_coding import grouped_specular
 from .support.checks import check_arrays, has_colour
 from .support.edge_aware import Paths
@@ -265,7 +265,8 @@ def separate(
     -------
     Separation
         Inside the mask 0 <= diffuse <= image. The confidence falls with the expected error. A photo
-        without colour is left unchanged, with low confidence.
+        without colour is left unchanged, with low confidence. `abstention` is set where nothing is
+        removed from pixels that are not clipped.
 
     Raises
     ------
@@ -300,14 +301,24 @@ def separate(
         specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
+    unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
+    abstention = None
+    if not _removes(split, unclipped):
+        abstention = _abstention(image, mask, photo, ratios, options)
     if options.odds > 0 and split.specular.any():
         split = _without_print(split, image, mask, options.odds, clipped, prior)
-    unclipped = np.ones(mask.shape, bool) if clipped is None else ~clipped
+        if abstention is None and not _removes(split, unclipped):
+            abstention = Abstention.PRINT
     likely = _confidence(image, mask, low, _base(low, mask, peak), split.specular[..., 0])
     for layer in (split.diffuse, split.specular, split.residual):
         if layer.any():  # zero pages that are never written need no memory
             layer *= unit
-    return replace(split, confidence=np.where(unclipped, likely, 0))
+    return replace(split, confidence=np.where(unclipped, likely, 0), abstention=abstention)
+
+
+def _removes(split: Separation, unclipped: np.ndarray) -> bool:
+    """Whether there is specular light where the photo is not clipped."""
+    return bool((split.specular.any(axis=2) & unclipped).any())
 
 
 def _without_print(
@@ -327,56 +338,16 @@ def _without_print(
     return keep_highlights(split, image, found.kept, mask)
 
 
-class Abstention(Enum):
-    """Why a photo was left unchanged.
-
-    Attributes
-    ----------
-    NO_COLOUR
-        All channels are equal.
-    NO_CANDIDATE
-        No pixel is paler than pixels of its hue.
-    NEAR_GREY
-        The object's colours are too pale to tell a highlight from them.
-    NOT_PROVEN
-        There are pale pixels, but they look like reflectance: they have its edges, or run with its
-        colours.
-    PRINT
-        The pale pixels are likelier print than highlights.
-    """
-
-    NO_COLOUR = "no colour"
-    NO_CANDIDATE = "no candidate"
-    NEAR_GREY = "near grey"
-    NOT_PROVEN = "not proven"
-    PRINT = "print"
-
-
-def abstention(
-    image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None
+def _abstention(
+    image: np.ndarray,
+    mask: np.ndarray,
+    photo: _ObjectMaps,
+    ratios: _DiffuseRatios,
+    options: IscOptions,
 ) -> Abstention:
-    """Return why `separate` with its defaults left a photo unchanged.
-
-    Parameters
-    ----------
-    image : (H, W, 3) ndarray
-        As for `separate`.
-    mask : (H, W) bool ndarray
-    clipped : (H, W) bool ndarray, optional
-
-    Returns
-    -------
-    Abstention
-        The first reason that applies.
-    """
+    """Why colour alone removes nothing from `image` (H, W, 3); `photo` are its block averages."""
     if not has_colour(image, mask):
         return Abstention.NO_COLOUR
-    options = VARIANTS["improved"]
-    unit = _unit(image[mask])
-    scaled = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
-    usable = mask if clipped is None else mask & ~clipped
-    photo = _object_maps(*_block_averages(scaled, mask, usable, -(-max(mask.shape) // _MAX_SIDE)))
-    ratios = _diffuse_ratios(photo, options)
     share = as_map(ratios.places.read(ratios.share), photo.mask)
     candidate = _specular(photo.low, photo.chroma, share) * ramp(
         photo.low / photo.base, options.bright
@@ -385,8 +356,7 @@ def abstention(
         return Abstention.NO_CANDIDATE
     if _saturation(photo) <= options.colourful[0]:
         return Abstention.NEAR_GREY
-    by_colour = separate(image, mask, replace(options, odds=0.0), clipped)
-    return Abstention.PRINT if by_colour.specular.any() else Abstention.NOT_PROVEN
+    return Abstention.NOT_PROVEN
 
 
 def _unit(values: np.ndarray) -> np.float32:

@@ -14,6 +14,7 @@ from ...progress import Monitor
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_writable_result, save_separation
 from ...scene.decomposition import Separation
+from ...scene.diagnostics import Abstention
 from ...separation import BEST, IMPROVED, METHODS, separate
 from ...separation.option_text import parse_changes
 from ..interface.mask_options import add_hints, hints_of, how_found
@@ -164,14 +165,12 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
     if photo.original.mask_from == "whole frame":
         yield "no mask: the whole image was processed; set one with --mask"
     if options.method != "none" and not layers.specular[~photo.clipped].any():
-        yield f"no highlight was found: {_why_unchanged(options.method, photo)}"
+        yield f"no highlight was found: {_why_unchanged(options.method, layers)}"
 
 
-def _why_unchanged(method: str, photo: Photo) -> str:
-    if method != BEST:
+def _why_unchanged(method: str, layers: Separation) -> str:
+    if layers.abstention is None:
         return f"the equation of {method} attributes no pixel to one; try --method {BEST}"
-    from ...separation.isc import Abstention, abstention
-
     reasons = {
         Abstention.NO_COLOUR: (
             "the photo has no colour, which distinguishes highlights from reflectance; use a "
@@ -191,7 +190,7 @@ def _why_unchanged(method: str, photo: Photo) -> str:
             "highlights by hand with --prior"
         ),
     }
-    return reasons[abstention(photo.image, photo.mask, photo.clipped)]
+    return reasons[layers.abstention]
 
 
 def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:

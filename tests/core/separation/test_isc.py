@@ -16,8 +16,9 @@ from isc_core.evaluation.metrics import psnr
 from isc_core.photo import read_linear
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
+from isc_core.scene.diagnostics import Abstention
 from isc_core.separation import BEST, COLOUR_ALONE, METHODS, isc, separate
-from isc_core.separation.isc import VARIANTS, Abstention, IscOptions, abstention
+from isc_core.separation.isc import VARIANTS, IscOptions
 from tests.core.separation.scenes import (
     ALBEDOS,
     assert_layers_hold,
@@ -276,7 +277,24 @@ def test_form_restores_paint_that_colour_takes_for_a_highlight() -> None:
     split = separate("isc", photo, mask)
     np.testing.assert_array_equal(split.diffuse, photo)
     assert not split.specular.any() and not split.residual.any()
-    assert abstention(photo, mask) is Abstention.PRINT
+    assert split.abstention is Abstention.PRINT
+
+
+def test_a_separation_that_removes_nothing_says_why() -> None:
+    _, _, mask, shading = disc()
+    matt = {
+        Abstention.NO_COLOUR: np.array([0.4, 0.4, 0.4]),
+        Abstention.NO_CANDIDATE: ALBEDOS[0],
+        Abstention.NEAR_GREY: np.array([0.5, 0.4, 0.38]),
+    }
+    for why, albedo in matt.items():
+        noise = 0.0 if why is not Abstention.NEAR_GREY else 0.01
+        scene = lit(albedo * shading[..., None], mask, [], noise=noise)
+        assert separate("isc", scene.image, mask).abstention is why
+    glossy = sectors()
+    assert separate("isc", glossy.image, mask).abstention is None
+    forbidden = separate("isc", glossy.image, mask, prior=np.zeros(mask.shape))
+    assert forbidden.abstention is Abstention.NOT_PROVEN and not forbidden.specular.any()
 
 
 def test_a_prior_multiplies_the_odds_against_print() -> None:
