@@ -98,6 +98,50 @@ class PhotoOperator:
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
+    def modal(self, context: Any, event: Any) -> set[str]:
+        """Pass an event on with the position of the mouse.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard; its position is in pixels of the window.
+
+        Returns
+        -------
+        set of str
+            As of `handle_event`; {"CANCELLED"} on Esc, the right mouse button, or where the region
+            is gone.
+        """
+        position = None if self._canvas is None else self._canvas.position(event)
+        if self._canvas is None or position is None or event.type in {"ESC", "RIGHTMOUSE"}:
+            return self._leave(context, {"CANCELLED"})
+        return self.handle_event(context, event, self._canvas, position)
+
+    def handle_event(
+        self, context: Any, event: Any, canvas: PhotoCanvas, position: tuple[int, int]
+    ) -> set[str]:
+        """Use an event; the operator's own.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+        event : bpy.types.Event
+            Event of the mouse or keyboard.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        position : tuple of int
+            Of the mouse, in pixels of the region.
+
+        Returns
+        -------
+        set of str
+            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting, {"FINISHED"} or {"CANCELLED"}.
+        """
+        raise NotImplementedError
+
     def status_text(self) -> str:
         """Return what to do with the mouse, for the status bar; the operator's own.
 
@@ -159,30 +203,31 @@ class ClickOnPhoto(PhotoOperator):
         """
         raise NotImplementedError
 
-    def modal(self, context: Any, event: Any) -> set[str]:
-        """Take the click of the left mouse button.
+    def handle_event(
+        self, context: Any, event: Any, canvas: PhotoCanvas, position: tuple[int, int]
+    ) -> set[str]:
+        """Take the click of the left mouse button; see `PhotoOperator`.
 
         Parameters
         ----------
         context : bpy.types.Context
             Blender's context.
         event : bpy.types.Event
-            Event of the mouse or keyboard; its position is in pixels of the window.
+            Event of the mouse or keyboard.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        position : tuple of int
+            Of the mouse.
 
         Returns
         -------
         set of str
-            {"PASS_THROUGH"} while waiting; {"FINISHED"} with a point; {"CANCELLED"} on Esc, the
-            right mouse button, or a click beside the photo.
+            {"PASS_THROUGH"} while waiting; {"FINISHED"} with a point; {"CANCELLED"} on a click
+            beside the photo.
         """
-        if event.type in {"ESC", "RIGHTMOUSE"}:
-            return self._leave(context, {"CANCELLED"})
-        if event.type != "LEFTMOUSE" or event.value != "PRESS" or self._canvas is None:
+        if event.type != "LEFTMOUSE" or event.value != "PRESS":
             return {"PASS_THROUGH"}
-        position = self._canvas.position(event)
-        if position is None:
-            return self._leave(context, {"CANCELLED"})
-        point = point_at(self._canvas.place(position), self._size)
+        point = point_at(canvas.place(position), self._size)
         self._leave(context, set())
         if point is None:
             self.report({"WARNING"}, OUTSIDE)
@@ -230,36 +275,36 @@ class DragOnPhoto(PhotoOperator):
         """
         return path
 
-    def modal(self, context: Any, event: Any) -> set[str]:
-        """Follow press, drag and release of the left mouse button.
+    def handle_event(
+        self, context: Any, event: Any, canvas: PhotoCanvas, position: tuple[int, int]
+    ) -> set[str]:
+        """Follow press, drag and release of the left mouse button; see `PhotoOperator`.
 
         Parameters
         ----------
         context : bpy.types.Context
             Blender's context.
         event : bpy.types.Event
-            Event of the mouse or keyboard; its position is in pixels of the window.
+            Event of the mouse or keyboard.
+        canvas : PhotoCanvas
+            Where the photo is drawn.
+        position : tuple of int
+            Of the mouse.
 
         Returns
         -------
         set of str
-            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting; as of `finish` at the release;
-            {"CANCELLED"} on Esc, the right mouse button, or where the region is gone.
+            {"RUNNING_MODAL"} or {"PASS_THROUGH"} while waiting; as of `finish` at the release.
         """
-        if event.type in {"ESC", "RIGHTMOUSE"} or self._canvas is None:
-            return self._leave(context, {"CANCELLED"})
-        position = self._canvas.position(event)
-        if position is None:
-            return self._leave(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
             self._path = [position]
         elif self._path is None:
             return {"PASS_THROUGH"}  # so that the view can still be moved
         elif event.type == "MOUSEMOVE":
             self._path.append(position)
-            self._canvas.redraw()
+            canvas.redraw()
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE":
-            return self.finish(context, self._canvas, [*self._path, position])
+            return self.finish(context, canvas, [*self._path, position])
         return {"RUNNING_MODAL"}
 
     def draw_over(self) -> None:

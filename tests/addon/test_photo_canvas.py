@@ -11,12 +11,17 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.operators.mask import ISC_OT_draw_box  # noqa: E402 (after the skip)
-from blender_addon.operators.photo_operators import StrokeOnPhoto, points_along  # noqa: E402
+from blender_addon.operators.photo_operators import (  # noqa: E402
+    ClickOnPhoto,
+    PhotoOperator,
+    StrokeOnPhoto,
+    points_along,
+)
 
 SIZE = (200, 100)
 
 
-class Stroke(StrokeOnPhoto):
+class OnPhoto(PhotoOperator):
     """On a photo of 200 x 100 pixels that fills its region."""
 
     def __init__(self) -> None:
@@ -33,15 +38,26 @@ class Stroke(StrokeOnPhoto):
     def report(self, kind: set[str], text: str) -> None:
         self.reports.append(text)
 
-    def use_points(self, settings: Any, points: Sequence[str]) -> None:
-        self.taken += points
-
     def follow(self, *events: tuple[str, str, tuple[int, int] | None]) -> list[set[str]]:
         context = SimpleNamespace(window=None, scene=SimpleNamespace(isc=None))
         return [
             self.modal(context, SimpleNamespace(type=kind, value=value, position=position))
             for kind, value, position in events
         ]
+
+
+class Stroke(OnPhoto, StrokeOnPhoto):
+    """Marks points."""
+
+    def use_points(self, settings: Any, points: Sequence[str]) -> None:
+        self.taken += points
+
+
+class Click(OnPhoto, ClickOnPhoto):
+    """Marks a point."""
+
+    def use_point(self, settings: Any, point: str) -> None:
+        self.taken.append(point)
 
 
 def test_a_click_is_one_point() -> None:
@@ -82,6 +98,30 @@ def test_what_ends_a_stroke_without_points(
     stroke = Stroke()
     assert stroke.follow(*events)[-1] == {"CANCELLED"}
     assert not stroke.taken and len(stroke.reports) == reports and stroke._canvas is None
+
+
+@pytest.mark.parametrize(
+    ("event", "reports"),
+    [
+        (("ESC", "PRESS", (5, 5)), 0),
+        (("RIGHTMOUSE", "PRESS", (5, 5)), 0),
+        (("MOUSEMOVE", "NOTHING", None), 0),  # the region is gone
+        (("LEFTMOUSE", "PRESS", (-5, 5)), 1),
+    ],
+)
+def test_what_ends_a_click_without_a_point(
+    event: tuple[str, str, tuple[int, int] | None], reports: int
+) -> None:
+    click = Click()
+    assert click.follow(event) == [{"CANCELLED"}]
+    assert not click.taken and len(click.reports) == reports and click._canvas is None
+
+
+def test_a_pressed_button_is_a_click_and_other_events_pass() -> None:
+    click = Click()
+    ended = click.follow(("MOUSEMOVE", "NOTHING", (3, 3)), ("LEFTMOUSE", "PRESS", (40, 20)))
+    assert ended == [{"PASS_THROUGH"}, {"FINISHED"}]
+    assert click.taken == ["40,80"] and not click.reports
 
 
 @pytest.mark.parametrize("seed", range(3))
