@@ -126,7 +126,8 @@ def refine(
         "variant": str(load_mitsuba().variant()),
         **options.__dict__,
     }
-    result = _refined(d, surface, fit.radiance, monitor.part(0.7, 1.0)) if kept else d
+    of_pixels = transport if scale.step == 1 else None  # the points of the scale are the pixels
+    result = _refined(d, surface, fit.radiance, of_pixels, monitor.part(0.7, 1.0)) if kept else d
     return Refinement(_noted(result, note), kept, fit.before, fit.after)
 
 
@@ -215,20 +216,25 @@ def _check(d: Decomposition) -> None:
 
 
 def _refined(
-    d: Decomposition, surface: Surface, radiance: np.ndarray, monitor: Monitor
+    d: Decomposition,
+    surface: Surface,
+    radiance: np.ndarray,
+    transport: Transport | None,
+    monitor: Monitor,
 ) -> Decomposition:
-    """The result under a new light."""
+    """The result under a new light; `transport`: to its pixels, None if it is to be traced."""
     rows = int(np.sqrt(len(radiance) / 2))
     points, parts = surface.points(), []
     for first in range(0, len(points), _PIXELS):
-        part = points[first : first + _PIXELS]
+        part = slice(first, first + _PIXELS)
         monitor.report("rendering the light", first / len(points))
-        transport = light_transport(surface, part, rows)
-        open_sky, direct = (
-            np.einsum("nj,jc->nc", each, radiance)
-            for each in (transport.unshadowed, transport.shadowed)
+        found = (
+            light_transport(surface, points[part], rows) if transport is None else transport[part]
         )
-        parts.append((open_sky, direct, transport.indirect))
+        open_sky, direct = (
+            np.einsum("nj,jc->nc", each, radiance) for each in (found.unshadowed, found.shadowed)
+        )
+        parts.append((open_sky, direct, found.indirect))
     open_sky, direct, indirect = (np.concatenate(each) for each in zip(*parts, strict=True))
     direct = np.maximum(direct, 1e-3 * direct.mean())
     normal = points.normal

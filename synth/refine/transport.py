@@ -44,6 +44,9 @@ class Transport:
     shadowed: np.ndarray
     indirect: np.ndarray
 
+    def __getitem__(self, part: slice) -> "Transport":
+        return Transport(self.unshadowed[part], self.shadowed[part], self.indirect[part])
+
 
 def light_transport(
     surface: Surface, points: SurfacePoints, rows: int, monitor: Monitor | None = None

@@ -3,6 +3,7 @@
 import argparse
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -171,10 +172,15 @@ def shadowed_dome(size: int = 96) -> Decomposition:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("size", [96, 480])
-def test_a_refined_result_keeps_every_identity_and_its_files(tmp_path: Path, size: int) -> None:
+def test_a_refined_result_keeps_every_identity_and_its_files(
+    tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    traced = Mock(side_effect=light_transport)
+    monkeypatch.setattr("synth.refine.refine.light_transport", traced)
     start = shadowed_dome(size)
     done = refine(start)
     assert done.kept and done.after < done.before
+    assert (traced.call_count == 1) == (size == 96), "the working scale has the pixels of the maps"
     d = done.result
     assert d.visibility is not None and d.indirect is not None and d.environment is not None
     assert not d.identity_errors().broken()
