@@ -44,8 +44,7 @@ from isc_core.shading.environment_map import (
 from synth.capture.truth import render_truth
 from synth.refine.light_objective import shading_of
 from synth.refine.refine import RefineOptions, fit_environment
-from synth.refine.surface import Surface
-from synth.refine.transport import Transport, light_transport
+from synth.refine.transport import Transport, transport_of
 from synth.rendering import RenderOptions
 from synth.scene.lights import DirectionalLight
 
@@ -141,7 +140,7 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
     wanted = truth["shading"][mask].astype(float)
     light = resampled(truth["environment"], _ROWS).reshape(-1, 3).astype(float)
     true_shape = replace(start, normal=truth["normal"], height=truth["height"])
-    of_truth, of_start = (transport_of(d) for d in (true_shape, start))
+    of_truth, of_start = (transport_of(d, _ROWS) for d in (true_shape, start))
     recovered = environment_from_shading(start.illumination, _ROWS, viewer=start.viewer)
     old = start.shading[mask].astype(float)
     first = Step("start", old, recovered.reshape(-1, 3).astype(float), of_start, diffuse)
@@ -157,22 +156,6 @@ def steps(start: Decomposition, truth: dict[str, np.ndarray]) -> Iterator[Step]:
     fit = fit_environment(start, working_scale(start), of_start, options, Monitor())
     kept = fit.after < fit.before and fit.explains_better
     yield Step("c", fit.shading, fit.radiance, of_start, diffuse, kept)
-
-
-def transport_of(d: Decomposition) -> Transport:
-    """Return the transport to the pixels of a result.
-
-    Parameters
-    ----------
-    d : Decomposition
-        At its working scale: the object is at most 192 pixels long.
-
-    Returns
-    -------
-    Transport
-    """
-    surface = Surface(d)
-    return light_transport(surface, surface.points(), _ROWS)
 
 
 def nearest(transport: Transport, shading: np.ndarray) -> np.ndarray:

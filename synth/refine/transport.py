@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import directions, solid_angles
 
 from .surface import Surface, SurfacePoints
@@ -89,3 +90,27 @@ def light_transport(
         reflected = surface.radiance(points.lifted[point], towards[light])
         np.add.at(indirect, point, unshadowed[point, light, None] * reflected)
     return Transport(unshadowed, shadowed, indirect)
+
+
+def transport_of(d: Decomposition, rows: int) -> Transport:
+    """Trace the transport to the pixels of a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+        All of its transport is in memory at a time.
+    rows : int
+        Of the environment.
+
+    Returns
+    -------
+    Transport
+        To the pixels of the mask, row by row.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is missing.
+    """
+    surface = Surface(d)
+    return light_transport(surface, surface.points(), rows)

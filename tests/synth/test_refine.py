@@ -27,7 +27,7 @@ from synth.refine.light_field import LightField
 from synth.refine.light_objective import LightObjective
 from synth.refine.refine import RefineOptions, refine
 from synth.refine.surface import Surface
-from synth.refine.transport import Transport, light_transport
+from synth.refine.transport import light_transport, transport_of
 from synth.scene.variant import load_mitsuba
 
 LIGHT = np.zeros((9, 3))
@@ -55,17 +55,12 @@ def dome(size: int = 48, *, wall: bool = False) -> Decomposition:
     )  # fmt: skip
 
 
-def transport_of(d: Decomposition, rows: int = 8) -> Transport:
-    surface = Surface(d)
-    return light_transport(surface, surface.points(), rows)
-
-
 def objective(d: Decomposition) -> tuple[LightObjective, LightField]:
     light = np.where(d.mask[..., None], np.log(np.maximum(d.diffuse, 1e-4)), 0).astype(float)
     light += np.where(d.mask[..., None], np.random.default_rng(0).normal(0, 0.1, light.shape), 0)
     terms = ReflectanceTerms(light, d.mask, shipped_priors("photo", 3), isc_weights("photo", 3))
     field = LightField.around(np.maximum(environment_from_shading(LIGHT, 8), 1e-3))
-    found = transport_of(d)
+    found = transport_of(d, 8)
     direct, indirect = found.shadowed.astype(float), found.indirect.astype(float)
     return LightObjective(terms, field, direct, indirect, d.mask.astype(float), 0.1), field
 
@@ -73,15 +68,15 @@ def objective(d: Decomposition) -> tuple[LightObjective, LightField]:
 def test_without_shadows_the_transport_is_the_shading_of_the_environment() -> None:
     d = dome()
     environment = np.random.default_rng(1).uniform(0.1, 1, (8, 16, 3))
-    found = transport_of(d).unshadowed @ environment.reshape(-1, 3)
+    found = transport_of(d, 8).unshadowed @ environment.reshape(-1, 3)
     assert np.allclose(found, shading_under(environment, d.normal[d.mask].astype(float)), rtol=1e-4)
 
 
 def test_a_convex_surface_shades_nothing_and_a_wall_shades_the_far_side() -> None:
-    convex = transport_of(dome())
+    convex = transport_of(dome(), 8)
     assert convex.shadowed.sum() > 0.98 * convex.unshadowed.sum()
     d = dome(wall=True)
-    found = transport_of(d)
+    found = transport_of(d, 8)
     across = np.nonzero(d.mask)[1] - d.mask.shape[1] / 2
     near = (across < -3) & (across > -12)
     share = found.shadowed[near].sum(0) / np.maximum(found.unshadowed[near].sum(0), 1e-9)
@@ -116,7 +111,7 @@ def test_a_bowl_lights_itself_by_its_form_factor() -> None:
 
 def test_a_convex_surface_reflects_no_light_on_itself() -> None:
     d = dome()
-    assert transport_of(d).indirect.mean() < 0.01 * d.diffuse[d.mask].mean()
+    assert transport_of(d, 8).indirect.mean() < 0.01 * d.diffuse[d.mask].mean()
 
 
 def test_points_of_blocks_get_the_mean_of_their_pixels() -> None:
@@ -124,7 +119,7 @@ def test_points_of_blocks_get_the_mean_of_their_pixels() -> None:
     surface, scale = Surface(d), working_scale(d)
     coarse = light_transport(surface, surface.points_at(scale), 8)
     fine = np.zeros((*d.mask.shape, 3))
-    fine[d.mask] = transport_of(d).indirect
+    fine[d.mask] = transport_of(d, 8).indirect
     wanted = scale.reduced(fine, d.mask)[scale.mask]
     assert scale.step == 2 and len(coarse.indirect) == len(wanted)
     assert np.abs(coarse.indirect - wanted).mean() < 0.05 * wanted.mean()

@@ -7,10 +7,11 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
+from synth.refine.transport import transport_of
 from synth.rendering import Lit, Renderer, RenderOptions, light_surface
 from synth.scene.variant import CUDA, LLVM, SCALAR, usable_variants
 from tests.synth.small_scenes import lights, materials, seen, skittle, variant
-from tests.synth.test_refine import dome, transport_of
+from tests.synth.test_refine import dome
 
 MISSING = {
     CUDA: "needs a graphics card with CUDA and OptiX, whose driver Dr.Jit can load",
@@ -75,7 +76,7 @@ def test_variants_trace_the_same_shadows(other: str) -> None:
     found = []
     for name in (LLVM, other):
         with variant(name):
-            found.append(transport_of(dome(wall=True)))
+            found.append(transport_of(dome(wall=True), 8))
     np.testing.assert_array_equal(found[0].unshadowed, found[1].unshadowed)
     hidden = [each.shadowed < each.unshadowed for each in found]
     assert hidden[0].mean() > 0.01

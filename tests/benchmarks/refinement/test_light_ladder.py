@@ -7,8 +7,9 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from benchmarks.refinement.light_ladder import Step, blocked, nearest, scores, transport_of
+from benchmarks.refinement.light_ladder import Step, blocked, nearest, scores
 from synth.refine.light_objective import shading_of
+from synth.refine.transport import transport_of
 from tests.synth.test_refine import dome
 
 ROWS = 16
@@ -19,7 +20,7 @@ LIGHT = np.random.default_rng(3).uniform(0.1, 1, (2 * ROWS**2, 1)) * np.array([[
 def step(request: pytest.FixtureRequest) -> Step:
     """A dome, and a floor with a wall, under a known light."""
     d = dome(32, wall=request.param)
-    transport = transport_of(d)
+    transport = transport_of(d, ROWS)
     shading = shading_of(transport.shadowed, LIGHT, transport.indirect)
     return Step("wall" if request.param else "dome", shading, LIGHT, transport, 0.5 * shading)
 
