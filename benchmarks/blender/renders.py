@@ -16,7 +16,7 @@ from typing import Any, Literal
 import bpy
 import numpy as np
 
-from blender_addon.datablocks.images import COLOR, map_file, new_image, replace_image
+from blender_addon.datablocks.images import COLOR, ImageRole, map_file, new_image, replace_image
 from blender_addon.files.result_arrays import ResultArrays
 from blender_addon.scene import BuildOptions, BuiltObject, build_object
 from blender_addon.scene.sun import ensure_sun
@@ -152,7 +152,7 @@ def _white() -> bpy.types.Material:
 def _relight(built: BuiltObject, new: RelitTruth) -> None:
     """Set another environment map and a sun; direct light only, as in the ground truth."""
     key = built.object["isc_key"]
-    replace_image(new_image(map_file(new.sky, COLOR)), key, "environment_map")
+    replace_image(new_image(map_file(new.sky, COLOR)), key, ImageRole.ENVIRONMENT_MAP)
     if new.sun_irradiance.any():
         sun = ensure_sun(key, built.collection, new.sun_direction, new.sun_irradiance)
         sun.data.angle = 0.0

@@ -11,6 +11,7 @@ does it while the window waits. Blender decodes one when it is drawn for the fir
 
 import zlib
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 import bpy
 import numpy as np
@@ -26,23 +27,71 @@ from .provenance import datablock_name, find_tagged, tag
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
 _FAST = 1  # compression of large textures
 _CHECKSUM = "isc_file_crc32"
-# Names of the textures in files, by role.
+
+
+class ImageRole(StrEnum):
+    """Purpose of an image of an object. The values are in files: see `provenance`.
+
+    Attributes
+    ----------
+    BASE_COLOR, PLAIN_BASE_COLOR, EDITED_BASE_COLOR
+        Textures: with the gloss of the photo, without gloss, with the user's edits.
+    NORMAL_MAP, SPECULAR_VARIATION, ALPHA
+        Other textures of the material.
+    VIEW_NORMAL
+        Normals in the photo's view, from which edits of the gloss compute a base color.
+    DISPLACEMENT, ENVIRONMENT_MAP, PHOTO
+        Of the displaced mesh, the world and the camera's background.
+    DIFFUSE, SPECULAR, RESIDUAL, REFLECTANCE, SHADING, LOBE, NORMAL, HEIGHT, CONFIDENCE, MASK
+        Maps of the result, by their names in it.
+    """
+
+    BASE_COLOR = "base_color"
+    PLAIN_BASE_COLOR = "plain_base_color"
+    EDITED_BASE_COLOR = "edited_base_color"
+    NORMAL_MAP = "normal_map"
+    SPECULAR_VARIATION = "specular_variation"
+    ALPHA = "alpha"
+    VIEW_NORMAL = "view_normal"
+    DISPLACEMENT = "displacement"
+    ENVIRONMENT_MAP = "environment_map"
+    PHOTO = "photo"
+    DIFFUSE = "diffuse"
+    SPECULAR = "specular"
+    RESIDUAL = "residual"
+    REFLECTANCE = "reflectance"
+    SHADING = "shading"
+    LOBE = "lobe"
+    NORMAL = "normal"
+    HEIGHT = "height"
+    CONFIDENCE = "confidence"
+    MASK = "mask"
+
+
+# Names of the textures in files.
 TEXTURE_NAMES = {
-    "base_color": "basecolor",
-    "plain_base_color": "basecolor_plain",
-    "edited_base_color": "basecolor_edited",
-    "normal_map": "normal",
-    "specular_variation": "specular",
-    "alpha": "alpha",
+    ImageRole.BASE_COLOR: "basecolor",
+    ImageRole.PLAIN_BASE_COLOR: "basecolor_plain",
+    ImageRole.EDITED_BASE_COLOR: "basecolor_edited",
+    ImageRole.NORMAL_MAP: "normal",
+    ImageRole.SPECULAR_VARIATION: "specular",
+    ImageRole.ALPHA: "alpha",
 }
+# The maps of a result, with their colour spaces.
 MAPS = {
-    **dict.fromkeys(("diffuse", "specular", "residual", "reflectance", "shading", "lobe"), COLOR),
-    **dict.fromkeys(("normal", "height", "confidence", "mask"), DATA),
+    ImageRole.DIFFUSE: COLOR,
+    ImageRole.SPECULAR: COLOR,
+    ImageRole.RESIDUAL: COLOR,
+    ImageRole.REFLECTANCE: COLOR,
+    ImageRole.SHADING: COLOR,
+    ImageRole.LOBE: COLOR,
+    ImageRole.NORMAL: DATA,
+    ImageRole.HEIGHT: DATA,
+    ImageRole.CONFIDENCE: DATA,
+    ImageRole.MASK: DATA,
 }
-
-
 # Maps that materials and exports need; the others are optional.
-USED_MAPS = ("specular", "height", "mask")
+USED_MAPS = (ImageRole.SPECULAR, ImageRole.HEIGHT, ImageRole.MASK)
 
 
 def require_color_spaces(*names: str) -> None:
@@ -221,7 +270,7 @@ def unmodified_file(image: bpy.types.Image) -> bytes:
     return data if f"{zlib.crc32(data):08x}" == image[_CHECKSUM] else b""
 
 
-def replace_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Image:
+def replace_image(image: bpy.types.Image, key: str, role: ImageRole) -> bpy.types.Image:
     """Name and tag an image, and replace the previous one of that role everywhere.
 
     A generated image loses its pixels when resized in place, so it is replaced instead.
@@ -232,8 +281,7 @@ def replace_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Imag
         A new image.
     key : str
         Name of the photo.
-    role : str
-        Purpose of the image.
+    role : ImageRole
 
     Returns
     -------
@@ -249,13 +297,14 @@ def replace_image(image: bpy.types.Image, key: str, role: str) -> bpy.types.Imag
     return tag(image, key, role)
 
 
-def image_name(key: str, role: str) -> str:
+def image_name(key: str, role: ImageRole) -> str:
     """Return the name of an image, from which exporters make that of its file.
 
     Parameters
     ----------
-    key, role : str
-        As of `replace_image`.
+    key : str
+        Name of the photo.
+    role : ImageRole
 
     Returns
     -------
@@ -267,7 +316,7 @@ def image_name(key: str, role: str) -> str:
     return datablock_name(key, role.replace("_", " "))
 
 
-def map_files(result: ResultArrays, every: bool = True) -> dict[str, ImageFile]:
+def map_files(result: ResultArrays, every: bool = True) -> dict[ImageRole, ImageFile]:
     """Return the files of maps; this may run in another thread.
 
     Parameters
@@ -279,17 +328,16 @@ def map_files(result: ResultArrays, every: bool = True) -> dict[str, ImageFile]:
 
     Returns
     -------
-    dict of str to ImageFile
-        The files by map name.
+    dict of ImageRole to ImageFile
     """
     return {
-        name: map_file(getattr(result, name), space)
-        for name, space in MAPS.items()
-        if every or name in USED_MAPS
+        role: map_file(getattr(result, role), space)
+        for role, space in MAPS.items()
+        if every or role in USED_MAPS
     }
 
 
-def attach_maps(key: str, obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
+def attach_maps(key: str, obj: bpy.types.Object, maps: dict[ImageRole, bpy.types.Image]) -> None:
     """Store the images as custom properties, so that they are saved and appended with the object.
 
     Parameters
@@ -299,14 +347,13 @@ def attach_maps(key: str, obj: bpy.types.Object, maps: dict[str, bpy.types.Image
     obj : bpy.types.Object
         The object; gets the properties `isc_map_...`, and loses those of other maps, whose images
         are removed.
-    maps : dict of str to bpy.types.Image
-        The images by map name.
+    maps : dict of ImageRole to bpy.types.Image
     """
-    for name in MAPS:
-        if name in maps:
-            obj[f"isc_map_{name}"] = maps[name]
+    for role in MAPS:
+        if role in maps:
+            obj[f"isc_map_{role}"] = maps[role]
             continue
-        if f"isc_map_{name}" in obj:
-            del obj[f"isc_map_{name}"]
-        if (old := find_tagged(bpy.data.images, key, name)) is not None:
+        if f"isc_map_{role}" in obj:
+            del obj[f"isc_map_{role}"]
+        if (old := find_tagged(bpy.data.images, key, role)) is not None:
             bpy.data.images.remove(old)  # of an earlier result

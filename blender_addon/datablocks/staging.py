@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 
 import bpy
 
-from .images import ImageFile, new_image
+from .images import ImageFile, ImageRole, new_image
 from .mesh import MeshArrays, fill_mesh
 
 Outcome = TypeVar("Outcome")
@@ -24,13 +24,13 @@ class StagedBlocks:
 
     Attributes
     ----------
-    images : dict of str to int
+    images : dict of ImageRole to int
         `session_uid` of the images, by role.
     mesh : int
         `session_uid` of the mesh; 0 before it is created.
     """
 
-    images: dict[str, int] = field(default_factory=dict)
+    images: dict[ImageRole, int] = field(default_factory=dict)
     mesh: int = 0
 
     @property
@@ -39,13 +39,12 @@ class StagedBlocks:
         present = {block.session_uid for block in (*bpy.data.images, *bpy.data.meshes)}
         return present.issuperset((*self.images.values(), self.mesh))
 
-    def take_image(self, role: str) -> bpy.types.Image | None:
+    def take_image(self, role: ImageRole) -> bpy.types.Image | None:
         """Hand over an image, which is then no longer one of these.
 
         Parameters
         ----------
-        role : str
-            Its role.
+        role : ImageRole
 
         Returns
         -------
@@ -78,13 +77,13 @@ class StagedBlocks:
 
 
 def stage(
-    files: Mapping[str, ImageFile], arrays: MeshArrays, base: int = 0
+    files: Mapping[ImageRole, ImageFile], arrays: MeshArrays, base: int = 0
 ) -> Generator[None, None, StagedBlocks]:
     """Create images and a mesh, one datablock per step; removes them if closed early.
 
     Parameters
     ----------
-    files : dict of str to ImageFile
+    files : dict of ImageRole to ImageFile
         Files of the images, by role.
     arrays : MeshArrays
         The mesh.

@@ -24,7 +24,7 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..datablocks.images import ImageFile, image_name, new_image
+from ..datablocks.images import ImageFile, ImageRole, image_name, new_image
 from ..datablocks.nodes import add_node
 from ..datablocks.provenance import KEY, ROLE, all_tagged, tag
 from .color_bake import (
@@ -49,7 +49,7 @@ from .gloss_edits import (
 _NUMBERS, _COLOR = "isc_written_numbers", "isc_written_color"
 _FORMER_FACTOR = "Specular Share"
 _GLOSS_MARK = "\n"  # before the gloss in the text of a state
-_EDITED_ROLE, _STATE = "edited_base_color", "isc_edits"  # of an image: the edits it shows
+_STATE = "isc_edits"  # of an image: the edits it shows
 
 
 def apply_edits(material: bpy.types.Material) -> bool:
@@ -192,8 +192,8 @@ def finish_bake(material: bpy.types.Material, state: str, file: ImageFile) -> No
     if surface is None or group is None:
         return
     key = _key(material)
-    image = tag(new_image(file), key, _EDITED_ROLE)
-    image.name, image[_STATE] = image_name(key, _EDITED_ROLE), state
+    image = tag(new_image(file), key, ImageRole.EDITED_BASE_COLOR)
+    image.name, image[_STATE] = image_name(key, ImageRole.EDITED_BASE_COLOR), state
     _show_edited(material, surface, group, image)
 
 
@@ -333,7 +333,7 @@ def _can_bake(material: bpy.types.Material, group: bpy.types.Node) -> bool:
 
 
 def _edited_images(material: bpy.types.Material) -> Iterator[bpy.types.Image]:
-    return all_tagged(bpy.data.images, _key(material), _EDITED_ROLE)
+    return all_tagged(bpy.data.images, _key(material), ImageRole.EDITED_BASE_COLOR)
 
 
 def _key(material: bpy.types.Material) -> str:
@@ -379,5 +379,5 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
 def _replace_image(node: Any, image: bpy.types.Image | None) -> None:
     """A new datablock each time: undo restores the pixels of one only with its datablock."""
     old, node.image = node.image, image
-    if old is not None and old.users == 0 and old.get(ROLE) == _EDITED_ROLE:
+    if old is not None and old.users == 0 and old.get(ROLE) == ImageRole.EDITED_BASE_COLOR:
         bpy.data.images.remove(old)

@@ -20,6 +20,7 @@ from bpy.props import BoolProperty, EnumProperty, StringProperty
 from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
+from ..datablocks.images import ImageRole
 from ..datablocks.provenance import KEY, ROLE
 from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
 from ..runs.messages import reason_line, sentence
@@ -32,9 +33,19 @@ from .texture_set import linked_image, write_texture_set
 
 _EXR_MAGIC, _PNG_MAGIC = b"v/1\x01", b"\x89PNG"
 # Names of the recovered maps in files, where they differ from the role.
-_MAP_NAMES = {"lobe": "specular_fit", "residual": "difference", "reflectance": "albedo"}
+_MAP_NAMES: dict[str, str] = {
+    ImageRole.LOBE: "specular_fit",
+    ImageRole.RESIDUAL: "difference",
+    ImageRole.REFLECTANCE: "albedo",
+}
 # Light and camera are the scene's; textures are the material's.
-_NOT_MAPS = ("environment_map", "photo", "base_color", "edited_base_color", "normal_map")
+_NOT_MAPS = (
+    ImageRole.ENVIRONMENT_MAP,
+    ImageRole.PHOTO,
+    ImageRole.BASE_COLOR,
+    ImageRole.EDITED_BASE_COLOR,
+    ImageRole.NORMAL_MAP,
+)
 _FORMATS = (
     ("GLB", "glTF Binary (.glb)", "One file with textures, for most programs and the web"),
     ("USD", "USD (.usdc)", "Universal Scene Description with preview surface and textures"),

@@ -24,7 +24,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..datablocks.images import SRGB, image_name, new_image, texture_file
+from ..datablocks.images import SRGB, ImageRole, image_name, new_image, texture_file
 from ..datablocks.nodes import node_tree
 from ..datablocks.provenance import SPECULAR_LEVEL
 from ..materials.color_bake import linear_colors, recolour_reflectance
@@ -145,5 +145,5 @@ def _bake(image: bpy.types.Image, hue: float, saturation: float, gain: float) ->
     """The edited reflectance, 8 bits, sRGB."""
     edited = recolour_reflectance(linear_colors(image), hue, saturation, gain)
     baked = new_image(texture_file(edited[::-1], SRGB))
-    baked.name = image_name("plain", "base_color")
+    baked.name = image_name("plain", ImageRole.BASE_COLOR)
     return baked

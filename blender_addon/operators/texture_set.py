@@ -30,6 +30,7 @@ from isc_core.result_files.exports.targets import PACKED, TARGETS
 from isc_core.result_files.solids.solid_mesh import continued
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 
+from ..datablocks.images import ImageRole
 from ..materials.color_bake import linear_colors
 from ..materials.edit_nodes import LEVEL_FACTOR, PLASTIC, specular_level, surface_node
 from ..scene.built_object import BuiltObject
@@ -116,7 +117,7 @@ class _Planes:
                 "texture, or bake it"
             )
         colors = linear_colors(image)[::-1]
-        mask = self._map("mask")
+        mask = self._map(ImageRole.MASK)
         rows, columns = (
             (np.arange(size) + 0.5) * of / size
             for size, of in zip(colors.shape, mask.shape, strict=False)
@@ -171,14 +172,14 @@ class _Planes:
 
     @property
     def height(self) -> np.ndarray:
-        height, mask = self._map("height"), self._map("mask") > 0.5
+        height, mask = self._map(ImageRole.HEIGHT), self._map(ImageRole.MASK) > 0.5
         low, high = height[mask].min(), height[mask].max()
         share = np.clip((height - low) / max(high - low, 1e-12), 0, 1)
         return np.clip(self._fine(np.where(mask, share, 0)), 0, 1)
 
     @cached_property
     def ao(self) -> np.ndarray:
-        share = ambient_occlusion(self._map("height"), self._map("mask") > 0.5)
+        share = ambient_occlusion(self._map(ImageRole.HEIGHT), self._map(ImageRole.MASK) > 0.5)
         return np.clip(self._fine(share.astype(float)), 0, 1)
 
     @property
@@ -187,7 +188,7 @@ class _Planes:
 
     def _fine(self, values: np.ndarray) -> np.ndarray:
         """Values of the maps at the size of the textures."""
-        mask = self._map("mask") > 0.5
+        mask = self._map(ImageRole.MASK) > 0.5
         if values.shape[:2] == mask.shape != self.size:
             near = mask
             for _ in range(_REACH):
@@ -199,10 +200,10 @@ class _Planes:
             values = np.where(beside, continued(values, mask, near), values)
         return enlarged_cubically(values.astype(np.float32), self.size)
 
-    def _map(self, name: str) -> np.ndarray:
-        image = self.built.object.get(f"isc_map_{name}")
+    def _map(self, role: ImageRole) -> np.ndarray:
+        image = self.built.object.get(f"isc_map_{role}")
         if image is None:
-            raise InputError(f"{self.built.object.name} lacks its {name} map: create it again")
+            raise InputError(f"{self.built.object.name} lacks its {role} map: create it again")
         return linear_colors(image)[::-1, :, 0]
 
 

@@ -17,6 +17,7 @@ from ..datablocks.images import (
     DATA,
     MAPS,
     SRGB,
+    ImageRole,
     attach_maps,
     replace_image,
     require_color_spaces,
@@ -58,6 +59,13 @@ from .world import ensure_world
 LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 
 _NO_LAMPS = np.zeros((0, 3))
+# Textures that only some builds have.
+_OPTIONAL_TEXTURES = (
+    ImageRole.NORMAL_MAP,
+    ImageRole.ALPHA,
+    ImageRole.PLAIN_BASE_COLOR,
+    ImageRole.VIEW_NORMAL,
+)
 
 
 @dataclass(frozen=True)
@@ -243,11 +251,11 @@ def _place(
         if (image := blocks.take_image(role)) is not None
     }
     maps = MaterialMaps(
-        base_color=images["base_color"],
-        specular=images["specular"],
-        variation=images.get("specular_variation"),
-        normal=images.get("normal_map"),
-        alpha=images.get("alpha"),
+        base_color=images[ImageRole.BASE_COLOR],
+        specular=images[ImageRole.SPECULAR],
+        variation=images.get(ImageRole.SPECULAR_VARIATION),
+        normal=images.get(ImageRole.NORMAL_MAP),
+        alpha=images.get(ImageRole.ALPHA),
         basis=_gloss_basis(result, images),
     )
     material = ensure_material(key, maps, prepared.specular)
@@ -255,13 +263,13 @@ def _place(
     is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
     obj = _ensure_object(key, collection, prepared, blocks.take_mesh(), material)
     if options.displacement:
-        add_displacement(key, obj, images["displacement"], result.eye is not None)
+        add_displacement(key, obj, images[ImageRole.DISPLACEMENT], result.eye is not None)
     else:
         remove_displacement(key, obj)
     if is_new:
         _position(obj, options, scene, *position)
-    attach_maps(key, obj, {name: images[name] for name in MAPS if name in images})
-    world = ensure_world(key, images["environment_map"], result.sun_ambient, options.sun)
+    attach_maps(key, obj, {role: images[role] for role in MAPS if role in images})
+    world = ensure_world(key, images[ImageRole.ENVIRONMENT_MAP], result.sun_ambient, options.sun)
     # So that the light is saved and appended with the object even if no scene uses it.
     obj["isc_world"] = world
     for block in (obj, collection):
@@ -270,7 +278,7 @@ def _place(
     ensure_lamps(key, collection, *_lamps(result) if lamps else (_NO_LAMPS, _NO_LAMPS))
     relight(obj, options.sun)
     camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
-    photo = photo or images.get("photo")
+    photo = photo or images.get(ImageRole.PHOTO)
     if camera is not None and photo is not None:
         set_background_photo(camera, photo)
     built = BuiltObject(collection, obj, camera, world, scene, material)
@@ -386,22 +394,24 @@ def _ensure_camera_and_light(
     )
 
 
-def _gloss_basis(result: ResultArrays, images: dict[str, bpy.types.Image]) -> GlossBasis | None:
-    if "plain_base_color" not in images:
+def _gloss_basis(
+    result: ResultArrays, images: dict[ImageRole, bpy.types.Image]
+) -> GlossBasis | None:
+    if ImageRole.PLAIN_BASE_COLOR not in images:
         return None
     return GlossBasis(
-        images["plain_base_color"],
-        images["view_normal"],
+        images[ImageRole.PLAIN_BASE_COLOR],
+        images[ImageRole.VIEW_NORMAL],
         recovered_light(result).numbers,
-        images.get("specular_variation"),
+        images.get(ImageRole.SPECULAR_VARIATION),
     )
 
 
-def _remove_unused(key: str, images: dict[str, bpy.types.Image]) -> None:
+def _remove_unused(key: str, images: dict[ImageRole, bpy.types.Image]) -> None:
     """Remove the textures of an earlier build that this one lacks: its mesh had fewer triangles, or
     a soft rim, or its material gloss.
     """
-    for role in ("normal_map", "alpha", "plain_base_color", "view_normal"):
+    for role in _OPTIONAL_TEXTURES:
         old = find_tagged(bpy.data.images, key, role)
         if role not in images and old is not None and old.users == 0:
             bpy.data.images.remove(old)

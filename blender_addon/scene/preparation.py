@@ -16,6 +16,7 @@ from ..datablocks.images import (
     DATA,
     SRGB,
     ImageFile,
+    ImageRole,
     coded_file,
     map_file,
     map_files,
@@ -112,8 +113,8 @@ class PreparedObject:
         The mesh.
     checksum : str
         Of the mesh, see `hand_edits`.
-    files : dict of str to ImageFile
-        The files of the images, by role; "photo" is one of them if no image of the file shows it.
+    files : dict of ImageRole to ImageFile
+        The files of the images; `PHOTO` is one of them if no image of the file shows it.
     specular : SpecularSettings
         The specular part of the material.
     offset : tuple of float
@@ -124,7 +125,7 @@ class PreparedObject:
     options: BuildOptions
     mesh: MeshArrays
     checksum: str
-    files: dict[str, ImageFile]
+    files: dict[ImageRole, ImageFile]
     specular: SpecularSettings
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -158,27 +159,31 @@ def prepare(
     mesh = mesh_arrays(geometry)
     specular = _specular_settings(result, options)
     files = map_files(result, options.all_maps)
-    files["environment_map"] = map_file(result.environment_map, COLOR)
+    files[ImageRole.ENVIRONMENT_MAP] = map_file(result.environment_map, COLOR)
     surface = coated_surface(result)
     is_matt = options.specular_from == "none"
     layer = None if is_matt else surface.layer(specular.level, specular.roughness)
-    files["base_color"] = _base_color(result, layer)
+    files[ImageRole.BASE_COLOR] = _base_color(result, layer)
     if layer is not None:
-        files["plain_base_color"] = _base_color(result, None)
-        files["view_normal"] = replace(coded_file(encode_normals(surface.normal)), space=DATA)
+        files[ImageRole.PLAIN_BASE_COLOR] = _base_color(result, None)
+        files[ImageRole.VIEW_NORMAL] = replace(
+            coded_file(encode_normals(surface.normal)), space=DATA
+        )
     if result.specular_variation is not None:
         values = result.specular_variation / _peak(result)
-        files["specular_variation"] = texture_file(values, DATA)
+        files[ImageRole.SPECULAR_VARIATION] = texture_file(values, DATA)
     # A mesh with a vertex per pixel has all detail in its own normals.
     if np.abs(normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
-        files["normal_map"] = texture_file(normal_map, DATA)
+        files[ImageRole.NORMAL_MAP] = texture_file(normal_map, DATA)
     # The mesh of the result ends at its pixels, where the rim is soft, too.
     if result.alpha is not None and options.back and not options.displacement:
-        files["alpha"] = texture_file(result.alpha / 255, DATA)
+        files[ImageRole.ALPHA] = texture_file(result.alpha / 255, DATA)
     if options.displacement:
-        files["displacement"] = map_file(displacement_map(result, options.size_metres), DATA)
+        files[ImageRole.DISPLACEMENT] = map_file(
+            displacement_map(result, options.size_metres), DATA
+        )
     if with_photo:
-        files["photo"] = map_file(result.image, COLOR, result.mask)
+        files[ImageRole.PHOTO] = map_file(result.image, COLOR, result.mask)
     return PreparedObject(result, options, mesh, mesh_checksum(mesh), files, specular)
 
 
