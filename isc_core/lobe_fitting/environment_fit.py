@@ -11,6 +11,7 @@ Limits: where the environment map is smooth, all alphas of the grid explain the 
 alpha is undetermined.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,11 +82,8 @@ def fit_under_environment(
     InputError
         If the environment map is unusable.
     """
-    from scipy.optimize import minimize_scalar
-
     mask = observed.mask
     environment = _checked(radiance)
-    convention = CONVENTION[options.model]
     if not radiance.any():
         return LobeFit.without_lobe(
             options.model, LobeFitOutcome.NO_SPECULAR, observed.specular.shape
@@ -93,34 +91,21 @@ def fit_under_environment(
     smallest = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
     nodes = np.linspace(np.log(smallest), np.log(ALPHAS[1]), _NODES)
     candidates = [_candidate(environment, pixels, options, node) for node in nodes]
-    best = int(np.argmin([t.loss for t in candidates]))
-    low, high = nodes[max(best - 1, 0)], nodes[min(best + 1, _NODES - 1)]
-    found = minimize_scalar(
-        lambda node: _candidate(environment, pixels, options, node).loss,
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 1e-3, "maxiter": 14},
-    )
-    chosen = _candidate(environment, pixels, options, float(found.x))
-    alpha = float(np.exp(chosen.log_alpha))
-    strength, image = _coloured(environment, pixels, chosen, observed, options)
+    best = _refined(environment, pixels, options, candidates)
+    alpha = float(np.exp(best.log_alpha))
+    strength, image = _coloured(environment, pixels, best, observed, options)
     given = observed.specular_at(mask)
     remaining, total = np.square(given - image[mask]).sum(), float(np.square(given).sum())
     explained = float(np.clip(1 - remaining / max(total, 1e-300), 0, 1))
-    sd_alpha, sd_strength, allowed = _deviations(environment, pixels, chosen, options)
-    far = [
-        t for t in candidates if abs(t.log_alpha - chosen.log_alpha) > np.log(_UNDETERMINED_FACTOR)
-    ]
-    undetermined = any(t.loss - chosen.loss < allowed or _equal(t, chosen, pixels) for t in far)
-    outcome = (
-        LobeFitOutcome.UNEXPLAINED
-        if explained < _MIN_EXPLAINED
-        else LobeFitOutcome.SMOOTH_LIGHT
-        if undetermined
-        else LobeFitOutcome.NARROW
-        if pixels.bright < _MIN_PEAK_PIXELS
-        else LobeFitOutcome.DETERMINED
-    )
+    sd_alpha, sd_strength, allowed = _deviations(environment, pixels, best, options)
+    if explained < _MIN_EXPLAINED:
+        outcome = LobeFitOutcome.UNEXPLAINED
+    elif _is_undetermined(candidates, best, pixels, allowed):
+        outcome = LobeFitOutcome.SMOOTH_LIGHT
+    elif pixels.bright < _MIN_PEAK_PIXELS:
+        outcome = LobeFitOutcome.NARROW
+    else:
+        outcome = LobeFitOutcome.DETERMINED
     factor = float(np.exp(min(sd_strength, 20)))
     interval = Interval(
         max(alpha * np.exp(-sd_alpha), ALPHAS[0]), min(alpha * np.exp(sd_alpha), 1.0)
@@ -129,7 +114,7 @@ def fit_under_environment(
         alpha, interval = float(interval.high), Interval(ALPHAS[0], interval.high)
     known = outcome in (LobeFitOutcome.DETERMINED, LobeFitOutcome.NARROW)
     return LobeFit(
-        convention,
+        CONVENTION[options.model],
         outcome,
         alpha if known else None,
         interval if known else None,
@@ -138,6 +123,37 @@ def fit_under_environment(
         Interval(strength / factor, strength * factor),
         explained,
         image,
+    )
+
+
+def _refined(
+    environment: SplitEnvironment,
+    pixels: Pixels,
+    options: LobeFitOptions,
+    candidates: Sequence[_Candidate],
+) -> _Candidate:
+    """The minimum of the loss between the neighbours of the best node of the grid."""
+    from scipy.optimize import minimize_scalar
+
+    best = int(np.argmin([one.loss for one in candidates]))
+    low, high = candidates[max(best - 1, 0)], candidates[min(best + 1, len(candidates) - 1)]
+    found = minimize_scalar(
+        lambda node: _candidate(environment, pixels, options, node).loss,
+        bounds=(low.log_alpha, high.log_alpha),
+        method="bounded",
+        options={"xatol": 1e-3, "maxiter": 14},
+    )
+    return _candidate(environment, pixels, options, float(found.x))
+
+
+def _is_undetermined(
+    candidates: Sequence[_Candidate], best: _Candidate, pixels: Pixels, allowed: float
+) -> bool:
+    """Whether an alpha far from the best one explains the image as well."""
+    return any(
+        one.loss - best.loss < allowed or _equal(one, best, pixels)
+        for one in candidates
+        if abs(one.log_alpha - best.log_alpha) > np.log(_UNDETERMINED_FACTOR)
     )
 
 

@@ -233,6 +233,43 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         metavar="NAME",
         help=f"separation method, see below (default {defaults.separator})",
     )
+    _add_scene_settings(group, defaults)
+    group.add_argument(
+        "--highlight-odds",
+        type=not_negative,
+        default=defaults.highlight_odds,
+        metavar="N",
+        help="for joint: odds of a highlight against print that removed light must exceed; 1: "
+        "remove what is more likely a highlight, 0: remove all that colour and shape find "
+        "(default %(default)s)",
+    )
+    group.add_argument(
+        "--shading-only",
+        action="store_true",
+        help="assume that the object has one colour (shape from shading)",
+    )
+    group.add_argument(
+        "--confidence-weights",
+        action="store_true",
+        help="for joint and mdr: weight pixels by the confidence of their separation",
+    )
+    group.add_argument(
+        "--priors",
+        type=Path,
+        metavar="FILE",
+        help="priors written by isc fit-priors (default: those of the package)",
+    )
+    group.add_argument(
+        "--seed",
+        type=count,
+        default=defaults.seed,
+        metavar="N",
+        help="random seed, recorded in the result (default %(default)s)",
+    )
+
+
+def _add_scene_settings(group: argparse._ArgumentGroup, defaults: Settings) -> None:
+    """What is assumed of light, shape and camera."""
     group.add_argument(
         "--illumination",
         choices=ILLUMINATIONS,
@@ -271,38 +308,6 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         metavar="NAME|MM",
         help="auto (the focal length in the photo's EXIF, orthographic without it), orthographic, "
         "or a 35 mm equivalent focal length in mm, based on the diagonal (default %(default)s)",
-    )
-    group.add_argument(
-        "--highlight-odds",
-        type=not_negative,
-        default=defaults.highlight_odds,
-        metavar="N",
-        help="for joint: odds of a highlight against print that removed light must exceed; 1: "
-        "remove what is more likely a highlight, 0: remove all that colour and shape find "
-        "(default %(default)s)",
-    )
-    group.add_argument(
-        "--shading-only",
-        action="store_true",
-        help="assume that the object has one colour (shape from shading)",
-    )
-    group.add_argument(
-        "--confidence-weights",
-        action="store_true",
-        help="for joint and mdr: weight pixels by the confidence of their separation",
-    )
-    group.add_argument(
-        "--priors",
-        type=Path,
-        metavar="FILE",
-        help="priors written by isc fit-priors (default: those of the package)",
-    )
-    group.add_argument(
-        "--seed",
-        type=count,
-        default=defaults.seed,
-        metavar="N",
-        help="random seed, recorded in the result (default %(default)s)",
     )
 
 
