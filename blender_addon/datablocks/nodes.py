@@ -1,4 +1,4 @@
-"""Helpers for node trees."""
+"""Node trees: access to them, new nodes, links."""
 
 from typing import Any
 

@@ -4,7 +4,7 @@ Image, drag and drop.
 A photo with transparency is created at once. The mask of any other is found first, and shown: the
 user accepts it with Create Object, or corrects it.
 
-Limits: transparency is told from the number of bits per pixel, not from the pixels.
+Limits: transparency is inferred from the number of bits per pixel, not from the pixels.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)

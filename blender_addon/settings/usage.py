@@ -1,4 +1,4 @@
-"""Which settings have no effect beside the others, and why: the panels grey them out and say so."""
+"""Which settings have no effect with the others, and why; the panels disable these settings."""
 
 from typing import Any
 

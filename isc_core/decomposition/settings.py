@@ -250,7 +250,7 @@ class Settings:
 
     @property
     def separates_by_colour(self) -> bool:
-        """Whether the separator decides by colour alone: this model asks form itself."""
+        """Whether the separator decides by colour alone: the model joint tests form itself."""
         return self.model == "joint"
 
     @property

@@ -45,7 +45,7 @@ SUMMARIES = {
 METHODS = tuple(SUMMARIES)
 PUBLISHED = tuple(name for name in METHODS if name[-4:].isdigit())
 BEST = "isc"
-COLOUR_ALONE = {"odds": 0.0}  # changes options of `BEST`: form has no say
+COLOUR_ALONE = {"odds": 0.0}  # changes options of `BEST`: form is ignored
 IMPROVED = "improved"
 # That light is a highlight and no paint, to be exceeded (`support.highlight_evidence`).
 HIGHLIGHT_ODDS = 4.0

@@ -1,5 +1,5 @@
 """The separator of this project: it removes a highlight only where colour shows that it is one, and
-form does not speak for print.
+its form does not indicate print.
 
 Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). By colour alone pale
 reflectance is mistaken for a highlight, with larger errors than those of all highlights. So a
