@@ -5,7 +5,8 @@ exception that it raises. Until `cli.main` takes over, nothing has been written,
 process at once. The handler is installed before anything else is imported. Garbage collection,
 which takes a tenth of the time of imports and frees nothing, is enabled after them. BLAS runs on
 one thread unless the environment sets another number: its threads wait for work by spinning, which
-takes cores from ISC's own threads.
+takes cores from ISC's own threads. It uses the instructions of this processor even if it is older
+than it.
 
 Finalising the interpreter after a decomposition takes a third of a second and only frees memory
 that the system reclaims anyway. So the process calls the functions registered with `atexit` and
@@ -35,13 +36,23 @@ def _end(number: int, frame: object) -> None:
     os._exit(_CANCELLED)
 
 
+def _choose_blas() -> None:
+    """Set what OpenBLAS reads when NumPy is imported, unless the user has."""
+    from .numerics.blas import openblas_core_type
+
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    core_type = openblas_core_type()
+    if core_type is not None:
+        os.environ.setdefault("OPENBLAS_CORETYPE", core_type)
+
+
 def start() -> NoReturn:
     """Run `isc` with the arguments of the process, and end the process with its exit code."""
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
     gc.disable()  # until `cli.main` has imported the command
     sys.setswitchinterval(_SWITCH_INTERVAL)
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    _choose_blas()
     from .cli.main import main
 
     code = main()

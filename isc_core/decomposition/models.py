@@ -67,7 +67,8 @@ def solve(task: DecompositionTask) -> SceneEstimate:
 
 def load(settings: Settings, prior_set: PriorSet | None = None) -> None:
     """Load the resources of a model, which `solve` does otherwise: a program can do it on a thread
-    while it reads the photo.
+    while it reads the photo. `solve` waits for what is being loaded; if loading fails, it tries
+    again, and raises the error.
 
     Parameters
     ----------

@@ -7,7 +7,6 @@ convolutions in order of execution; all other arrays are specific to the network
 import importlib.resources
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import ClassVar, Self, TypeVar
 
@@ -15,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.npy import read_arrays
+from ..numerics.thread_pool import computed_once
 from .layers import weights_in
 
 AnyNetwork = TypeVar("AnyNetwork", bound="Network")
@@ -100,7 +100,7 @@ class Network:
         return _shipped(cls)  # type: ignore[arg-type]  # mypy: types are hashable
 
 
-@cache
+@computed_once
 def _shipped(kind: type[AnyNetwork]) -> AnyNetwork:
     resource = importlib.resources.files(__package__) / "data" / kind.file
     with importlib.resources.as_file(resource) as path:

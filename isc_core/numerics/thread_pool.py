@@ -6,7 +6,13 @@ and sums over tasks are taken in the order of the tasks.
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import cache, wraps
+from threading import RLock
 from types import TracebackType
+from typing import TypeVar, TypeVarTuple
+
+Arguments = TypeVarTuple("Arguments")
+Result = TypeVar("Result")
 
 
 class ThreadPool:
@@ -69,3 +75,29 @@ class ThreadPool:
 def _drain(pending: Iterator[Callable[[], None]]) -> None:
     for task in pending:  # a list's iterator yields each task to one thread only
         task()
+
+
+def computed_once(
+    function: Callable[[*Arguments], Result],
+) -> Callable[[*Arguments], Result]:
+    """Keep the results of a function; a thread that needs one being computed waits for it.
+
+    With `functools.cache`, both threads would compute it. An exception is not kept.
+
+    Parameters
+    ----------
+    function : callable
+        Of hashable arguments.
+
+    Returns
+    -------
+    callable
+    """
+    kept, lock = cache(function), RLock()
+
+    @wraps(function)
+    def waiting(*arguments: *Arguments) -> Result:
+        with lock:
+            return kept(*arguments)
+
+    return waiting

@@ -13,7 +13,6 @@ their first call.
 
 import sys
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ import numpy as np
 from ..numerics.jit import drop_broken, ensure_cache_folder, numba_available
 from ..numerics.kernel_library import shipped_library
 from ..numerics.lbfgs import LbfgsOptions
+from ..numerics.thread_pool import computed_once
 from ..progress import Monitor
 from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
@@ -67,7 +67,7 @@ def kernels_compiled() -> bool:
     return any(index.stat().st_mtime >= source.stat().st_mtime for index in indices)
 
 
-@cache
+@computed_once
 def load_kernels(illumination: str) -> None:
     """Load the tables and compiled kernels that a colour photo needs, once per process.
 

@@ -218,12 +218,13 @@ def _decompose_one(
     """Decompose a photo, and return the lines to print."""
     finder = MaskSearch(hints_of(options))
     require_writable_result(output, inputs=(path, options.mask))
-    with photo_file(path, options) as file, ThreadPoolExecutor(1) as aside:
-        loaded = aside.submit(load, settings, prior_set)
+    aside = ThreadPoolExecutor(1)
+    aside.submit(load, settings, prior_set)
+    aside.shutdown(wait=False)
+    with photo_file(path, options) as file:
         photo = read_photo(
             file, options.mask, options.transfer, limits=limits_of(options), finder=finder
         )
-        loaded.result()
     lines = [f"note: {note}" for note in mask_notes(photo)]
     return lines + _decompose_photo(photo, path, output, options, settings, prior_set, monitor)
 
