@@ -22,6 +22,7 @@ from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
 from ..scene.known_inputs import DepthObservation, KnownInputs, SceneConstraints
+from ..scene.object_part import object_part
 from ..shading.perspective import view_directions
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
@@ -107,9 +108,11 @@ def decompose(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
         )
     known_shape = inputs.height is not None or inputs.depth is not None
+    _check_shapes(inputs, photo)
     photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
-        maps = photo.resized_to_object(settings.maps_size)
+        part = object_part(photo, settings.maps_size)
+        photo, maps, inputs = part.photo, part.maps, part.known(inputs)
         own_scale = known_shape or settings.model not in SIRFS_MODELS
         of_maps = own_scale or settings.maps_size == WORKING_SIZE
         working = maps if of_maps else _working(photo, maps)
@@ -130,16 +133,28 @@ def decompose(
         settings.seed,
         _versions(),
         clock.seconds,
-        _input_json(maps, name),
+        _input_json(maps, part.corner, name),
         estimate.diagnostics,
     )
     with clock.stage("maps"):
         result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
         if estimate.prediction is not None and inputs.height is None:
             result = with_expected_error(result, estimate.prediction, working)
+        result = part.placed(result)
     if maps.mask.size > LARGE_PHOTO:
         release_memory()
     return result
+
+
+def _check_shapes(inputs: KnownInputs, photo: Photo) -> None:
+    """Raise `InputError` for maps that are not of the photo's size."""
+    for what, values in (("shape", inputs.height), ("depth", inputs.depth)):
+        if values is not None and values.shape != photo.mask.shape:
+            (rows, columns), (h, w) = values.shape, photo.mask.shape
+            raise InputError(
+                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the "
+                "photo's full size"
+            )
 
 
 def _is_black(photo: Photo) -> bool:
@@ -263,13 +278,6 @@ def _confidence(split: Separation, normal: np.ndarray, photo: Photo) -> np.ndarr
 def _at_scale(inputs: KnownInputs, photo: Photo, working: Photo) -> SceneConstraints:
     """The known quantities on the working photo's grid and in its pixels."""
     factor = working.scale / photo.scale
-    for what, values in (("shape", inputs.height), ("depth", inputs.depth)):
-        if values is not None and values.shape != photo.mask.shape:
-            (rows, columns), (h, w) = values.shape, photo.mask.shape
-            raise InputError(
-                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the "
-                "photo's full size"
-            )
     light = None if inputs.light is None else light_to_reference(np.asarray(inputs.light, float))
     height = (
         None
@@ -307,27 +315,29 @@ def _versions() -> dict[str, str]:
     return versions | {package: str(one.__version__) for package, one in loaded if one}
 
 
-def _input_json(photo: Photo, name: str) -> dict[str, object]:
+def _input_json(photo: Photo, corner: tuple[int, int], name: str) -> dict[str, object]:
+    """The source of a part of the maps whose upper left pixel is `corner`."""
     source = photo.original
+    left, top, width, height = mask_box(photo.mask)
     return {
         "name": name,
         "sha256": source.sha256,
         "size": list(source.size),
         "scale": photo.scale,
-        "crop_box": list(mask_box(photo.mask)),
+        "crop_box": [left + corner[0], top + corner[1], width, height],
         "transfer": source.transfer,
         "bit_depth": source.bit_depth,
         "colour_profile": source.colour_profile,
         "reading_notes": [{"kind": one.kind.value, "value": one.value} for one in source.notes],
         "mask_from": source.mask_from,
-        **_marks_json(photo),
+        **_marks_json(photo, corner),
         **({} if source.confidence is None else {"mask_confidence": round(source.confidence, 4)}),
     }
 
 
-def _marks_json(photo: Photo) -> dict[str, object]:
+def _marks_json(photo: Photo, corner: tuple[int, int]) -> dict[str, object]:
     """Pixels of the file that a user has marked, by kind."""
-    marks = photo.marks.scaled(1 / photo.scale)
+    marks = photo.marks.moved(*corner).scaled(1 / photo.scale)
     return {
         f"marked_{name}": [[int(x), int(y)] for x, y in places]
         for name, places in (("highlights", marks.highlights), ("paint", marks.paint))

@@ -56,11 +56,29 @@ class AreaFilter:
         return (self.columns @ (self.rows @ values.astype(np.float32, copy=False)).T).T
 
 
+def reduced_count(count: int, factor: float) -> int:
+    """Return the number of new pixels along an axis.
+
+    Parameters
+    ----------
+    count : int
+        Old pixels.
+    factor : float
+        Scale in (0, 1].
+
+    Returns
+    -------
+    int
+        The last may extend past the old ones.
+    """
+    return max(1, int(np.ceil(count * factor - 1e-6)))
+
+
 def _overlaps(count: int, factor: float) -> Any:
     """Sparse (new, old) float32: the share of each new pixel covered by each of the `count` old
     pixels; 0 < factor <= 1.
     """
-    new = max(1, int(np.ceil(count * factor - 1e-6)))
+    new = reduced_count(count, factor)
     start, end = np.arange(count) * factor, np.arange(1, count + 1) * factor
     first = np.minimum(start.astype(int), new - 1)
     split = np.clip(first + 1.0, start, end)

@@ -1,4 +1,6 @@
-"""The smallest box around a mask."""
+"""The smallest box around a mask, and parts of a frame."""
+
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -60,3 +62,113 @@ def mask_diagonal(mask: np.ndarray) -> float:
     """
     _, _, width, height = mask_box(mask)
     return float(np.hypot(height, width))
+
+
+WORTHWHILE = 0.5
+"""A part of a larger share of its frame saves too little."""
+
+
+@dataclass(frozen=True)
+class FramePart:
+    """A rectangle of a frame.
+
+    Attributes
+    ----------
+    rows, columns : slice
+        Its pixels, with start and stop.
+    shape : tuple of int
+        Rows and columns of the frame.
+    """
+
+    rows: slice
+    columns: slice
+    shape: tuple[int, int]
+
+    @classmethod
+    def around(cls, mask: np.ndarray, margin: int, step: int = 1) -> "FramePart":
+        """Return the box of a mask with a margin, or the whole frame if it is half of that.
+
+        Parameters
+        ----------
+        mask : (H, W) bool ndarray
+            At least one pixel is set.
+        margin : int
+            Pixels around the box, clipped at the frame.
+        step : int, optional
+            The first row and column are multiples of it.
+
+        Returns
+        -------
+        FramePart
+        """
+        rows, columns = (
+            slice(box.start - box.start % step, box.stop) for box in mask_slices(mask, margin)
+        )
+        part = cls(rows, columns, (mask.shape[0], mask.shape[1]))
+        return part if part.share <= WORTHWHILE else cls.whole(part.shape)
+
+    @classmethod
+    def whole(cls, shape: tuple[int, int]) -> "FramePart":
+        """Return the whole frame.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Its rows and columns.
+
+        Returns
+        -------
+        FramePart
+        """
+        return cls(slice(0, shape[0]), slice(0, shape[1]), shape)
+
+    @property
+    def corner(self) -> tuple[int, int]:
+        """(x, y) of its upper left pixel."""
+        return self.columns.start, self.rows.start
+
+    @property
+    def share(self) -> float:
+        """Its area over that of the frame."""
+        height = self.rows.stop - self.rows.start
+        width = self.columns.stop - self.columns.start
+        return height * width / (self.shape[0] * self.shape[1])
+
+    def cut(self, values: np.ndarray) -> np.ndarray:
+        """Return the values of the part.
+
+        Parameters
+        ----------
+        values : (H, W, ...) ndarray
+            Of the frame.
+
+        Returns
+        -------
+        (h, w, ...) ndarray
+            A view.
+        """
+        return values[self.rows, self.columns]
+
+    def placed(self, values: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
+        """Return values in the frame.
+
+        Parameters
+        ----------
+        values : (h, w, ...) ndarray
+            Of the part; rows and columns beyond it are left out.
+        around : (...) ndarray, optional
+            The value around the part; by default 0, which takes no memory until it is written.
+
+        Returns
+        -------
+        (H, W, ...) ndarray
+            The values themselves if the part is the whole frame.
+        """
+        if values.shape[:2] == self.shape:
+            return values
+        frame = np.zeros((*self.shape, *values.shape[2:]), values.dtype)
+        if around is not None:
+            frame[...] = around
+        inside = self.cut(frame)
+        inside[...] = values[: inside.shape[0], : inside.shape[1]]
+        return frame

@@ -68,6 +68,21 @@ class Camera:
         """
         return Camera(focal_length, (size[0] / 2, size[1] / 2), source)
 
+    def moved(self, right: float, down: float) -> "Camera":
+        """Return the camera of a frame that begins elsewhere.
+
+        Parameters
+        ----------
+        right, down : float
+            Position of this frame in the other one, pixels.
+
+        Returns
+        -------
+        Camera
+        """
+        x, y = self.principal_point
+        return replace(self, principal_point=(x + right, y + down))
+
     def scaled(self, factor: float) -> "Camera":
         """Return the camera of the photo resized by a factor.
 

@@ -48,6 +48,25 @@ class HighlightMarks:
             )
         )
 
+    def moved(self, right: float, down: float) -> "HighlightMarks":
+        """Return the marks in a frame that begins elsewhere.
+
+        Parameters
+        ----------
+        right, down : float
+            Position of this frame in the other one, pixels.
+
+        Returns
+        -------
+        HighlightMarks
+        """
+        return HighlightMarks(
+            *(
+                tuple((x + right, y + down) for x, y in places)
+                for places in (self.highlights, self.paint)
+            )
+        )
+
     def check(self, mask: np.ndarray) -> None:
         """Check that the marks lie on the object.
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.area_resize import AreaFilter, resize_separately
-from ..imaging.bounding_box import mask_box
+from ..imaging.bounding_box import FramePart, mask_box
 from ..io.decoders import MIN_SIDE
 from ..io.reading_notes import ReadingNote
 from .camera import Camera
@@ -104,6 +104,29 @@ class Photo:
     def box(self) -> tuple[int, int, int, int]:
         """(x, y, width, height) of the mask's bounding box, in pixels of `image`."""
         return mask_box(self.mask)
+
+    def cut(self, part: FramePart) -> "Photo":
+        """Return a part of the photo, without the coverage of the file's pixels.
+
+        Parameters
+        ----------
+        part : FramePart
+
+        Returns
+        -------
+        Photo
+        """
+        x, y = part.corner
+        return replace(
+            self,
+            image=part.cut(self.image),
+            mask=part.cut(self.mask),
+            clipped=part.cut(self.clipped),
+            camera=None if self.camera is None else self.camera.moved(-x, -y),
+            found=None,
+            cover=None,
+            marks=self.marks.moved(-x, -y),
+        )
 
     def resized_to_object(self, max_size: int = 512) -> "Photo":
         """Downscale the photo to an object of at most `max_size` pixels.

@@ -60,6 +60,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.bounding_box import FramePart
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
@@ -69,6 +70,8 @@ from .mesh.options import MeshOptions
 from .mesh.result import MeshResult
 
 ARRAYS = "arrays.npz"
+_MARGIN = 64  # pixels around the object, beyond those that the texture is extended by
+_ALIGNED = 64  # pixels, a multiple of all distances between vertices
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
 
 
@@ -165,13 +168,19 @@ def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResu
 def _surface_of(
     d: Decomposition, options: MeshOptions | None, cover: ObjectCover | None
 ) -> MeshResult:
-    maps = d.height, d.normal, d.mask, d.reflectance
+    """The mesh without gloss; only the object's part of the frame is processed."""
+    options = options or MeshOptions()
+    part = FramePart.around(d.mask, _MARGIN + options.bleed, _ALIGNED)
+    camera = None if d.camera is None else d.camera.moved(-part.corner[0], -part.corner[1])
+    height, normal, mask, reflectance = map(part.cut, (d.height, d.normal, d.mask, d.reflectance))
     try:
-        return build_mesh(*maps, options, camera=d.camera, cover=cover)
+        near = None if cover is None else cover.cut(part)
+        built = build_mesh(height, normal, mask, reflectance, options, camera, near)
     except InputError:
         if cover is None:
             raise
-        return build_mesh(*maps, options, camera=d.camera)
+        built, cover = build_mesh(height, normal, mask, reflectance, options, camera), None
+    return replace(built.placed(part, d.reflectance[d.mask].mean(0, dtype=float)), cover=cover)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:

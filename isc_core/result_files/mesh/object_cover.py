@@ -22,6 +22,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...imaging.area_resize import AreaFilter
+from ...imaging.bounding_box import FramePart
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
 from ...photo.soft_rim import soft_rim
@@ -51,6 +52,19 @@ class ObjectCover:
     soft: np.ndarray | None = None
     fine: np.ndarray | None = None
     scale: float = 1.0
+
+    def cut(self, part: FramePart) -> "ObjectCover":
+        """Return the coverage of a part of the frame, without that of the photo's pixels.
+
+        Parameters
+        ----------
+        part : FramePart
+
+        Returns
+        -------
+        ObjectCover
+        """
+        return ObjectCover(part.cut(self.share), None if self.soft is None else part.cut(self.soft))
 
     def alpha(self, shape: tuple[int, int] | None = None) -> np.ndarray | None:
         """Return the opacity of the surface, which is 1 except at soft rims.

@@ -11,12 +11,13 @@ Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import log, pi, sqrt
 from typing import Any
 
 import numpy as np
 
+from ...imaging.bounding_box import FramePart
 from ...lobe_fitting.specular_layer import CoatedSurface
 from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
@@ -27,6 +28,7 @@ from .object_cover import ObjectCover
 from .options import MeshOptions
 from .texture_codes import alpha_codes, color_codes, encoded_png, vector_codes
 
+_FLAT = np.array([0.0, 0.0, 1.0])  # of a normal map
 _SPECULAR = "KHR_materials_specular"
 
 
@@ -82,6 +84,39 @@ class MeshResult:
     texture: np.ndarray | None = None
     cover: ObjectCover | None = None
     coated: CoatedSurface | None = None
+
+    def placed(self, part: FramePart, mean: np.ndarray) -> "MeshResult":
+        """Return the mesh of a part of a frame as one of the whole frame.
+
+        Parameters
+        ----------
+        part : FramePart
+            Its place in the frame.
+        mean : (3,) ndarray
+            Mean reflectance, for the texture around the part.
+
+        Returns
+        -------
+        MeshResult
+            Without coverage.
+        """
+        (x, y), (height, width) = part.corner, part.shape
+        rows, columns = self.detail.shape[:2]
+        if (rows, columns) == part.shape:
+            return replace(self, cover=None)
+        u, v = self.mesh.uv.T
+        uv = np.stack([(x + u * columns) / width, 1 - (y + (1 - v) * rows) / height], -1)
+        column, row, depth = self.origin
+        return replace(
+            self,
+            mesh=replace(self.mesh, uv=uv),
+            origin=(column + x, row + y, depth),
+            vertex_pixel=self.vertex_pixel + (y, x),
+            base_color=part.placed(self.base_color, self.reflectance_scale * mean),
+            detail=part.placed(self.detail, _FLAT),
+            camera=None if self.camera is None else self.camera.moved(x, y),
+            cover=None,
+        )
 
     @property
     def needs_normal_map(self) -> bool:
