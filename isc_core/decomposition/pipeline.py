@@ -45,8 +45,9 @@ __all__ = [
     "decompose",
 ]
 
-# Memory at its peak: of the libraries, and for a pixel of the working photo and of the maps.
-_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES = 250_000_000, 250, 260
+# Memory at its peak: of the libraries, and for a pixel of the working photo, of the maps, and of
+# the frame around the part that is decomposed.
+_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES, _FRAME_BYTES = 250_000_000, 250, 260, 180
 _REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
@@ -125,7 +126,8 @@ def decompose(
     task = DecompositionTask(
         working, maps, settings, constraints, prior_set, monitor, clock, kept=kept
     )
-    with _within_memory(name or "the photo", working.mask.size, maps.mask.shape, memory):
+    frame = maps.mask.shape if part.target is None else part.target.shape
+    with _within_memory(name or "the photo", working.mask.size, maps.mask.size, frame, memory):
         estimate = solve(task)
     monitor.report("maps", 0.98)
     provenance = Provenance(
@@ -173,11 +175,13 @@ def _working(photo: Photo, maps: Photo) -> Photo:
 
 
 def _within_memory(
-    name: str, working_size: int, shape: tuple[int, ...], allowed: int | None
+    name: str, working_size: int, maps_size: int, shape: tuple[int, ...], allowed: int | None
 ) -> AbstractContextManager[None]:
     """Refuse a photo that needs more memory than allowed; errors of the block say how much."""
     work = f"{name}: {shape[1]} x {shape[0]} pixels to decompose"
-    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * shape[0] * shape[1]
+    around = max(shape[0] * shape[1] - maps_size, 0)
+    needed = _LEAST_BYTES + _WORKING_BYTES * working_size + _MAPS_BYTES * maps_size
+    needed += _FRAME_BYTES * around
     require_memory(work, needed, allowed, _REMEDY)
     return enough_memory(work, needed, _REMEDY)
 

@@ -134,6 +134,19 @@ class FramePart:
         width = self.columns.stop - self.columns.start
         return height * width / (self.shape[0] * self.shape[1])
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether it is the whole frame."""
+        return self.share == 1
+
+    @property
+    def far_corner(self) -> tuple[slice, slice]:
+        """Row and column of a pixel in a corner of the frame, outside the part if there is one."""
+        height, width = self.shape
+        row = 0 if self.rows.start > 0 or self.rows.stop == height else height - 1
+        column = 0 if self.columns.start > 0 or self.columns.stop == width else width - 1
+        return slice(row, row + 1), slice(column, column + 1)
+
     def cut(self, values: np.ndarray) -> np.ndarray:
         """Return the values of the part.
 

@@ -42,7 +42,8 @@ ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth
 _ANGLES, _NODES = 10, 32
 _MIN_ROUGHNESS = 0.05
 _DARKEST = 1e-6
-_BLEED = 64  # pixels around the object; farther out, the effect is the mean
+BLEED = 64
+"""Pixels around the object; farther out, the effect is the mean."""
 
 
 @dataclass(frozen=True)
@@ -165,7 +166,7 @@ class CoatedSurface:
         if level <= 0:
             return None
         mask = self.normal.any(-1)
-        part = FramePart.around(mask, _BLEED)
+        part = FramePart.around(mask, BLEED)
         normal = self.normal[mask].astype(float)
         view = self.view if self.view.ndim == 1 else self.view[mask]
         model = _layer(level, roughness)

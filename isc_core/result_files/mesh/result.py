@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...imaging.bounding_box import FramePart
-from ...lobe_fitting.specular_layer import CoatedSurface
+from ...lobe_fitting.specular_layer import BLEED, CoatedSurface, SpecularLayer
 from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
 from ..solids.back import Back
@@ -156,8 +156,19 @@ class MeshResult:
             layer = self.coated.layer(self.specular * self._largest_variation, self.roughness)
         if self.texture is not None:
             return self.texture if layer is None else layer.codes_under(self.texture)
-        color = self.base_color if layer is None else layer.color_under(self.base_color)
-        return color_codes(color)
+        return color_codes(self.base_color) if layer is None else self._codes_under(layer)
+
+    def _codes_under(self, layer: SpecularLayer) -> np.ndarray:
+        """The base colour under the gloss; farther from the object, both are constant."""
+        assert self.coated is not None
+        part = FramePart.around(self.coated.normal.any(-1), BLEED)
+        near = SpecularLayer(part.cut(layer.effect)).color_under(part.cut(self.base_color))
+        if part.is_whole:
+            return color_codes(near)
+        far = SpecularLayer(layer.effect[part.far_corner]).color_under(
+            self.base_color[part.far_corner]
+        )
+        return part.placed(color_codes(near), color_codes(far))
 
     @property
     def has_layer(self) -> bool:
