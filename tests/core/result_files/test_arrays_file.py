@@ -15,13 +15,14 @@ import trimesh
 from isc_core.cli.main import main
 from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
-from isc_core.lobe_fitting.specular_level import fitted_specular
+from isc_core.lobe_fitting.specular_level import SpecularFit, fitted_specular
 from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of
 from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
 from isc_core.result_files.mesh.texture_codes import color_codes
 from isc_core.result_files.result_folder import load, require_room, save
+from isc_core.result_files.solids.back import Back
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.environment_map import shading_under
@@ -240,3 +241,41 @@ def test_a_folder_without_a_result_is_one_clear_line(
     message = capsys.readouterr().err
     assert message.count("\n") == 1 and "not a result folder" in message
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("triangles", [0, 800])
+@pytest.mark.parametrize("back", list(Back))
+def test_a_mesh_does_not_depend_on_the_frame_around_it(triangles: int, back: Back) -> None:
+    """Only the part around the object is processed; all is in the frame of the maps."""
+    d = ball((512, 700), 40.0, (330.0, 420.0))
+    options = MeshOptions(triangles=triangles, back=back)
+    found = mesh_of(d, options)
+    whole = build_mesh(d.height, d.normal, d.mask, d.reflectance, options)
+    # The sides and the back are a guess, by means over blocks that begin elsewhere.
+    tolerance = 1e-9 if back is Back.OPEN else 0.5
+    difference = (found.mesh.vertices - whole.mesh.vertices) / whole.metres_per_pixel
+    assert np.abs(difference[:, :2]).max() < 1e-9
+    assert np.abs(difference[:, 2]).max() < tolerance
+    assert _sets(found.mesh.faces) == _sets(whole.mesh.faces) or back is not Back.OPEN
+    np.testing.assert_allclose(found.mesh.uv, whole.mesh.uv, atol=5e-4)
+    np.testing.assert_array_equal(found.vertex_pixel, whole.vertex_pixel)
+    np.testing.assert_allclose(found.origin, whole.origin, atol=tolerance)
+    np.testing.assert_array_equal(found.detail, whole.detail)
+    np.testing.assert_array_equal(found.base_color, whole.base_color)
+
+
+def _sets(faces: np.ndarray) -> set[tuple[int, ...]]:
+    return {tuple(sorted(face)) for face in faces.tolist()}
+
+
+def test_the_texture_under_the_gloss_does_not_depend_on_the_frame() -> None:
+    near, far = ball((128, 128), 40.0, (60.0, 60.0)), ball((512, 700), 40.0, (316.0, 444.0))
+    gloss = SpecularFit(0.3, 0.8)
+    small, large = (mesh_of(d, gloss=gloss) for d in (near, far))
+    assert small.has_layer
+    codes = large.base_color_codes
+    assert codes.shape == (512, 700, 3)
+    inside = codes[256:384, 384:512].astype(int)
+    assert np.abs(inside - small.base_color_codes)[near.mask].max() <= 1
+    outside = codes[:200, :300]
+    assert (outside == outside[0, 0]).all()
