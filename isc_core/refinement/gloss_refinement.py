@@ -24,10 +24,12 @@ import numpy as np
 
 from ..decomposition.lobe import FittedLobe
 from ..errors import InputError
+from ..imaging.bounding_box import FramePart
 from ..numerics.linear import solve_linear
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
+from ..scene.part_of_result import cut_result, placed_result
 from ..shading.spherical_harmonics import real_sh
 from .gloss_fit import GlossProblem, bumps_of, explained, fit_gloss, gloss_problem, minimised
 from .gloss_note import NOTE, GlossOutcome, was_refined
@@ -46,6 +48,7 @@ _MIN_EXPLAINED, _MAX_RISE = 0.25, 1.0
 _STRENGTH_SPREAD, _OTHER_CONE = 0.34, 30.0  # from `lobe_fitting.recovered`; degrees
 _MIN_ALPHA = 0.01
 _LIGHT_RIDGE = 1e-3
+_MARGIN = 64  # pixels around the object
 
 
 @dataclass(frozen=True)
@@ -132,6 +135,13 @@ def refine_gloss(
     options, monitor = options or GlossOptions(), monitor or Monitor()
     _check(d)
     monitor.report("refining the gloss", 0.0)
+    part = FramePart.around(d.mask, _MARGIN)
+    done = _refinement(cut_result(d, part), options, monitor)
+    return replace(done, result=placed_result(done.result, part))
+
+
+def _refinement(d: Decomposition, options: GlossOptions, monitor: Monitor) -> GlossRefinement:
+    """The refinement of the object's part of a result."""
     fit = d.brdf
     if fit is None or fit.alpha is None or not fit.lights or not d.specular[d.mask].any():
         return _with_note(GlossRefinement(d, GlossOutcome.NO_HIGHLIGHT), options)

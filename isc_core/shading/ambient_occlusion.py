@@ -29,6 +29,8 @@ height map is taken for an orthographic view. Grooves of known opening angles co
 
 import numpy as np
 
+from ..imaging.bounding_box import FramePart, mask_box
+
 _STEPS = ((0, 1), (1, 2), (1, 1), (2, 1), (1, 0), (2, -1), (1, -1), (1, -2))  # row and column
 _GROWTH = 1.1
 _REACH = 0.25  # of the object's longer side
@@ -51,17 +53,18 @@ def ambient_occlusion(height: np.ndarray, mask: np.ndarray, reach: float = _REAC
     (H, W) float32 ndarray
         In [0, 1], 1 is unoccluded; 1 outside the mask.
     """
-    longest = max(np.ptp(np.flatnonzero(mask.any(axis=n))) + 1 for n in (0, 1))
-    far = max(2, round(reach * longest))
-    here = np.where(mask, height, -np.inf).astype(np.float32)
+    far = max(2, round(reach * max(mask_box(mask)[2:])))
+    part = FramePart.around(mask, 0)
+    inside = part.cut(mask)
+    here = np.where(inside, part.cut(height), -np.inf).astype(np.float32)
     level = np.pad(here, far, "constant", constant_values=-np.inf)
-    share = np.ones(mask.shape, np.float32)
-    for top in range(0, len(mask), _ROWS):
-        bottom = min(top + _ROWS, len(mask))
+    share = np.ones(inside.shape, np.float32)
+    for top in range(0, len(inside), _ROWS):
+        bottom = min(top + _ROWS, len(inside))
         with np.errstate(invalid="ignore"):  # outside of the mask
-            part = _unoccluded(level[top : bottom + 2 * far], far)
-        share[top:bottom] = np.where(mask[top:bottom], part, 1)
-    return share
+            some = _unoccluded(level[top : bottom + 2 * far], far)
+        share[top:bottom] = np.where(inside[top:bottom], some, 1)
+    return part.placed(share, np.ones(()))
 
 
 def _unoccluded(level: np.ndarray, far: int) -> np.ndarray:
