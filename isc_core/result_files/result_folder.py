@@ -27,7 +27,7 @@ from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.limits import Limits
-from ..io.memory import LARGE_PHOTO, release_memory
+from ..io.memory import release_memory
 from ..io.png import encode_png
 from ..io.printable_names import readable
 from ..photo.camera import Camera
@@ -82,6 +82,7 @@ _RESULT_FILES = (
 # A small object in a large frame compresses to a hundredth.
 _LIMITS = Limits(max_bytes=1 << 33)
 _PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the default 6 for 18 % more bytes
+_MOST_AT_ONCE = 1 << 21  # pixels: beyond, maps are written before the mesh is built, to save memory
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
@@ -144,7 +145,7 @@ def save(
         (partial / "maps").mkdir()
         maps = pool.submit(_write_maps, d, channels, partial)
         preview = pool.submit(_write_preview, d, partial / "preview.png")
-        if d.mask.size > LARGE_PHOTO:
+        if d.mask.size > _MOST_AT_ONCE:
             maps.result()
             release_memory()
         monitor.report("building the mesh", 0.4)
