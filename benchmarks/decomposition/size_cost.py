@@ -1,12 +1,14 @@
 """What does a photo's size cost: seconds and memory of `isc decompose` at full detail.
 
-  python -m benchmarks.decomposition.size_cost PHOTO [--megapixels M ...] [--threads N]
+  python -m benchmarks.decomposition.size_cost PHOTO [--megapixels M ...] [--frame F]
+  [--threads N]
 
 PHOTO, a masked photo, is enlarged until the object has M million pixels, and sensor noise of two
-codes is added, so that the finest level has something to look at. It is decomposed with
-`--max-size 0 --detail 4096`. The table has the object's and the frame's megapixels, the processor's
-seconds, those for each further megapixel of the object, the peak of memory, and its bytes beyond
-400 MB for each pixel of the object and of the frame.
+codes is added, so that the finest level has something to look at. With `--frame`, it is in the
+middle of a grey frame of F megapixels of the same shape, as objects in photos by phones are. It is
+decomposed with `--max-size 0 --detail 4096`. The table has the object's and the frame's megapixels,
+the processor's seconds, those for each further megapixel of the object, the peak of memory, and its
+bytes beyond 400 MB for each pixel of the object and of the frame.
 
 Limits: processor time grows on a busy machine; an enlarged photo compresses better than a real one.
 While EXR files are written, their content is in a memory file, which the peak leaves out.
@@ -26,11 +28,13 @@ from isc_core.decomposition.settings import MOST_DETAIL
 from isc_core.photo import read_photo
 
 _MEGAPIXELS = (0.1, 0.4, 1.0, 2.0, 4.0, 8.0)
-_NOISE = 2.0  # codes
+_NOISE, _GREY = 2.0, 128.0  # codes
 _FIXED = 400e6  # bytes
 
 
-def enlarged(photo: Path, megapixels: float, folder: Path) -> tuple[Path, Path, float, float]:
+def enlarged(
+    photo: Path, megapixels: float, folder: Path, least_frame: float = 0.0
+) -> tuple[Path, Path, float, float]:
     """Write an enlarged photo and its mask.
 
     Parameters
@@ -39,6 +43,8 @@ def enlarged(photo: Path, megapixels: float, folder: Path) -> tuple[Path, Path, 
     megapixels : float
         Of the object.
     folder : Path
+    least_frame : float, optional
+        Megapixels to which the frame is extended.
 
     Returns
     -------
@@ -53,8 +59,14 @@ def enlarged(photo: Path, megapixels: float, folder: Path) -> tuple[Path, Path, 
         large = np.asarray(picture.convert("RGB").resize(size, Image.Resampling.BICUBIC), float)
     cover = Image.fromarray(np.uint8(255) * mask).resize(size, Image.Resampling.BICUBIC)
     inside = np.asarray(cover) > 127
+    around = max(0.0, np.sqrt(1e6 * least_frame / inside.size) - 1) / 2
+    border = [(round(around * count),) * 2 for count in inside.shape]
+    background = _GREY if least_frame else 0.0
+    inside = np.pad(inside, border)
+    large = np.where(inside[..., None], np.pad(large, (*border, (0, 0))), background)
     grain = np.random.default_rng(0).normal(0, _NOISE, inside.shape)
-    codes = np.clip(large + grain[..., None], 3, 255) * inside[..., None]
+    codes = np.clip(large + grain[..., None], 3, 255)
+    codes[~inside & (background == 0)] = 0
     paths = folder / "photo.png", folder / "mask.png"
     Image.fromarray(np.rint(codes).astype(np.uint8)).save(paths[0])
     Image.fromarray(np.uint8(255) * inside).save(paths[1])
@@ -91,6 +103,7 @@ def main() -> None:
     )
     parser.add_argument("photo", type=Path, metavar="PHOTO")
     parser.add_argument("--megapixels", type=float, nargs="+", default=_MEGAPIXELS, metavar="M")
+    parser.add_argument("--frame", type=float, default=0.0, metavar="F")
     parser.add_argument("--threads", type=int, default=0, help="0 (default) for all cores")
     given = parser.parse_args()
     titles = "object, MP", "frame, MP", "processor, s", "s a further MP", "peak, MB"
@@ -99,7 +112,9 @@ def main() -> None:
     before: tuple[float, float] | None = None
     for megapixels in sorted(given.megapixels):
         with tempfile.TemporaryDirectory() as folder:
-            photo, mask, inside, frame = enlarged(given.photo, megapixels, Path(folder))
+            photo, mask, inside, frame = enlarged(
+                given.photo, megapixels, Path(folder), given.frame
+            )
             seconds, peak = cost(photo, mask, Path(folder) / "result", given.threads)
         further = "" if before is None else f"{(seconds - before[1]) / (inside - before[0]):.1f}"
         before = inside, seconds
