@@ -1,8 +1,8 @@
 """The arrays that `isc decompose --arrays` writes, read with Python and NumPy alone.
 
-`ResultArrays` has the names, shapes and units of `arrays.npz`. Maps cover the full frame of the
-photo, row 0 at the top, and are 0 outside the mask. Colours are linear Rec.709. Vectors are in the
-camera frame (x right, y up, z toward the viewer).
+`ResultArrays` has the names, shapes and units of `arrays.npz`. Maps cover `part` of the frame of
+the result, row 0 at the top, and are 0 outside the mask. Colours are linear Rec.709. Vectors are in
+the frame of the camera (x right, y up, z toward the viewer).
 
 Limits: a damaged file, or one of an unsupported version, is refused; nothing is repaired.
 """
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.io.json_files import read_json
 from isc_core.io.npy import read_arrays
 from isc_core.photo.camera import Camera
@@ -60,17 +61,18 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     "alpha": ("h_alpha", "w_alpha"),
     "environment_map": ("h", "w", 3),
     "photo_size": (2,),
+    "frame": (4,),
     "principal_point": (2,),
     "eye": (3,),
 }
 _DTYPES = {
     **dict.fromkeys(("mask", "soft"), np.dtype(bool)),
     **dict.fromkeys(("texture", "alpha"), np.dtype(np.uint8)),
-    **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
+    **dict.fromkeys(("faces", "vertex_pixel", "photo_size", "frame"), np.dtype(np.int32)),
 }
 _CAMERA = ("focal_length", "principal_point", "eye")
 _OPTIONAL, _MAY_BE_NAN = (
-    {"specular_variation", "texture", "cover", "soft", "alpha", *_CAMERA, *_LAMPS},
+    {"specular_variation", "texture", "cover", "soft", "alpha", "frame", *_CAMERA, *_LAMPS},
     {"roughness", "specular_level"},
 )
 _MAX_LAMPS = 3
@@ -157,6 +159,9 @@ class ResultArrays:
         Its (x, y) in pixels from the left and upper edge of the maps.
     eye : (3,) ndarray or None
         Its place, in metres as `vertices`.
+    frame : (4,) ndarray of int32 or None
+        Column and row of the arrays' upper left pixel in the frame of the result, and the width and
+        height of that; None if the arrays cover it.
     description : dict
         Content of decomposition.json.
     folder : Path
@@ -206,13 +211,23 @@ class ResultArrays:
     focal_length: float | None = None
     principal_point: np.ndarray | None = None
     eye: np.ndarray | None = None
+    frame: np.ndarray | None = None
     description: dict[str, Any] = field(default_factory=dict)
     folder: Path = Path()
 
     @property
     def size(self) -> tuple[int, int]:
-        """Width and height of the maps in pixels."""
-        return self.mask.shape[1], self.mask.shape[0]
+        """Width and height of the result's frame in pixels of the maps."""
+        if self.frame is None:
+            return self.mask.shape[1], self.mask.shape[0]
+        return int(self.frame[2]), int(self.frame[3])
+
+    @property
+    def part(self) -> FramePart:
+        """The part of the frame that the arrays cover."""
+        height, width = self.mask.shape
+        x, y = (0, 0) if self.frame is None else map(int, self.frame[:2])
+        return FramePart(slice(y, y + height), slice(x, x + width), self.size[::-1])
 
     @property
     def camera(self) -> Camera | None:
@@ -314,6 +329,13 @@ def _check_arrays(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
     lamps = [name for name in _LAMPS if name in values]
     if lamps and (len(lamps) < len(_LAMPS) or sizes["lamps"] > _MAX_LAMPS):
         raise InputError(f"{path} is damaged (lamps): decompose the photo again")
+    frame = values.get("frame")
+    if frame is not None and not (
+        min(frame[:2]) >= 0
+        and frame[0] + sizes["W"] <= frame[2]
+        and frame[1] + sizes["H"] <= frame[3]
+    ):
+        raise InputError(f"{path} is damaged (frame): decompose the photo again")
     faces, (rows, columns) = values["faces"], values["vertex_pixel"].T
     outside = faces.min() < 0 or faces.max() >= sizes["V"] or min(rows.min(), columns.min()) < 0
     if outside or rows.max() >= sizes["H"] or columns.max() >= sizes["W"]:

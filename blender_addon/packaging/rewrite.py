@@ -22,6 +22,7 @@ LIGHT_MODULES = frozenset(
         "isc_core.cli.interface.values",
         "isc_core.errors",
         "isc_core.extras",
+        "isc_core.imaging.bounding_box",
         "isc_core.imaging.row_blocks",
         "isc_core.imaging.srgb",
         "isc_core.imaging.upsampling",

@@ -99,7 +99,8 @@ def _fit_orthographic(
     data: bpy.types.Camera, result: ResultArrays, step: float, frame: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Set lens and clipping for pixels of `step` metres; the camera's place."""
-    (width, height), (column, row, _) = frame, result.origin.astype(float)
+    (width, height), (left, top) = frame, result.part.corner
+    column, row = left + float(result.origin[0]), top + float(result.origin[1])
     # Far enough for everything in the frame: the object's own depth, and objects beside it.
     distance = (
         4 * max(width, height) * step
@@ -119,7 +120,8 @@ def _fit_pinhole(
     assert result.focal_length is not None
     assert result.principal_point is not None
     assert result.eye is not None
-    (width, height), (x, y) = frame, result.principal_point.astype(float)
+    (width, height), (left, top) = frame, result.part.corner
+    x, y = left + float(result.principal_point[0]), top + float(result.principal_point[1])
     longest = max(width, height)
     data.type, data.sensor_fit, data.sensor_width = "PERSP", "AUTO", _SENSOR
     data.lens = _SENSOR * result.focal_length / longest

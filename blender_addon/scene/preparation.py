@@ -183,7 +183,10 @@ def prepare(
             displacement_map(result, options.size_metres), DATA
         )
     if with_photo:
-        files[ImageRole.PHOTO] = map_file(result.image, COLOR, result.mask)
+        part = result.part
+        files[ImageRole.PHOTO] = map_file(
+            part.placed(result.image), COLOR, part.placed(result.mask)
+        )
     return PreparedObject(result, options, mesh, mesh_checksum(mesh), files, specular)
 
 

@@ -134,6 +134,28 @@ class FramePart:
         width = self.columns.stop - self.columns.start
         return height * width / (self.shape[0] * self.shape[1])
 
+    def scaled(self, factor: float, shape: tuple[int, ...]) -> "FramePart":
+        """Return the part in a frame of another size.
+
+        Parameters
+        ----------
+        factor : float
+            Size of that frame over the size of this one.
+        shape : tuple of int
+            Its rows and columns, first of all.
+
+        Returns
+        -------
+        FramePart
+        """
+        rows, columns = (
+            slice(min(round(factor * along.start), count), min(round(factor * along.stop), count))
+            for along, count in zip((self.rows, self.columns), shape[:2], strict=True)
+        )
+        if self.is_whole:
+            return FramePart.whole((shape[0], shape[1]))
+        return FramePart(rows, columns, (shape[0], shape[1]))
+
     @property
     def is_whole(self) -> bool:
         """Whether it is the whole frame."""

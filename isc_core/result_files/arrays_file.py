@@ -44,6 +44,10 @@ pickles) contains all of it as arrays, float32 unless stated otherwise:
                                  likewise
     photo_size (2,) int32        width and height of the original photo
     crop_scale ()                map pixels per photo pixel
+    frame (4,) int32             x, y of the arrays' upper left pixel in the maps of the result, and
+                                 width and height of these: where the object and a margin are less
+                                 than half of the frame, maps, textures and pixels are those of
+                                 that part
 
 Equation: base_color * exp(SH(n; mesh_illumination)) = diffuse, and the irradiance of `sky` on a
 white surface, over pi, is exp(SH(n; mesh_illumination)).
@@ -64,6 +68,7 @@ from ..imaging.bounding_box import FramePart
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
+from ..scene.part_of_result import cut_result
 from .mesh.build import build_mesh
 from .mesh.object_cover import ObjectCover
 from .mesh.options import MeshOptions
@@ -72,7 +77,8 @@ from .mesh.result import MeshResult
 ARRAYS = "arrays.npz"
 _MARGIN = 64  # pixels around the object, beyond those that the texture is extended by
 _ALIGNED = 64  # pixels, a multiple of all distances between vertices
-_INTEGERS = {"faces", "vertex_pixel", "photo_size"}
+_SEARCH = 64  # pixels by which the part of the frame is extended at most
+_INTEGERS = {"faces", "vertex_pixel", "photo_size", "frame"}
 
 
 def write_arrays(
@@ -101,11 +107,16 @@ def write_arrays(
     OSError
         If the file cannot be written.
     """
-    arrays = arrays_of(d, built or mesh_of(d))
+    built = built or mesh_of(d)
+    factor = 1.0 if texture is None else texture.shape[1] / d.mask.shape[1]
+    part = _part_of(d.mask, factor)
+    arrays = arrays_of(cut_result(d, part), built.cut(part))
+    arrays["frame"] = np.array([*part.corner, *part.shape[::-1]], np.int32)
+    fine = part.scaled(factor, d.mask.shape if texture is None else texture.shape)
     if texture is not None:
-        arrays["texture"] = texture
+        arrays["texture"] = fine.cut(texture)
     if cover is not None:
-        arrays |= _cover(cover, None if texture is None else texture.shape[:2])
+        arrays |= _cover(cover, part, fine)
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 
@@ -205,11 +216,32 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     return {name: _typed(name, array) for name, array in values.items()}
 
 
-def _cover(cover: ObjectCover, shape: tuple[int, ...] | None) -> dict[str, np.ndarray]:
-    alpha = cover.alpha(None if shape is None else (shape[0], shape[1]))
+def _part_of(mask: np.ndarray, factor: float) -> FramePart:
+    """The object's part of the frame; its edges lie between pixels of a texture that is larger by
+    `factor`, or nearly so.
+    """
+    part = FramePart.around(mask, _MARGIN + MeshOptions().bleed)
+    if part.is_whole or factor == 1:
+        return part
+
+    def distance(edge: int) -> float:
+        return abs(edge * factor - round(edge * factor))
+
+    def extended(along: slice, count: int) -> slice:
+        first = range(along.start, max(along.start - _SEARCH, -1), -1)
+        last = range(along.stop, min(along.stop + _SEARCH, count + 1))
+        return slice(min(first, key=distance), min(last, key=distance))
+
+    rows, columns = map(extended, (part.rows, part.columns), mask.shape)
+    return FramePart(rows, columns, part.shape)
+
+
+def _cover(cover: ObjectCover, part: FramePart, fine: FramePart) -> dict[str, np.ndarray]:
+    """The coverage in a part of the maps, and the opacity in that part of the texture."""
+    share, alpha = part.cut(cover.share), cover.alpha(fine.shape)
     if cover.soft is None or alpha is None:
-        return {"cover": cover.share}
-    return {"cover": cover.share, "soft": cover.soft, "alpha": alpha}
+        return {"cover": share}
+    return {"cover": share, "soft": part.cut(cover.soft), "alpha": fine.cut(alpha)}
 
 
 def _typed(name: str, values: np.ndarray) -> np.ndarray:

@@ -22,10 +22,10 @@ def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
     Returns
     -------
     Decomposition
-        Its maps are views.
+        Its maps are views; the result itself if the part is the whole frame.
     """
     x, y = part.corner
-    return _changed(d, part.cut, (-x, -y))
+    return d if part.is_whole else _changed(d, part.cut, (-x, -y))
 
 
 def placed_result(d: Decomposition, part: FramePart) -> Decomposition:
@@ -42,7 +42,7 @@ def placed_result(d: Decomposition, part: FramePart) -> Decomposition:
     Decomposition
         Its maps have, around the part, the values of pixels outside the mask.
     """
-    if d.mask.shape == part.shape:
+    if part.is_whole:
         return d
     found = _changed(d, part.placed, part.corner)
     outside = ~found.mask

@@ -118,6 +118,42 @@ class MeshResult:
             cover=None,
         )
 
+    def cut(self, part: FramePart) -> "MeshResult":
+        """Return the mesh of a part of the frame; the inverse of `placed`.
+
+        Parameters
+        ----------
+        part : FramePart
+            Contains the object.
+
+        Returns
+        -------
+        MeshResult
+            Without coverage, texture and light.
+        """
+        (x, y), (height, width) = part.corner, part.shape
+        base_color = part.cut(self.base_color)
+        rows, columns = base_color.shape[:2]
+        u, v = self.mesh.uv.T
+        uv = np.stack([(u * width - x) / columns, 1 - ((1 - v) * height - y) / rows], -1)
+        column, row, depth = self.origin
+        variation = self.gloss.variation
+        return replace(
+            self,
+            mesh=self.mesh if part.is_whole else replace(self.mesh, uv=uv),
+            origin=(column - x, row - y, depth),
+            vertex_pixel=self.vertex_pixel - (y, x),
+            base_color=base_color,
+            detail=part.cut(self.detail),
+            gloss=self.gloss
+            if variation is None
+            else replace(self.gloss, variation=part.cut(variation)),
+            camera=None if self.camera is None else self.camera.moved(-x, -y),
+            texture=None,
+            cover=None,
+            coated=None,
+        )
+
     @property
     def needs_normal_map(self) -> bool:
         """Whether the normal map adds detail to the normals of the vertices."""

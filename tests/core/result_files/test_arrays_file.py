@@ -16,8 +16,9 @@ from isc_core.cli.main import main
 from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.lobe_fitting.specular_level import SpecularFit, fitted_specular
-from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of
+from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of, write_arrays
 from isc_core.result_files.mesh.build import build_mesh
+from isc_core.result_files.mesh.object_cover import ObjectCover
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
 from isc_core.result_files.mesh.texture_codes import color_codes
@@ -279,3 +280,38 @@ def test_the_texture_under_the_gloss_does_not_depend_on_the_frame() -> None:
     assert np.abs(inside - small.base_color_codes)[near.mask].max() <= 1
     outside = codes[:200, :300]
     assert (outside == outside[0, 0]).all()
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.6, 2.371])
+def test_arrays_and_texture_of_a_part_agree(tmp_path: Path, factor: float) -> None:
+    """A texture pixel of the part is that of the frame."""
+    d = ball((512, 700), 40.0, (330.0, 420.0))
+    soft = d.mask & (np.arange(700) % 9 == 0)
+    share = np.where(soft, 0.6, d.mask).astype(np.float32)
+    cover = ObjectCover(share, soft, np.rint(255 * share).astype(np.uint8))
+    shape = (round(512 * factor), round(700 * factor))
+    texture = np.random.default_rng(0).integers(0, 256, (*shape, 3), np.uint8)
+    write_arrays(d, tmp_path / ARRAYS, mesh_of(d), texture if factor > 1 else None, cover)
+    arrays = read(tmp_path / ARRAYS)
+    x, y, width, height = arrays["frame"]
+    assert (width, height) == (700, 512)
+    rows, columns = arrays["mask"].shape
+    assert rows * columns < 0.5 * 512 * 700
+    part = np.s_[y : y + rows, x : x + columns]
+    np.testing.assert_array_equal(arrays["diffuse"], d.diffuse[part])
+    np.testing.assert_array_equal(arrays["cover"], share[part])
+    np.testing.assert_array_equal(arrays["soft"], soft[part])
+    factor = shape[1] / 700
+    left, top = round(x * factor), round(y * factor)
+    assert abs(x * factor - left) < 0.03 > abs(y * factor - top)
+    if factor > 1:
+        size = arrays["texture"].shape
+        assert np.abs(np.array(size[:2]) - np.array([rows, columns]) * factor).max() < 0.06
+        expected = texture[top : top + size[0], left : left + size[1]]
+        np.testing.assert_array_equal(arrays["texture"], expected)
+    alpha = cover.alpha(shape)
+    assert alpha is not None
+    size = arrays["alpha"].shape
+    np.testing.assert_array_equal(
+        arrays["alpha"], alpha[top : top + size[0], left : left + size[1]]
+    )
