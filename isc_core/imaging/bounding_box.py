@@ -184,6 +184,24 @@ class FramePart:
         """
         return values[self.rows, self.columns]
 
+    def constant_around(self, values: np.ndarray) -> float | None:
+        """Return the value of all pixels around the part.
+
+        Parameters
+        ----------
+        values : (H, W) ndarray
+            Of the frame.
+
+        Returns
+        -------
+        float or None
+            None if they differ.
+        """
+        value = values[self.far_corner][0, 0]
+        beside = values[self.rows, : self.columns.start], values[self.rows, self.columns.stop :]
+        parts = values[: self.rows.start], values[self.rows.stop :], *beside
+        return float(value) if all((part == value).all() for part in parts) else None
+
     def placed(self, values: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
         """Return values in the frame.
 
@@ -202,7 +220,7 @@ class FramePart:
         if values.shape[:2] == self.shape:
             return values
         frame = np.zeros((*self.shape, *values.shape[2:]), values.dtype)
-        if around is not None:
+        if around is not None and around.any():
             frame[...] = around
         inside = self.cut(frame)
         inside[...] = values[: inside.shape[0], : inside.shape[1]]

@@ -22,6 +22,7 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
+from ..imaging.bounding_box import FramePart
 from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
@@ -408,12 +409,28 @@ def _layers(
             f"{path} has NaN or infinite values in {broken[0]}: it is damaged; decompose the "
             "photo again"
         )
-    stacks = {
-        layer: np.stack([channels[name] for name in group], -1) for layer, group in names.items()
-    }
+    part = _object_part(channels["mask.A"] > 0.5)
     return {
-        layer: stack if stack.shape[-1] > 1 else stack[..., 0] for layer, stack in stacks.items()
+        layer: _stacked([channels[name] for name in group], part) for layer, group in names.items()
     }
+
+
+def _object_part(mask: np.ndarray) -> FramePart:
+    if not mask.any():
+        return FramePart.whole((mask.shape[0], mask.shape[1]))
+    return FramePart.around(mask, 0)
+
+
+def _stacked(planes: list[np.ndarray], part: FramePart) -> np.ndarray:
+    """The planes of a layer as one array; only the object's part of the frame is copied if they are
+    constant around it.
+    """
+    if len(planes) == 1:
+        return planes[0]
+    around = [part.constant_around(plane) for plane in planes]
+    if part.is_whole or None in around:
+        return np.stack(planes, -1)
+    return part.placed(np.stack([part.cut(plane) for plane in planes], -1), np.array(around))
 
 
 def _read_json(path: Path) -> dict[str, Any]:

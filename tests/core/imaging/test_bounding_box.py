@@ -65,3 +65,16 @@ def test_the_far_corner_is_outside(mask: np.ndarray) -> None:
     part.cut(inside)[...] = True
     assert inside[part.far_corner].shape == (1, 1)
     assert not inside[part.far_corner].any()
+
+
+def test_constant_values_around_a_part() -> None:
+    part = FramePart.around(spot(5, 9, 20, 31), 3)
+    values = np.full(SHAPE, 4.0)
+    part.cut(values)[...] = np.arange(17)
+    assert part.constant_around(values) == 4
+    for row, column in [(0, 0), (39, 59), (5, 2), (5, 58), (1, 25)]:
+        other = values.copy()
+        other[row, column] = 5
+        assert part.constant_around(other) is None
+    whole = FramePart.whole(SHAPE)
+    assert whole.constant_around(values) == values[0, 0]
