@@ -128,7 +128,7 @@ class Photo:
             marks=self.marks.moved(-x, -y),
         )
 
-    def resized_to_object(self, max_size: int = 512) -> "Photo":
+    def resized_to_object(self, max_size: int = 512, largest: float = 1.0) -> "Photo":
         """Downscale the photo to an object of at most `max_size` pixels.
 
         Linear light is averaged over the area of each new pixel, separately for object and
@@ -138,6 +138,8 @@ class Photo:
         ----------
         max_size : int
             Long side of the mask's bounding box; 0 keeps the size. Photos are never enlarged.
+        largest : float, optional
+            Largest factor by which the photo may be resized, if it is too long.
 
         Returns
         -------
@@ -156,7 +158,7 @@ class Photo:
         longest = max(self.box[2:])
         if max_size == 0 or longest <= max_size:
             return self
-        factor = max_size / longest
+        factor = min(max_size / longest, largest)
         while True:
             area = AreaFilter.of(self.mask.shape, factor)
             cover = area(self.mask)

@@ -132,3 +132,14 @@ def test_camera_marks_and_known_shape_move_with_it(settings: Settings) -> None:
 def test_a_known_shape_of_another_size_is_refused(settings: Settings) -> None:
     with pytest.raises(InputError, match="the shape map is 88 x 88 but the photo 560 x 400"):
         decompose(photo(), settings, known=KnownInputs(height=np.zeros((88, 88))))
+
+
+def test_a_part_is_found_for_every_size() -> None:
+    """Some factors have no pixel of the maps that begins where one of the photo does nearby."""
+    whole = photo()
+    for size in range(30, 80):
+        part = object_part(whole, size)
+        assert part.source is not None
+        assert 0.98 * size <= max(part.maps.box[2:]) <= size
+        for start in part.source.corner:
+            assert abs(start * part.maps.scale - round(start * part.maps.scale)) <= 0.02
