@@ -1,7 +1,7 @@
 """How much relief `isc decompose` recovers, and how much it invents on print.
 
   python -m benchmarks.detail.recovered SET --rows FILE [--set NAME=VALUE]... [--solve-size N]
-  [--count N] [--kind relief|print|mixed]
+  [--count N] [--kind relief|print|mixed|parts|drawn]
   python -m benchmarks.detail.recovered SET --rows FILE --normals DIR
 
 SET is a folder of `benchmarks.detail.sets`, the measure that of `benchmarks.detail.measure`. By
@@ -10,10 +10,10 @@ default the pipeline that users run is measured, with its settings (`--set detai
 `NAME.npy` (H, W, 3) of a folder instead. A row is stored for each body, so that an interrupted run
 continues.
 
-Table: relief, the share of the true energy explained, mean over bodies; print, the mean energy that
-is invented over the mean true energy of the relief bodies; mixed, the share explained on bodies
-that have both; base, the median over bodies of the median angle of the overall shape. Intervals are
-of 2,000 sets of resampled bodies.
+Table: relief, mixed and parts, the share of the true energy explained, mean over bodies; print and
+drawn, the mean energy that is invented over the mean true energy of the relief bodies; base, the
+median over bodies of the median angle of the overall shape. Intervals are of 2,000 sets of
+resampled bodies.
 """
 
 import argparse
@@ -153,27 +153,26 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     str
         A Markdown table.
     """
-    relief, printed, mixed = (
-        [row for row in rows if row["body"].startswith(kind)]
-        for kind in (SetKind.RELIEF, SetKind.PRINT, SetKind.MIXED)
-    )
+    of_kind = {kind: [row for row in rows if row["body"].startswith(kind)] for kind in SetKind}
     lines = [
         "| figure | bodies | " + " | ".join(f"{one} px" for one in OCTAVES) + " | base | seconds |",
         "|---" * (len(OCTAVES) + 4) + "|",
     ]
     rng = np.random.default_rng(0)
-    for title, bodies in (("relief: explained", relief), ("mixed: explained", mixed)):
-        if bodies:
+    for kind in (SetKind.RELIEF, SetKind.MIXED, SetKind.PARTS):
+        if bodies := of_kind[kind]:
             explained = np.array([row["explained"] for row in bodies])
             again = explained[rng.integers(len(bodies), size=(_RESAMPLED, len(bodies)))].mean(1)
-            lines.append(_line(title, bodies, explained.mean(0), again))
-    if relief and printed:
-        energy = np.array([row["energy"] for row in relief])
-        error = np.array([row["error"] for row in printed])
-        above = error[rng.integers(len(printed), size=(_RESAMPLED, len(printed)))].mean(1)
-        below = energy[rng.integers(len(relief), size=(_RESAMPLED, len(relief)))].mean(1)
-        figures = error.mean(0) / energy.mean(0)
-        lines.append(_line("print: invented", printed, figures, above / below))
+            lines.append(_line(f"{kind}: explained", bodies, explained.mean(0), again))
+    relief = of_kind[SetKind.RELIEF]
+    for kind in (SetKind.PRINT, SetKind.DRAWN):
+        if relief and (bodies := of_kind[kind]):
+            energy = np.array([row["energy"] for row in relief])
+            error = np.array([row["error"] for row in bodies])
+            above = error[rng.integers(len(bodies), size=(_RESAMPLED, len(bodies)))].mean(1)
+            below = energy[rng.integers(len(relief), size=(_RESAMPLED, len(relief)))].mean(1)
+            figures = error.mean(0) / energy.mean(0)
+            lines.append(_line(f"{kind}: invented", bodies, figures, above / below))
     return "\n".join(lines)
 
 
@@ -213,7 +212,8 @@ def main() -> None:
         rows = []
         measure = partial(score_body, estimator=estimator)
         for row in body_rows(given.folder, given.rows, kinds, given.count, key, measure):
-            shown = "error" if row["body"].startswith(SetKind.PRINT) else "explained"
+            printed = row["body"].startswith((SetKind.PRINT, SetKind.DRAWN))
+            shown = "error" if printed else "explained"
             print(row["body"], shown, *(f"{value:.3g}" for value in row[shown]), flush=True)
             rows.append(row)
     except InputError as error:

@@ -2,7 +2,8 @@
 
   python -m benchmarks.detail.relief_rule SET --rows FILE [--count N]
 
-SET is the validation set of `benchmarks.detail.sets`. Each body is decomposed without fine relief.
+SET is the validation set of `benchmarks.detail.sets`, of which bodies with relief, with print and
+mixed ones are used. Each body is decomposed without fine relief.
 The evidence of its blocks, and where there is relief, are stored in a row for each body, so that an
 interrupted run continues.
 
@@ -40,6 +41,7 @@ from .body_rows import body_rows
 from .rendering import SetKind
 from .sets import PHOTO, Truth, read_truth
 
+_KINDS = (SetKind.RELIEF, SetKind.PRINT, SetKind.MIXED)
 _RIDGE, _OFFSET_RIDGE = 0.1, 1e-6
 _LEAST_RELIEF = 4e-4
 _MOST_CHANGE = 0.05
@@ -163,7 +165,7 @@ def main() -> None:
     rows = []
     try:
         for row in body_rows(
-            given.folder, given.rows, list(SetKind), given.count, "blocks", evidence_and_truth
+            given.folder, given.rows, _KINDS, given.count, "blocks", evidence_and_truth
         ):
             print(row["body"], len(row["weight"]), "blocks", flush=True)
             rows.append(row)
@@ -182,7 +184,7 @@ def _print_rule(rows: Sequence[Mapping[str, Any]]) -> None:
     probability = left_out(features, is_relief, weight, body)
     loss = -np.log(np.maximum(np.where(is_relief, probability, 1 - probability), 1e-9))
     correct = (probability > 0.5) == is_relief
-    for kind in SetKind:
+    for kind in _KINDS:
         of_kind = kinds == kind
         total = max(float(weight[of_kind].sum()), 1e-9)
         means = [float((one * weight)[of_kind].sum()) / total for one in (loss, correct)]

@@ -1,7 +1,9 @@
 """Photos of bodies with relief of one paint, of smooth bodies with print, and of bodies with both.
 
 Normals are exact. A body with both has patches, about a fifth of its length wide: some of one paint
-with relief, the others flat with print.
+with relief, the others flat with print. Two more kinds consist of parts (`part_maps`): their
+surface does, with the same paint for all parts or slightly different ones, or their print does.
+Parts shade each other: the light from all around by V of `part_maps`, that of lamps by horizons.
 
 Every pixel is the mean of four points; its true normals are the normalised means of theirs. The
 light is that of `lighting`, the camera one of `cameras`.
@@ -27,6 +29,8 @@ from training.world.views import camera_rays
 from .bodies import SHAPES, Wrap, displaced_normals, draw_wrap, facing, smooth_body
 from .cameras import Camera, photo_of
 from .lighting import Gloss, Lamp, ReachingLight, Room, outgoing_light, reaching_light
+from .part_maps import PartKind, PartMap, draw_parts
+from .part_prints import draw_part_print, varied_paint
 from .print_maps import PrintKind, draw_colour, draw_print
 from .relief_maps import ReliefKind, ReliefMap, draw_relief
 
@@ -44,6 +48,8 @@ class SetKind(StrEnum):
     RELIEF = "relief"
     PRINT = "print"
     MIXED = "mixed"
+    PARTS = "parts"  # the surface consists of parts
+    DRAWN = "drawn"  # print of parts on a smooth body
 
 
 @dataclass(frozen=True)
@@ -83,6 +89,7 @@ class _Plan:
     slope: np.ndarray | None  # spline coefficients (2, side, side) of the relief's slopes
     paint: np.ndarray  # (3,) or a map (side, side, 3)
     facts: dict[str, object]
+    shades: PartMap | None = None  # parts that shade each other
 
 
 def render(
@@ -151,6 +158,16 @@ def _planned(
         "lamps": len(room.lamps),
         "gloss": [gloss.front, gloss.alpha],
     }
+    if kind in (SetKind.PARTS, SetKind.DRAWN):
+        of_parts = list(PartKind)[number % len(PartKind)]
+        parts = draw_parts(of_parts, rng, side)
+        facts |= {"pattern": of_parts}
+        if kind == SetKind.DRAWN:
+            paint, style = draw_part_print(parts, number, rng)
+            return _Plan(mesh, family, room, gloss, None, paint, facts | {"style": style})
+        slope = np.stack([ndimage.spline_filter(one, mode="grid-wrap") for one in parts.slope])
+        paint = varied_paint(parts, draw_colour(rng), rng)
+        return _Plan(mesh, family, room, gloss, slope, paint, facts, parts)
     if kind != SetKind.PRINT:
         pattern = list(ReliefKind)[number % len(ReliefKind)]
         degrees, shares = rng.uniform(5, 16), rng.uniform(0.4, 1, 3)
@@ -228,8 +245,35 @@ def _shaded(
         middle = plan.paint.shape[0] / 2
         planes = [_sampled(plan.paint[..., c], uv, middle, order=1) for c in range(3)]
         albedo = np.clip(np.stack(planes, axis=1), 0.005, 0.95)
+    if plan.shades is not None:
+        fields = _between_parts(plan.shades, light, fields, uv, gradient, smooth, albedo)
     seen = outgoing_light(light, fields, normal, albedo, plan.gloss, plan.room)
     return np.concatenate([seen, normal, smooth], axis=1).astype(np.float32)
+
+
+def _between_parts(
+    parts: PartMap,
+    light: ReachingLight,
+    fields: np.ndarray,
+    uv: np.ndarray,
+    gradient: np.ndarray,
+    smooth: np.ndarray,
+    albedo: np.ndarray,
+) -> np.ndarray:
+    """The fields (fields, N) of light that reaches points between parts."""
+    middle, found = len(parts.height) / 2, fields.copy()
+    visible = _sampled(parts.visible, uv, middle, order=1)[:, None]
+    share = visible / (1 - albedo * (1 - visible))
+    found[:54] *= np.tile(share.T, (18, 1))
+    for lamp, seen in zip(light.lamps, found[55:], strict=True):
+        across = gradient @ lamp.toward
+        turn = np.arctan2(across[:, 1], across[:, 0]) / (2 * np.pi) % 1 * len(parts.horizon)
+        tangent = smooth @ lamp.toward / np.maximum(np.linalg.norm(across, axis=1), 1e-6)
+        places = [turn, uv[:, 1] + middle, uv[:, 0] + middle]
+        horizon = ndimage.map_coordinates(parts.horizon, places, order=1, mode="grid-wrap")
+        apart = (np.arctan(tangent) - np.arctan(horizon)) / (2 * lamp.radius)
+        seen *= np.clip(0.5 + apart, 0, 1)
+    return found
 
 
 def _sampled(values: np.ndarray, uv: np.ndarray, middle: float, order: int) -> np.ndarray:

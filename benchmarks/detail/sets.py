@@ -1,12 +1,13 @@
-"""Write the measured sets: photos of bodies with relief, of smooth ones with print, and with both.
+"""Write the measured sets: photos of bodies with relief, of smooth ones with print, and of others.
 
   python -m benchmarks.detail.sets FOLDER --panoramas DIR --part validation|lights|test
   [--camera good|phone] [--count N]
 
-FOLDER gets `relief_NN`, `print_NN` and `mixed_NN`, each with `photo.png` (the mask in alpha) and
-`truth.npz`. What is there already is kept. Methods are chosen on `validation` and `lights`, figures
-reported on `test`. Half of the panoramas kept from learning light the bodies of `validation`, half
-those of `test`; all others light the bodies of `validation` once more in `lights`.
+FOLDER gets `relief_NN`, `print_NN`, `mixed_NN`, `parts_NN` and `drawn_NN` (`rendering.SetKind`),
+each with `photo.png` (the mask in alpha) and `truth.npz`. What is there already is kept. Methods
+are chosen on `validation` and `lights`, figures reported on `test`. Half of the panoramas kept from
+learning light the bodies of `validation`, half those of `test`; all others light the bodies of
+`validation` once more in `lights`.
 """
 
 import argparse

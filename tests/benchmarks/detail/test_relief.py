@@ -86,8 +86,9 @@ def test_paint_is_a_reflectance(kind: PrintKind) -> None:
 
 @pytest.mark.slow
 def test_relief_bends_normals_and_print_does_not(tmp_path: Path) -> None:
-    relief, printed, mixed = (render(kind, 0, 1, [ROOM], SIDE) for kind in SetKind)
-    for scene in (relief, printed, mixed):
+    scenes = [render(kind, 0, 1, [ROOM], SIDE) for kind in SetKind]
+    relief, printed, mixed, parts, drawn = scenes
+    for scene in scenes:
         assert_allclose(np.linalg.norm(scene.normal[scene.mask], axis=1), 1, atol=1e-5)
         assert not scene.normal[~scene.mask].any()
         assert max(np.ptp(np.nonzero(scene.mask), axis=1)) + 1 == pytest.approx(
@@ -95,6 +96,9 @@ def test_relief_bends_normals_and_print_does_not(tmp_path: Path) -> None:
         )
         write_scene(tmp_path, scene)
     assert np.array_equal(printed.normal, printed.smooth)
+    assert np.array_equal(drawn.normal, drawn.smooth)
+    cosine = (parts.normal * parts.smooth).sum(2)[parts.mask]
+    assert 15 < np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 60
     cosine = (relief.normal * relief.smooth).sum(2)[relief.mask]
     assert 3 < np.degrees(np.sqrt(np.mean(2 - 2 * np.minimum(cosine, 1)))) < 25
     bent = np.abs(mixed.normal - mixed.smooth).max(2)[mixed.mask] > 1e-3
