@@ -22,7 +22,7 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
-from ..imaging.bounding_box import FramePart
+from ..imaging.bounding_box import FramePart, mask_slices
 from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
@@ -83,7 +83,8 @@ _RESULT_FILES = (
 # A small object in a large frame compresses to a hundredth.
 _LIMITS = Limits(max_bytes=1 << 33)
 _PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the default 6 for 18 % more bytes
-_MOST_AT_ONCE = 1 << 21  # pixels: beyond, maps are written before the mesh is built, to save memory
+# Pixels of the object's box: beyond, maps are written before the mesh is built, to save memory.
+_MOST_AT_ONCE = 1 << 21
 _LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # lower bounds, from measured results
 _ARRAY_BYTES_A_PIXEL = 129  # the maps of the arrays file are not compressed
@@ -146,7 +147,7 @@ def save(
         (partial / "maps").mkdir()
         maps = pool.submit(_write_maps, d, channels, partial)
         preview = pool.submit(_write_preview, d, partial / "preview.png")
-        if d.mask.size > _MOST_AT_ONCE:
+        if d.mask[mask_slices(d.mask)].size > _MOST_AT_ONCE:
             maps.result()
             release_memory()
         monitor.report("building the mesh", 0.4)
