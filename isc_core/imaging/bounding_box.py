@@ -85,7 +85,7 @@ class FramePart:
     shape: tuple[int, int]
 
     @classmethod
-    def around(cls, mask: np.ndarray, margin: int, step: int = 1) -> "FramePart":
+    def around(cls, mask: np.ndarray, margin: int) -> "FramePart":
         """Return the box of a mask with a margin, or the whole frame if it is half of that.
 
         Parameters
@@ -94,17 +94,12 @@ class FramePart:
             At least one pixel is set.
         margin : int
             Pixels around the box, clipped at the frame.
-        step : int, optional
-            The first row and column are multiples of it.
 
         Returns
         -------
         FramePart
         """
-        rows, columns = (
-            slice(box.start - box.start % step, box.stop) for box in mask_slices(mask, margin)
-        )
-        part = cls(rows, columns, (mask.shape[0], mask.shape[1]))
+        part = cls(*mask_slices(mask, margin), (mask.shape[0], mask.shape[1]))
         return part if part.share <= WORTHWHILE else cls.whole(part.shape)
 
     @classmethod

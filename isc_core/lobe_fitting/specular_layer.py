@@ -27,7 +27,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..imaging.bounding_box import FramePart
 from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_codes, srgb_to_linear
 from ..imaging.upsampling import enlarged
@@ -42,8 +41,6 @@ ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth
 _ANGLES, _NODES = 10, 32
 _MIN_ROUGHNESS = 0.05
 _DARKEST = 1e-6
-BLEED = 64
-"""Pixels around the object; farther out, the effect is the mean."""
 
 
 @dataclass(frozen=True)
@@ -166,7 +163,6 @@ class CoatedSurface:
         if level <= 0:
             return None
         mask = self.normal.any(-1)
-        part = FramePart.around(mask, BLEED)
         normal = self.normal[mask].astype(float)
         view = self.view if self.view.ndim == 1 else self.view[mask]
         model = _layer(level, roughness)
@@ -175,10 +171,9 @@ class CoatedSurface:
         inside = np.concatenate([mirrored / np.maximum(self.shading[mask], _DARKEST), share], -1)
         if self.variation is not None:
             inside *= self.variation[mask][:, None]
-        near = part.cut(mask)
-        effect = np.zeros((*near.shape, 4), np.float32)
-        effect[near] = inside
-        return SpecularLayer(part.placed(fill(effect, near), inside.mean(0)))
+        effect = np.zeros((*mask.shape, 4), np.float32)
+        effect[mask] = inside
+        return SpecularLayer(fill(effect, mask))
 
 
 def specular_share(level: float, roughness: float, cosines: np.ndarray) -> np.ndarray:

@@ -76,7 +76,6 @@ from .mesh.result import MeshResult
 
 ARRAYS = "arrays.npz"
 _MARGIN = 64  # pixels around the object, beyond those that the texture is extended by
-_ALIGNED = 64  # pixels, a multiple of all distances between vertices
 _SEARCH = 64  # pixels by which the part of the frame is extended at most
 _INTEGERS = {"faces", "vertex_pixel", "photo_size", "frame"}
 
@@ -107,12 +106,11 @@ def write_arrays(
     OSError
         If the file cannot be written.
     """
-    built = built or mesh_of(d)
-    factor = 1.0 if texture is None else texture.shape[1] / d.mask.shape[1]
-    part = _part_of(d.mask, factor)
-    arrays = arrays_of(cut_result(d, part), built.cut(part))
-    arrays["frame"] = np.array([*part.corner, *part.shape[::-1]], np.int32)
+    factor = finer_by(texture, d.mask)
+    built = built or mesh_of(d, finer=factor)
+    part = built.place
     fine = part.scaled(factor, d.mask.shape if texture is None else texture.shape)
+    arrays = arrays_of(cut_result(d, part), built)
     if texture is not None:
         arrays["texture"] = fine.cut(texture)
     if cover is not None:
@@ -126,8 +124,9 @@ def mesh_of(
     options: MeshOptions | None = None,
     cover: ObjectCover | None = None,
     gloss: SpecularFit | None = None,
+    finer: float = 1.0,
 ) -> MeshResult:
-    """Build the mesh of a result.
+    """Build the mesh of a result, with maps and textures of the object's part of the frame.
 
     Parameters
     ----------
@@ -137,6 +136,8 @@ def mesh_of(
         The mesh follows its outline, unless the object is so thin that smoothing would remove it.
     gloss : SpecularFit, optional
         From another mesh of this result, if it is known.
+    finer : float, optional
+        Size of a texture of the frame over the size of the maps.
 
     Returns
     -------
@@ -147,11 +148,30 @@ def mesh_of(
     InputError
         If the mask is too small for a mesh.
     """
-    if gloss is not None:
-        return _coated(d, _surface_of(d, options, cover), gloss)
+    part = _part_of(d.mask, finer)
+    near, edge = cut_result(d, part), None if cover is None else cover.cut(part)
     with ThreadPoolExecutor(1) as pool:  # half of the work
-        found = pool.submit(bounded_specular, d)
-        return _coated(d, _surface_of(d, options, cover), found.result())
+        found = None if gloss is not None else pool.submit(bounded_specular, near)
+        built = _surface_of(near, options, edge)
+        fit = gloss if found is None else found.result()
+    assert fit is not None
+    return replace(_coated(near, built, fit), part=part)
+
+
+def finer_by(texture: np.ndarray | None, mask: np.ndarray) -> float:
+    """Return the size of a texture of the frame over the size of the maps.
+
+    Parameters
+    ----------
+    texture : (h, w, ...) ndarray or None
+    mask : (H, W) ndarray
+
+    Returns
+    -------
+    float
+        1 without a texture.
+    """
+    return 1.0 if texture is None else texture.shape[1] / mask.shape[1]
 
 
 def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResult:
@@ -179,19 +199,13 @@ def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResu
 def _surface_of(
     d: Decomposition, options: MeshOptions | None, cover: ObjectCover | None
 ) -> MeshResult:
-    """The mesh without gloss; only the object's part of the frame is processed."""
-    options = options or MeshOptions()
-    part = FramePart.around(d.mask, _MARGIN + options.bleed, _ALIGNED)
-    camera = None if d.camera is None else d.camera.moved(-part.corner[0], -part.corner[1])
-    height, normal, mask, reflectance = map(part.cut, (d.height, d.normal, d.mask, d.reflectance))
+    maps = d.height, d.normal, d.mask, d.reflectance
     try:
-        near = None if cover is None else cover.cut(part)
-        built = build_mesh(height, normal, mask, reflectance, options, camera, near)
+        return build_mesh(*maps, options, camera=d.camera, cover=cover)
     except InputError:
         if cover is None:
             raise
-        built, cover = build_mesh(height, normal, mask, reflectance, options, camera), None
-    return replace(built.placed(part, d.reflectance[d.mask].mean(0, dtype=float)), cover=cover)
+        return build_mesh(*maps, options, camera=d.camera)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
@@ -200,8 +214,9 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     Parameters
     ----------
     d : Decomposition
+        The part of the result that the mesh covers.
     built : MeshResult
-        The mesh of `d`.
+        Its mesh.
 
     Returns
     -------
@@ -212,7 +227,9 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
         d.provenance.input.get("size", d.mask.shape[::-1]),
         d.provenance.input.get("scale", 1.0),
     )
+    part = built.place
     values |= {"photo_size": np.array(size), "crop_scale": np.array(scale)}
+    values["frame"] = np.array([*part.corner, *part.shape[::-1]])
     return {name: _typed(name, array) for name, array in values.items()}
 
 
@@ -221,13 +238,15 @@ def _part_of(mask: np.ndarray, factor: float) -> FramePart:
     `factor`, or nearly so.
     """
     part = FramePart.around(mask, _MARGIN + MeshOptions().bleed)
-    if part.is_whole or factor == 1:
+    if part.is_whole:
         return part
 
     def distance(edge: int) -> float:
         return abs(edge * factor - round(edge * factor))
 
     def extended(along: slice, count: int) -> slice:
+        if factor == 1:  # the grid of a mesh with fewer triangles is that of the whole frame
+            return slice(along.start - along.start % _SEARCH, along.stop)
         first = range(along.start, max(along.start - _SEARCH, -1), -1)
         last = range(along.stop, min(along.stop + _SEARCH, count + 1))
         return slice(min(first, key=distance), min(last, key=distance))

@@ -37,7 +37,7 @@ from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
-from .arrays_file import ARRAYS, mesh_of, write_arrays
+from .arrays_file import ARRAYS, finer_by, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
@@ -152,12 +152,13 @@ def save(
             release_memory()
         monitor.report("building the mesh", 0.4)
         edge = object_cover(d, cover)
-        built = mesh_of(d, mesh, edge)
+        finer = finer_by(texture, d.mask)
+        built = mesh_of(d, mesh, edge, finer=finer)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
             # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
-            plain = built if edge is None else mesh_of(d, mesh, gloss=built.gloss)
+            plain = built if edge is None else mesh_of(d, mesh, None, built.gloss, finer)
             write_arrays(d, partial / ARRAYS, plain, texture, edge)
         if png:
             write_layer_pngs(d, partial)

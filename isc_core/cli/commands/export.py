@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...io.atomic import require_writable
 from ...lobe_fitting.specular_level import SpecularSource
 from ...progress import Monitor
-from ...result_files.arrays_file import mesh_of
+from ...result_files.arrays_file import finer_by, mesh_of
 from ...result_files.exports.full_texture import full_texture
 from ...result_files.exports.mesh_file import SUFFIXES, check_mesh_path, write_mesh_file
 from ...result_files.exports.targets import TARGETS
@@ -22,6 +22,7 @@ from ...result_files.mesh.options import MeshOptions
 from ...result_files.result_folder import MASK, load
 from ...result_files.solids.back import Back
 from ...scene.decomposition import Decomposition
+from ...scene.part_of_result import cut_result
 from ..interface.options import add_limits, add_triangles, limits_of
 from ..interface.parser import describe, hints
 from ..interface.result_photo import photo_of_result
@@ -138,9 +139,13 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     cover = object_cover(d, read_cover(options.result / MASK))
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
     # Texture sets are for the plane of the photo, whose mesh has its vertices at pixels.
-    built = mesh_of(d, how, None if options.format is None else cover)
-    if options.photo is not None and options.texture_size != MAPS_SIZE:
-        built = replace(built, texture=_fine_texture(d, options))
+    fine = options.photo is not None and options.texture_size != MAPS_SIZE
+    texture = _fine_texture(d, options) if fine else None
+    factor = finer_by(texture, d.mask)
+    built = mesh_of(d, how, None if options.format is None else cover, finer=factor)
+    if texture is not None:
+        near = built.place.scaled(factor, texture.shape)
+        built = replace(built, texture=near.cut(texture))
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
         built = replace(built, gloss=replace(built.gloss, **given))
@@ -150,9 +155,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         return hints(options, f"wrote {', '.join(map(str, files))}")
     writing = monitor.part(0.4, 1.0)
     write_texture_set(
-        d,
+        cut_result(d, built.place),
         built,
-        d.mask.astype(np.float32) if cover is None else cover.share,
+        built.place.cut(d.mask.astype(np.float32) if cover is None else cover.share),
         options.textures,
         output,
         name=name,

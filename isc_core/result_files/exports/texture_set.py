@@ -94,8 +94,9 @@ def write_texture_set(
     Parameters
     ----------
     d : Decomposition
+        The part of the result that the mesh covers.
     built : MeshResult
-        The mesh of `d`.
+        Its mesh.
     cover : (H, W) ndarray
         Alpha of the base colour.
     target : str
@@ -274,6 +275,7 @@ def _description(
         "target": target,
         "photo": d.provenance.input.get("name", ""),
         "size": list(built.base_color_size),
+        "frame": [*built.place.corner, *built.place.shape[::-1]],
         "files": {texture: f"{name}_{texture}.png" for texture in textures}
         | {"height_float": f"{name}_height.exr"},
         "colour_space": {"basecolor": "sRGB", "others": "linear"},

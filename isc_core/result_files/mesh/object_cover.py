@@ -46,15 +46,18 @@ class ObjectCover:
         The coverage of the photo's pixels, in codes.
     scale : float
         Map pixels per pixel of `fine`.
+    corner : tuple of int
+        (x, y) of the upper left pixel in the maps that `fine` covers.
     """
 
     share: np.ndarray
     soft: np.ndarray | None = None
     fine: np.ndarray | None = None
     scale: float = 1.0
+    corner: tuple[int, int] = (0, 0)
 
     def cut(self, part: FramePart) -> "ObjectCover":
-        """Return the coverage of a part of the frame, without that of the photo's pixels.
+        """Return the coverage of a part of the frame.
 
         Parameters
         ----------
@@ -64,7 +67,8 @@ class ObjectCover:
         -------
         ObjectCover
         """
-        return ObjectCover(part.cut(self.share), None if self.soft is None else part.cut(self.soft))
+        soft = None if self.soft is None else part.cut(self.soft)
+        return ObjectCover(part.cut(self.share), soft, self.fine, self.scale, part.corner)
 
     def alpha(self, shape: tuple[int, int] | None = None) -> np.ndarray | None:
         """Return the opacity of the surface, which is 1 except at soft rims.
@@ -72,7 +76,7 @@ class ObjectCover:
         Parameters
         ----------
         shape : tuple of int, optional
-            Rows and columns of a texture over the frame of the maps; by default those of the maps.
+            Rows and columns of a texture over the same frame; by default those of `share`.
 
         Returns
         -------
@@ -83,7 +87,8 @@ class ObjectCover:
             return None
         height, width = shape or self.share.shape
         factor = max(1.0, width / self.share.shape[1])
-        cover = _resized(self.fine, self.scale * factor, (height, width))
+        x, y = (round(factor * start) for start in self.corner)
+        cover = _resized(self.fine, self.scale * factor, (height, width), (x, y))
         weight = enlarged(self.soft.astype(np.float32), (height, width), factor)
         return np.rint(255 * (1 - weight * (1 - cover))).astype(np.uint8)
 
@@ -146,12 +151,17 @@ def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | No
     return ObjectCover(share, soft, codes, scale)
 
 
-def _resized(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> np.ndarray:
-    """The coverage (H, W) float32 at a scale, unchanged from 1; 0 beyond the photo."""
+def _resized(
+    codes: np.ndarray, scale: float, shape: tuple[int, int], corner: tuple[int, int] = (0, 0)
+) -> np.ndarray:
+    """The coverage (H, W) float32 at a scale, unchanged from 1, from a corner (x, y) on; 0 beyond
+    the photo.
+    """
     cover = codes.astype(np.float32) / 255
     if scale < 1:
         area = AreaFilter.of(cover.shape, scale)
         cover = np.clip(area(cover) / np.maximum(area.full, 1e-6), 0, 1)
+    cover = cover[corner[1] :, corner[0] :]
     found = np.zeros(shape, np.float32)
     rows, columns = (min(a, b) for a, b in zip(shape, cover.shape, strict=True))
     found[:rows, :columns] = cover[:rows, :columns]

@@ -11,14 +11,14 @@ Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import log, pi, sqrt
 from typing import Any
 
 import numpy as np
 
 from ...imaging.bounding_box import FramePart
-from ...lobe_fitting.specular_layer import BLEED, CoatedSurface, SpecularLayer
+from ...lobe_fitting.specular_layer import CoatedSurface
 from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
 from ..solids.back import Back
@@ -28,7 +28,6 @@ from .object_cover import ObjectCover
 from .options import MeshOptions
 from .texture_codes import alpha_codes, color_codes, encoded_png, vector_codes
 
-_FLAT = np.array([0.0, 0.0, 1.0])  # of a normal map
 _SPECULAR = "KHR_materials_specular"
 
 
@@ -67,6 +66,9 @@ class MeshResult:
         Coverage that the outline follows; None for the steps of the pixels.
     coated : CoatedSurface or None
         Determines the base colour under the gloss; None keeps the base colour unchanged.
+    part : FramePart or None
+        The part of the result's frame that all pixels, textures and the camera refer to; None for
+        the whole.
     """
 
     mesh: TexturedMesh
@@ -84,75 +86,13 @@ class MeshResult:
     texture: np.ndarray | None = None
     cover: ObjectCover | None = None
     coated: CoatedSurface | None = None
+    part: FramePart | None = None
 
-    def placed(self, part: FramePart, mean: np.ndarray) -> "MeshResult":
-        """Return the mesh of a part of a frame as one of the whole frame.
-
-        Parameters
-        ----------
-        part : FramePart
-            Its place in the frame.
-        mean : (3,) ndarray
-            Mean reflectance, for the texture around the part.
-
-        Returns
-        -------
-        MeshResult
-            Without coverage.
-        """
-        (x, y), (height, width) = part.corner, part.shape
+    @property
+    def place(self) -> FramePart:
+        """The part of the result's frame that its maps and textures cover."""
         rows, columns = self.detail.shape[:2]
-        if (rows, columns) == part.shape:
-            return replace(self, cover=None)
-        u, v = self.mesh.uv.T
-        uv = np.stack([(x + u * columns) / width, 1 - (y + (1 - v) * rows) / height], -1)
-        column, row, depth = self.origin
-        return replace(
-            self,
-            mesh=replace(self.mesh, uv=uv),
-            origin=(column + x, row + y, depth),
-            vertex_pixel=self.vertex_pixel + (y, x),
-            base_color=part.placed(self.base_color, self.reflectance_scale * mean),
-            detail=part.placed(self.detail, _FLAT),
-            camera=None if self.camera is None else self.camera.moved(x, y),
-            cover=None,
-        )
-
-    def cut(self, part: FramePart) -> "MeshResult":
-        """Return the mesh of a part of the frame; the inverse of `placed`.
-
-        Parameters
-        ----------
-        part : FramePart
-            Contains the object.
-
-        Returns
-        -------
-        MeshResult
-            Without coverage, texture and light.
-        """
-        (x, y), (height, width) = part.corner, part.shape
-        base_color = part.cut(self.base_color)
-        rows, columns = base_color.shape[:2]
-        u, v = self.mesh.uv.T
-        uv = np.stack([(u * width - x) / columns, 1 - ((1 - v) * height - y) / rows], -1)
-        column, row, depth = self.origin
-        variation = self.gloss.variation
-        return replace(
-            self,
-            mesh=self.mesh if part.is_whole else replace(self.mesh, uv=uv),
-            origin=(column - x, row - y, depth),
-            vertex_pixel=self.vertex_pixel - (y, x),
-            base_color=base_color,
-            detail=part.cut(self.detail),
-            gloss=self.gloss
-            if variation is None
-            else replace(self.gloss, variation=part.cut(variation)),
-            camera=None if self.camera is None else self.camera.moved(-x, -y),
-            texture=None,
-            cover=None,
-            coated=None,
-        )
+        return FramePart.whole((rows, columns)) if self.part is None else self.part
 
     @property
     def needs_normal_map(self) -> bool:
@@ -192,19 +132,8 @@ class MeshResult:
             layer = self.coated.layer(self.specular * self._largest_variation, self.roughness)
         if self.texture is not None:
             return self.texture if layer is None else layer.codes_under(self.texture)
-        return color_codes(self.base_color) if layer is None else self._codes_under(layer)
-
-    def _codes_under(self, layer: SpecularLayer) -> np.ndarray:
-        """The base colour under the gloss; farther from the object, both are constant."""
-        assert self.coated is not None
-        part = FramePart.around(self.coated.normal.any(-1), BLEED)
-        near = SpecularLayer(part.cut(layer.effect)).color_under(part.cut(self.base_color))
-        if part.is_whole:
-            return color_codes(near)
-        far = SpecularLayer(layer.effect[part.far_corner]).color_under(
-            self.base_color[part.far_corner]
-        )
-        return part.placed(color_codes(near), color_codes(far))
+        color = self.base_color if layer is None else layer.color_under(self.base_color)
+        return color_codes(color)
 
     @property
     def has_layer(self) -> bool:
@@ -290,11 +219,16 @@ class MeshResult:
         return extension, [encoded_png(alpha_codes(variation / largest))]
 
     def describe(self) -> dict[str, Any]:
-        """Return the metadata of the mesh, ready for JSON."""
+        """Return the metadata of the mesh, ready for JSON; its origin is in pixels of the frame."""
+        left, top = self.place.corner
         return {
             "reflectance_scale": self.reflectance_scale,
             "metres_per_pixel": self.metres_per_pixel,
-            "origin": {"column": self.origin[0], "row": self.origin[1], "height": self.origin[2]},
+            "origin": {
+                "column": self.origin[0] + left,
+                "row": self.origin[1] + top,
+                "height": self.origin[2],
+            },
             "stride": self.stride,
             "base_color": "k * reflectance" + (" under the gloss" if self.has_layer else ""),
             "vertices": len(self.mesh.vertices),

@@ -41,12 +41,6 @@ def test_values_beyond_the_part_are_left_out() -> None:
     np.testing.assert_array_equal(part.cut(placed), np.arange(20.0).reshape(5, 4)[:4, :3])
 
 
-def test_a_part_begins_at_multiples_of_the_step() -> None:
-    part = FramePart.around(spot(15, 19, 30, 35), 2, 8)
-    assert part.corner == (24, 8)
-    assert part.cut(spot(15, 19, 30, 35)).sum() == 20
-
-
 def test_a_part_of_more_than_half_is_the_whole_frame() -> None:
     whole = FramePart.around(spot(2, 38, 2, 40), 0)
     assert whole.is_whole
