@@ -21,7 +21,8 @@ def mask_slices(mask: np.ndarray, margin: int = 0) -> tuple[slice, slice]:
     """
     along = ((np.flatnonzero(mask.any(axis=1 - k)), mask.shape[k]) for k in (0, 1))
     rows, columns = (
-        slice(max(set_[0] - margin, 0), min(set_[-1] + 1 + margin, size)) for set_, size in along
+        slice(max(int(set_[0]) - margin, 0), min(int(set_[-1]) + 1 + margin, size))
+        for set_, size in along
     )
     return rows, columns
 

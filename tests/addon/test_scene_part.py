@@ -10,7 +10,7 @@ import pytest
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
-from isc_core.result_files.arrays_file import mesh_of, write_arrays
+from isc_core.result_files.arrays_file import write_arrays
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.part_of_result import placed_result
 from tests.addon.scene_fixture import bump, write_result
@@ -65,17 +65,20 @@ def build(result: ResultArrays, **options: Any) -> Any:
     return build_object(result, BuildOptions(**options))
 
 
+def arrays_of_part(folder: Path, d: Decomposition) -> ResultArrays:
+    write_result(folder, d)
+    write_arrays(d, folder / "arrays.npz")
+    return read_result(folder)
+
+
 @pytest.fixture
 def flat(tmp_path: Path) -> ResultArrays:
-    return read_result(write_result(tmp_path / "bump", in_frame(bump())))
+    return arrays_of_part(tmp_path / "bump", in_frame(bump()))
 
 
 @pytest.fixture
 def before_camera(tmp_path: Path) -> ResultArrays:
-    d = in_frame(bump_before_camera())
-    folder = write_result(tmp_path / "seen", d)
-    write_arrays(d, folder / "arrays.npz", mesh_of(d))
-    return read_result(folder)
+    return arrays_of_part(tmp_path / "seen", in_frame(bump_before_camera()))
 
 
 def test_arrays_are_those_of_the_objects_part(flat: ResultArrays) -> None:
@@ -101,6 +104,7 @@ def test_the_scene_is_that_of_the_whole_frame(
     blender: Any, tmp_path: Path, request: Any, name: str, options: dict[str, Any]
 ) -> None:
     part: ResultArrays = request.getfixturevalue(name)
+    assert part.mask.size < 0.5 * FRAME[0] * FRAME[1]
     whole = of_whole_frame(part)
     near, far = build(part, **options, name="part"), build(whole, **options, name="whole")
     np.testing.assert_allclose(

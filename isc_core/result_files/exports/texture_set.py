@@ -3,9 +3,10 @@
 Problem: programs expect the same quantities in different files: green of normal maps upward or
 downward, roughness or smoothness, several values packed into the channels of one file.
 
-The textures describe the surface over the plane of the photo: height, normal and occlusion are for
-a flat plane with the photo's aspect ratio. Base colour, roughness, specular and occlusion are also
-for the mesh (its texture coordinates are those of the photo), with `mesh_normal` instead of
+The textures describe the surface over the plane of the photo, or over the object's part of it if
+that is less than half: height, normal and occlusion are for a flat plane with the aspect ratio of
+the textures. Base colour, roughness, specular and occlusion are also
+for the mesh, which has the same texture coordinates, with `mesh_normal` instead of
 `normal`, which is written if the mesh needs one.
 
     basecolor             sRGB, 8 bits: k * reflectance under the gloss, as in the mesh; alpha is

@@ -13,6 +13,7 @@ from PIL import Image
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
+from isc_core.result_files.arrays_file import mesh_of
 from isc_core.result_files.exports import texture_set
 from isc_core.result_files.exports.targets import TARGETS
 from isc_core.result_files.exports.texture_set import texture_files, write_texture_set
@@ -20,6 +21,7 @@ from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.part_of_result import cut_result
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 from tests.core.ball_scene import ball
 
@@ -220,3 +222,23 @@ def test_a_full_disk_leaves_the_earlier_set(
     assert "\n" not in str(caught.value)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     assert list(tmp_path.iterdir()) == [folder]
+
+
+def test_textures_of_a_small_object_cover_its_part_of_the_frame(tmp_path: Path) -> None:
+    d = ball((512, 700), 40.0, (330.0, 420.0))
+    built = mesh_of(d, gloss=SpecularFit(0.3, 0.5, FITTED, FITTED))
+    near = cut_result(d, built.place)
+    write_texture_set(near, built, near.mask.astype(np.float32), "generic", tmp_path, name="ball")
+    description = json.loads((tmp_path / "ball_textures.json").read_text())
+    x, y, *frame = description["frame"]
+    assert frame == [700, 512]
+    width, height = description["size"]
+    assert width * height < 0.5 * 700 * 512
+    for path in tmp_path.glob("*.png"):
+        assert codes(path).shape[:2] == (height, width)
+    alpha = codes(tmp_path / "ball_basecolor.png")[..., 3]
+    np.testing.assert_array_equal(alpha, 255 * d.mask[y : y + height, x : x + width])
+    assert description["metres_per_pixel"] == pytest.approx(0.1 / 79)
+    u, v = built.mesh.uv.T
+    column, row = (u * width).astype(int), ((1 - v) * height).astype(int)
+    assert (alpha[row, column] == 255).all()
