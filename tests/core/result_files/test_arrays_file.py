@@ -61,7 +61,8 @@ def test_the_maps_are_those_of_the_result(arrays: Arrays) -> None:
     d = ball()
     for name in (*COLOR_MAPS, "normal", "height", "confidence", "mask"):
         assert np.array_equal(arrays[name], getattr(d, name)), name
-    whole = {"mask": bool, "faces": np.int32, "vertex_pixel": np.int32, "photo_size": np.int32}
+    integers = ("faces", "vertex_pixel", "photo_size", "frame")
+    whole = {"mask": bool, **dict.fromkeys(integers, np.int32)}
     assert {name: values.dtype for name, values in arrays.items()} == {
         name: whole.get(name, np.float32) for name in arrays
     }
