@@ -176,10 +176,10 @@ def test_what_is_no_result_is_one_line(tmp_path: Path, capsys: pytest.CaptureFix
 LIMIT = """import resource, signal
 import isc_core.cli.commands.export as command
 build = command.mesh_of
-def limited(*arguments):
+def limited(*arguments, **options):
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))
-    return build(*arguments)
+    return build(*arguments, **options)
 command.mesh_of = limited"""
 
 
