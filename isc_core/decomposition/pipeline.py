@@ -47,7 +47,7 @@ __all__ = [
 
 # Memory at its peak: of the libraries, and for a pixel of the working photo, of the maps, and of
 # the frame around the part that is decomposed.
-_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES, _FRAME_BYTES = 250_000_000, 250, 260, 180
+_LEAST_BYTES, _WORKING_BYTES, _MAPS_BYTES, _FRAME_BYTES = 250_000_000, 250, 260, 70
 _REMEDY = "use a smaller --max-size"
 WORKING_SIZE = 512  # long side of the object, pixels
 _THINNEST = 12  # pixels
