@@ -92,7 +92,7 @@ class FramePart:
         Parameters
         ----------
         mask : (H, W) bool ndarray
-            At least one pixel is set.
+            If no pixel is set, the whole frame is returned.
         margin : int
             Pixels around the box, clipped at the frame.
 
@@ -100,8 +100,11 @@ class FramePart:
         -------
         FramePart
         """
-        part = cls(*mask_slices(mask, margin), (mask.shape[0], mask.shape[1]))
-        return part if part.share <= WORTHWHILE else cls.whole(part.shape)
+        shape = mask.shape[0], mask.shape[1]
+        if not mask.any():
+            return cls.whole(shape)
+        part = cls(*mask_slices(mask, margin), shape)
+        return part if part.share <= WORTHWHILE else cls.whole(shape)
 
     @classmethod
     def whole(cls, shape: tuple[int, int]) -> "FramePart":

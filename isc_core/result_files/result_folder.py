@@ -411,16 +411,10 @@ def _layers(
             f"{path} has NaN or infinite values in {broken[0]}: it is damaged; decompose the "
             "photo again"
         )
-    part = _object_part(channels["mask.A"] > 0.5)
+    part = FramePart.around(channels["mask.A"] > 0.5, 0)
     return {
         layer: _stacked([channels[name] for name in group], part) for layer, group in names.items()
     }
-
-
-def _object_part(mask: np.ndarray) -> FramePart:
-    if not mask.any():
-        return FramePart.whole((mask.shape[0], mask.shape[1]))
-    return FramePart.around(mask, 0)
 
 
 def _stacked(planes: list[np.ndarray], part: FramePart) -> np.ndarray:

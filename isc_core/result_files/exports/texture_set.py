@@ -5,9 +5,9 @@ downward, roughness or smoothness, several values packed into the channels of on
 
 The textures describe the surface over the plane of the photo, or over the object's part of it if
 that is less than half: height, normal and occlusion are for a flat plane with the aspect ratio of
-the textures. Base colour, roughness, specular and occlusion are also
-for the mesh, which has the same texture coordinates, with `mesh_normal` instead of
-`normal`, which is written if the mesh needs one.
+the textures. Base colour, roughness, specular and occlusion are also for the mesh, which has the
+same texture coordinates, with `mesh_normal` instead of `normal`, which is written if the mesh needs
+one.
 
     basecolor             sRGB, 8 bits: k * reflectance under the gloss, as in the mesh; alpha is
                           the object's cover

@@ -47,6 +47,7 @@ def test_a_part_of_more_than_half_is_the_whole_frame() -> None:
     assert whole.share == 1
     values = np.zeros(SHAPE)
     assert whole.placed(values) is values
+    assert FramePart.around(np.zeros(SHAPE, bool), 3).is_whole
 
 
 @pytest.mark.parametrize(
