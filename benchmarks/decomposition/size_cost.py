@@ -61,12 +61,12 @@ def enlarged(
     inside = np.asarray(cover) > 127
     around = max(0.0, np.sqrt(1e6 * least_frame / inside.size) - 1) / 2
     border = [(round(around * count),) * 2 for count in inside.shape]
-    background = _GREY if least_frame else 0.0
     inside = np.pad(inside, border)
-    large = np.where(inside[..., None], np.pad(large, (*border, (0, 0))), background)
+    large = np.where(inside[..., None], np.pad(large, (*border, (0, 0))), _GREY)
     grain = np.random.default_rng(0).normal(0, _NOISE, inside.shape)
     codes = np.clip(large + grain[..., None], 3, 255)
-    codes[~inside & (background == 0)] = 0
+    if not least_frame:
+        codes[~inside] = 0
     paths = folder / "photo.png", folder / "mask.png"
     Image.fromarray(np.rint(codes).astype(np.uint8)).save(paths[0])
     Image.fromarray(np.uint8(255) * inside).save(paths[1])

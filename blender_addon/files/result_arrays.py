@@ -230,6 +230,12 @@ class ResultArrays:
         return FramePart(slice(y, y + height), slice(x, x + width), self.size[::-1])
 
     @property
+    def origin_in_frame(self) -> tuple[float, float]:
+        """Column and row of the origin of `vertices` in the result's frame."""
+        (left, top), (column, row, _) = self.part.corner, self.origin.astype(float)
+        return float(left + column), float(top + row)
+
+    @property
     def camera(self) -> Camera | None:
         """The pinhole camera of the photo, for the maps; None for an orthographic view."""
         if self.focal_length is None or self.principal_point is None:

@@ -99,8 +99,7 @@ def _fit_orthographic(
     data: bpy.types.Camera, result: ResultArrays, step: float, frame: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Set lens and clipping for pixels of `step` metres; the camera's place."""
-    (width, height), (left, top) = frame, result.part.corner
-    column, row = left + float(result.origin[0]), top + float(result.origin[1])
+    (width, height), (column, row) = frame, result.origin_in_frame
     # Far enough for everything in the frame: the object's own depth, and objects beside it.
     distance = (
         4 * max(width, height) * step
@@ -117,14 +116,13 @@ def _fit_pinhole(
     data: bpy.types.Camera, result: ResultArrays, step: float, frame: tuple[float, float]
 ) -> tuple[float, float, float]:
     """Set lens, shift and clipping for pixels of `step` metres; the camera's place."""
-    assert result.focal_length is not None
-    assert result.principal_point is not None
+    assert result.camera is not None
     assert result.eye is not None
-    (width, height), (left, top) = frame, result.part.corner
-    x, y = left + float(result.principal_point[0]), top + float(result.principal_point[1])
+    seen = result.camera.moved(*result.part.corner)
+    (width, height), (x, y) = frame, seen.principal_point
     longest = max(width, height)
     data.type, data.sensor_fit, data.sensor_width = "PERSP", "AUTO", _SENSOR
-    data.lens = _SENSOR * result.focal_length / longest
+    data.lens = _SENSOR * seen.focal_length / longest
     data.shift_x, data.shift_y = (0.5 * width - x) / longest, (y - 0.5 * height) / longest
     right, behind, up = to_blender(result.eye.astype(float)) * (step / result.metres_per_pixel)
     data.clip_start, data.clip_end = -0.01 * behind, -10 * behind

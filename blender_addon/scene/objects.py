@@ -108,8 +108,7 @@ def offset_between(
         right, behind, up = map(float, eyes[0] - eyes[1])  # both are before the same eye
         return right, behind, up
     (x, y), (other_x, other_y) = (
-        (one.part.corner + one.origin[:2].astype(float) + 0.5) / one.crop_scale
-        for one in (first, other)
+        (np.array(one.origin_in_frame) + 0.5) / one.crop_scale for one in (first, other)
     )
     return float(other_x - x) * step, 0.0, float(y - other_y) * step
 

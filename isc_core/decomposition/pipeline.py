@@ -126,8 +126,9 @@ def decompose(
     task = DecompositionTask(
         working, maps, settings, constraints, prior_set, monitor, clock, kept=kept
     )
-    frame = maps.mask.shape if part.target is None else part.target.shape
-    with _within_memory(name or "the photo", working.mask.size, maps.mask.size, frame, memory):
+    with _within_memory(
+        name or "the photo", working.mask.size, maps.mask.size, part.target.shape, memory
+    ):
         estimate = solve(task)
     monitor.report("maps", 0.98)
     provenance = Provenance(
@@ -135,7 +136,7 @@ def decompose(
         settings.seed,
         _versions(),
         clock.seconds,
-        _input_json(maps, part.corner, name),
+        _input_json(maps, part.target.corner, name),
         estimate.diagnostics,
     )
     with clock.stage("maps"):

@@ -23,6 +23,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.area_resize import reduced_count
 from ..imaging.bounding_box import mask_box
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
@@ -94,7 +95,7 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
             "the result does not record the scale of its maps: decompose the photo again"
         )
     height, width = photo.mask.shape
-    expected = tuple(max(1, int(np.ceil(n * recorded - 1e-6))) for n in (height, width))
+    expected = tuple(reduced_count(count, recorded) for count in (height, width))
     if size != [width, height] or expected != d.mask.shape:
         raise InputError(
             f"the result was made from a photo of {' x '.join(map(str, size))} pixels, not of "

@@ -65,6 +65,40 @@ def mask_diagonal(mask: np.ndarray) -> float:
     return float(np.hypot(height, width))
 
 
+def misalignment(edge: int, factor: float) -> float:
+    """Return how far an edge between pixels is from the nearest one of another grid.
+
+    Parameters
+    ----------
+    edge : int
+    factor : float
+        Pixels of the other grid for one of this; both begin at 0.
+
+    Returns
+    -------
+    float
+        Pixels of the other grid, at most 1/2.
+    """
+    return abs(edge * factor - round(edge * factor))
+
+
+def aligned_edge(candidates: range, factor: float) -> int:
+    """Return the edge with the least `misalignment`, the first of several.
+
+    Parameters
+    ----------
+    candidates : range
+        Edges; not empty.
+    factor : float
+        As of `misalignment`.
+
+    Returns
+    -------
+    int
+    """
+    return min(candidates, key=lambda edge: misalignment(edge, factor))
+
+
 WORTHWHILE = 0.5
 """A part of a larger share of its frame saves too little."""
 
@@ -147,12 +181,12 @@ class FramePart:
         -------
         FramePart
         """
+        if self.is_whole:
+            return FramePart.whole((shape[0], shape[1]))
         rows, columns = (
             slice(min(round(factor * along.start), count), min(round(factor * along.stop), count))
             for along, count in zip((self.rows, self.columns), shape[:2], strict=True)
         )
-        if self.is_whole:
-            return FramePart.whole((shape[0], shape[1]))
         return FramePart(rows, columns, (shape[0], shape[1]))
 
     @property

@@ -1,5 +1,6 @@
 """Positions in a photo that a user has marked as highlights or paint."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -41,12 +42,7 @@ class HighlightMarks:
         -------
         HighlightMarks
         """
-        return HighlightMarks(
-            *(
-                tuple((factor * x, factor * y) for x, y in places)
-                for places in (self.highlights, self.paint)
-            )
-        )
+        return self._changed(lambda x, y: (factor * x, factor * y))
 
     def moved(self, right: float, down: float) -> "HighlightMarks":
         """Return the marks in a frame that begins elsewhere.
@@ -60,11 +56,12 @@ class HighlightMarks:
         -------
         HighlightMarks
         """
+        return self._changed(lambda x, y: (x + right, y + down))
+
+    def _changed(self, change: Callable[[float, float], Place]) -> "HighlightMarks":
+        """The marks with other places."""
         return HighlightMarks(
-            *(
-                tuple((x + right, y + down) for x, y in places)
-                for places in (self.highlights, self.paint)
-            )
+            *(tuple(change(*place) for place in places) for places in (self.highlights, self.paint))
         )
 
     def check(self, mask: np.ndarray) -> None:

@@ -64,7 +64,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.bounding_box import FramePart
+from ..imaging.bounding_box import FramePart, aligned_edge
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
@@ -241,15 +241,12 @@ def _part_of(mask: np.ndarray, factor: float) -> FramePart:
     if part.is_whole:
         return part
 
-    def distance(edge: int) -> float:
-        return abs(edge * factor - round(edge * factor))
-
     def extended(along: slice, count: int) -> slice:
         if factor == 1:  # the grid of a mesh with fewer triangles is that of the whole frame
             return slice(along.start - along.start % _SEARCH, along.stop)
         first = range(along.start, max(along.start - _SEARCH, -1), -1)
         last = range(along.stop, min(along.stop + _SEARCH, count + 1))
-        return slice(min(first, key=distance), min(last, key=distance))
+        return slice(aligned_edge(first, factor), aligned_edge(last, factor))
 
     rows, columns = map(extended, (part.rows, part.columns), mask.shape)
     return FramePart(rows, columns, part.shape)

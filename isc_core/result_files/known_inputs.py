@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.area_resize import reduced_count
 from ..imaging.resampling import nearest_samples
 from ..io.exr import read_channels
 from ..io.json_files import numbers, read_json
@@ -156,7 +157,7 @@ def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
         raise InputError(
             f"{folder / 'decomposition.json'} has no usable input.scale: it is damaged"
         )
-    if tuple(int(np.ceil(n * scale - 1e-6)) for n in shape) != result.mask.shape:
+    if tuple(reduced_count(count, scale) for count in shape) != result.mask.shape:
         raise InputError(
             f"{folder} is the result of a photo of another size than {_size(shape)}: use a result "
             "of this photo"

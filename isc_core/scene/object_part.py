@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..imaging.area_resize import reduced_count
-from ..imaging.bounding_box import WORTHWHILE, FramePart, mask_slices
+from ..imaging.bounding_box import WORTHWHILE, FramePart, aligned_edge, mask_slices, misalignment
 from ..photo import Photo
 from .decomposition import Decomposition
 from .known_inputs import KnownInputs
@@ -39,21 +39,16 @@ class ObjectPart:
     ----------
     photo, maps : Photo
         The part, at the photo's size and at that of the maps.
-    source : FramePart or None
-        Its place in the photo; None for the whole photo.
-    target : FramePart or None
+    source : FramePart
+        Its place in the photo.
+    target : FramePart
         The place of its maps in those of the whole photo.
     """
 
     photo: Photo
     maps: Photo
-    source: FramePart | None = None
-    target: FramePart | None = None
-
-    @property
-    def corner(self) -> tuple[int, int]:
-        """(x, y) of its upper left pixel in the maps of the whole photo."""
-        return (0, 0) if self.target is None else self.target.corner
+    source: FramePart
+    target: FramePart
 
     def known(self, inputs: KnownInputs) -> KnownInputs:
         """Return the known quantities of the part.
@@ -67,7 +62,7 @@ class ObjectPart:
         -------
         KnownInputs
         """
-        if self.source is None:
+        if self.source.is_whole:
             return inputs
         height, depth = (
             None if values is None else self.source.cut(values)
@@ -86,7 +81,7 @@ class ObjectPart:
         -------
         Decomposition
         """
-        return result if self.target is None else placed_result(result, self.target)
+        return placed_result(result, self.target)
 
 
 def object_part(photo: Photo, maps_size: int) -> ObjectPart:
@@ -116,9 +111,10 @@ def object_part(photo: Photo, maps_size: int) -> ObjectPart:
         part = photo.cut(source)
         maps = part.resized_to_object(maps_size, factor)
         factor = maps.scale / photo.scale  # smaller if the resized mask would be too long
-        if all(_distance(start, factor) <= _EXACT for start in source.corner):
+        if all(misalignment(start, factor) <= _EXACT for start in source.corner):
             return ObjectPart(part, maps, source, _in_maps(source, maps, factor))
-    return ObjectPart(photo, photo.resized_to_object(maps_size))
+    maps = photo.resized_to_object(maps_size)
+    return ObjectPart(photo, maps, *(FramePart.whole(_shape(one.mask)) for one in (photo, maps)))
 
 
 def _around(mask: np.ndarray, longest: int, factor: float) -> tuple[FramePart, float]:
@@ -126,23 +122,22 @@ def _around(mask: np.ndarray, longest: int, factor: float) -> tuple[FramePart, f
     the largest factor of the maps for which there is one.
     """
     margin = max(_LEAST_MARGIN, round(_MARGIN * longest))
-    boxes, shape = mask_slices(mask, margin), (mask.shape[0], mask.shape[1])
+    boxes = mask_slices(mask, margin)
     for _ in range(_FACTORS if factor < 1 else 1):
         rows, columns = (slice(_aligned(box.start, factor), box.stop) for box in boxes)
-        if max(_distance(one.start, factor) for one in (rows, columns)) <= _EXACT:
+        if max(misalignment(one.start, factor) for one in (rows, columns)) <= _EXACT:
             break
         factor *= 1 - _SMALLER / longest
-    return FramePart(rows, columns, shape), factor
+    return FramePart(rows, columns, _shape(mask)), factor
+
+
+def _shape(mask: np.ndarray) -> tuple[int, int]:
+    return mask.shape[0], mask.shape[1]
 
 
 def _aligned(start: int, factor: float) -> int:
     """The pixel, at most `_SEARCH` before `start`, nearest to the beginning of one of the maps."""
-    return min(range(start, max(start - _SEARCH, -1), -1), key=lambda at: _distance(at, factor))
-
-
-def _distance(start: int, factor: float) -> float:
-    """Pixels of the maps between a pixel of the photo and the nearest beginning of one of them."""
-    return abs(start * factor - round(start * factor))
+    return aligned_edge(range(start, max(start - _SEARCH, -1), -1), factor)
 
 
 def _in_maps(source: FramePart, maps: Photo, factor: float) -> FramePart:

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from ...imaging.area_resize import AreaFilter
+from ...imaging.area_resize import AreaFilter, reduced_count
 from ...imaging.bounding_box import FramePart
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
@@ -138,7 +138,7 @@ def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | No
     if not ((codes > 0) & (codes < 255)).any():
         return None
     scale = min(1.0, float(d.provenance.input.get("scale", 1.0)))
-    rows, columns = (max(1, int(np.ceil(n * scale - 1e-6))) for n in codes.shape)
+    rows, columns = (reduced_count(count, scale) for count in codes.shape)
     if (rows, columns) != d.mask.shape:  # of another photo
         return None
     share = _resized(codes, scale, (rows, columns))

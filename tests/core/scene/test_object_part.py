@@ -33,8 +33,8 @@ def photo(frame: tuple[int, int] = FRAME, place: tuple[float, float] = PLACE) ->
 def test_its_maps_are_those_of_the_whole_photo(size: int) -> None:
     whole = photo()
     part, expected = object_part(whole, size), whole.resized_to_object(size)
-    assert part.source is not None
-    assert part.target is not None
+    assert not part.source.is_whole
+    assert not part.target.is_whole
     assert part.target.shape == expected.mask.shape
     assert part.photo.mask.sum() == whole.mask.sum()
     assert part.maps.scale == expected.scale
@@ -52,7 +52,7 @@ def test_an_object_that_fills_the_frame_is_not_cut_out() -> None:
     near = photo((96, 120), (44, 66))
     part = object_part(near, 0)
     assert part.photo is near
-    assert part.corner == (0, 0)
+    assert part.target.corner == (0, 0)
     d = ball()
     assert part.placed(d) is d
     inputs = KnownInputs(height=d.height)
@@ -64,7 +64,7 @@ def test_objects_at_the_edges_of_the_frame(x: int, y: int) -> None:
     """With a size whose last row and column extend past the frame."""
     whole = photo(place=(y, x))
     part, expected = object_part(whole, 53), whole.resized_to_object(53)
-    assert part.target is not None
+    assert not part.target.is_whole
     placed = part.target.placed(part.maps.mask)
     assert placed.shape == expected.mask.shape
     assert (placed ^ expected.mask).sum() <= 0.02 * expected.mask.sum()
@@ -100,7 +100,7 @@ def test_the_place_in_the_frame_does_not_matter(settings: Settings) -> None:
     whole = photo()
     part = object_part(whole, 0)
     found, cropped = decompose(whole, settings), decompose(part.photo, settings)
-    assert part.source is not None
+    assert not part.source.is_whole
     assert found.mask.shape == FRAME
     assert found.identity_errors().broken() == ()
     np.testing.assert_array_equal(found.mask, whole.mask)
@@ -139,7 +139,7 @@ def test_a_part_is_found_for_every_size() -> None:
     whole = photo()
     for size in range(30, 80):
         part = object_part(whole, size)
-        assert part.source is not None
+        assert not part.source.is_whole
         assert 0.98 * size <= max(part.maps.box[2:]) <= size
         for start in part.source.corner:
             assert abs(start * part.maps.scale - round(start * part.maps.scale)) <= 0.02
