@@ -65,7 +65,7 @@ def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
 
 
 def unpacked_bytes(parts: tuple[ExrPart, ...]) -> int:
-    """Return the memory of a file's channels as float32.
+    """Return the memory of a file's channels as float32, in the larger of their windows.
 
     Parameters
     ----------
@@ -76,7 +76,10 @@ def unpacked_bytes(parts: tuple[ExrPart, ...]) -> int:
     int
         In bytes.
     """
-    return sum(4 * len(part.channels) * math.prod(size_of(part.data)) for part in parts)
+    return sum(
+        4 * len(part.channels) * max(math.prod(size_of(one)) for one in (part.data, part.display))
+        for part in parts
+    )
 
 
 def check_exr(

@@ -1,19 +1,19 @@
 """The folder of a result: maps, mesh, preview and provenance.
 
-A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
-`mesh.glb`, `preview.png`, and under `maps/` the main maps also as single-layer files, for programs
-that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`; `mask.png`, if the
-mask was found in the photo or is soft. With a fitted lobe, `maps.exr` has another layer, `lobe`:
-the specular image predicted by the fit; `expected_error` has the expected errors, if known. A
-refined light has other layers, `visibility` and `indirect`, and its image as `environment.exr`. A
-separation's folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder
-appears completely or not at all (see `io.atomic`).
+A decomposition's folder holds `maps.exr` (one multilayer float32 file, see `maps_file`),
+`decomposition.json`, `mesh.glb`, `preview.png`, and under `maps/` the main maps also as single-
+layer files, for programs that cannot read multilayer ones; on request `arrays.npz`, see
+`arrays_file`; `mask.png`, if the mask was found in the photo or is soft. With a fitted lobe,
+`maps.exr` has another layer, `lobe`: the specular image predicted by the fit; `expected_error` has
+the expected errors, if known. A refined light has other layers, `visibility` and `indirect`, and
+its image as `environment.exr`. A separation's folder holds `separation.exr`, `diffuse.png`,
+`specular.png`, `preview.png`. A folder appears completely or not at all (see `io.atomic`).
 """
 
 import json
 import math
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,11 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
-from ..imaging.bounding_box import FramePart, mask_slices
+from ..imaging.bounding_box import mask_slices
 from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
-from ..io.limits import Limits
 from ..io.memory import release_memory
 from ..io.png import encode_png
 from ..io.printable_names import readable
@@ -37,42 +36,40 @@ from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
+from ..scene.part_of_result import cut_result
 from .arrays_file import ARRAYS, finer_by, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
+from .maps_file import (
+    ENVIRONMENT,
+    EXPECTED_ERROR,
+    LAYERS,
+    LOBE,
+    MAPS,
+    REFINED_LIGHT,
+    SINGLE,
+    StoredMaps,
+    layer_channels,
+    map_channels,
+    stored_part,
+    write_environment,
+    write_maps,
+)
 from .mesh.object_cover import object_cover
 from .mesh.options import MeshOptions
 from .mesh.result import MeshResult
 
-SCHEMA_VERSION = 2  # 2: diagnostics are values instead of sentences
-LAYERS = {
-    **dict.fromkeys(COLOR_MAPS, "RGB"),
-    "normal": "XYZ",
-    "height": "Z",
-    "mask": "A",
-    "confidence": "Y",
-}
-LOBE = {"lobe": "RGB"}
-REFINED_LIGHT = {"visibility": "RGB", "indirect": "RGB"}
-EXPECTED_ERROR = ("expected_error.normal", "expected_error.reflectance")
-SINGLE = {
-    "diffuse": "RGB",
-    "specular": "RGB",
-    "reflectance": "RGB",
-    "shading": "RGB",
-    "normal": "RGB",
-    "height": "Y",
-}
+# 2: diagnostics are values instead of sentences; 3: files of large frames may store a part
+SCHEMA_VERSION = 3
 DECOMPOSITION_FILES = (
     "decomposition.json",
-    "maps.exr",
+    MAPS,
     "mesh.glb",
     "preview.png",
     *(f"maps/{name}.exr" for name in SINGLE),
 )
 MASK = "mask.png"
-ENVIRONMENT = "environment.exr"
 _RESULT_FILES = (
     *DECOMPOSITION_FILES,
     ARRAYS,
@@ -80,8 +77,6 @@ _RESULT_FILES = (
     ENVIRONMENT,
     *LAYER_PNGS,
 )  # including files written on demand
-# A small object in a large frame compresses to a hundredth.
-_LIMITS = Limits(max_bytes=1 << 33)
 _PREVIEW_COMPRESSION = 2  # of 9: a quarter of the time of the default 6 for 18 % more bytes
 # Pixels of the object's box: beyond, maps are written before the mesh is built, to save memory.
 _MOST_AT_ONCE = 1 << 21
@@ -129,23 +124,16 @@ def save(
         If a map has NaN or infinite values.
     """
     monitor = monitor or Monitor()
-    channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
-    if decomposition.brdf is not None:
-        channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
-    if (error := decomposition.expected_error) is not None:
-        channels |= dict(zip(EXPECTED_ERROR, (error.normal, error.reflectance), strict=True))
-    for name, letters in REFINED_LIGHT.items():
-        if (layer := getattr(decomposition, name)) is not None:
-            channels |= _channels({name: layer}, {name: letters})
-    if broken := sorted(_broken(channels)):
-        raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
+    part = stored_part(decomposition.mask)
+    stored = cut_result(decomposition, part)
+    channels = map_channels(stored)
     # The pool is inside the folder's block, so that its files are finished, or have failed, before
     # the folder is removed.
     with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(2) as pool:
         monitor.report("writing maps", 0.0)
         d = decomposition
         (partial / "maps").mkdir()
-        maps = pool.submit(_write_maps, d, channels, partial)
+        maps = pool.submit(write_maps, stored, channels, part, partial)
         preview = pool.submit(_write_preview, d, partial / "preview.png")
         if d.mask[mask_slices(d.mask)].size > _MOST_AT_ONCE:
             maps.result()
@@ -162,6 +150,8 @@ def save(
             write_arrays(d, partial / ARRAYS, plain, texture, edge)
         if png:
             write_layer_pngs(d, partial)
+        if d.environment is not None:
+            write_environment(d.environment, partial)
         if cover is not None:
             (partial / MASK).write_bytes(encoded_mask(cover))
         _write_description(d, built, partial / "decomposition.json")
@@ -169,27 +159,6 @@ def save(
         maps.result()
         preview.result()
         monitor.report("writing maps", 1.0)
-
-
-def _broken(channels: Mapping[str, np.ndarray]) -> Iterator[str]:
-    """The channels with values that are not finite."""
-    for name, values in channels.items():
-        planes = {name: values}
-        if values.ndim == 3:
-            planes = _planes(values, [f"{name}.{letter}" for letter in "RGB"])
-        yield from (plane for plane in planes if not np.isfinite(planes[plane]).all())
-
-
-def _write_maps(d: Decomposition, channels: Mapping[str, np.ndarray], folder: Path) -> None:
-    """The EXR files of a result; `channels` are those of maps.exr."""
-    write_channels(folder / "maps.exr", channels)
-    if d.environment is not None:
-        write_channels(folder / ENVIRONMENT, _planes(d.environment, list("RGB")))
-    for name, letters in SINGLE.items():
-        values = getattr(d, name)
-        whole = name in COLOR_MAPS
-        planes = {letters: values} if whole else _planes(values, list(letters))
-        write_channels(folder / "maps" / f"{name}.exr", planes)
 
 
 def _write_preview(decomposition: Decomposition, path: Path) -> None:
@@ -229,18 +198,18 @@ def load(folder: Path | str) -> Decomposition:
             "isc decompose wrote"
         )
     description = _read_json(folder / "decomposition.json")
-    channels = read_channels(folder / "maps.exr", _LIMITS)
-    maps = _layers(channels, LAYERS, folder / "maps.exr")
+    stored = StoredMaps.read(folder / MAPS)
+    maps = stored.layers(LAYERS)
     return Decomposition(
         **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
         mask=maps["mask"] > 0.5,
         illumination=_coefficients(description, folder),
         provenance=_provenance(description, folder),
-        brdf=_brdf(description, channels, folder),
-        expected_error=_expected_error(channels, folder / "maps.exr"),
+        brdf=_brdf(description, stored, folder),
+        expected_error=_expected_error(stored),
         camera=_camera(description, folder),
-        visibility=_refined_light("visibility", channels, folder / "maps.exr"),
-        indirect=_refined_light("indirect", channels, folder / "maps.exr"),
+        visibility=_refined_light("visibility", stored),
+        indirect=_refined_light("indirect", stored),
         environment=_environment(folder / ENVIRONMENT),
     )
 
@@ -276,16 +245,15 @@ def save_separation(
     inside = image.max(-1) > 0 if mask is None else mask
     if not inside.any():
         raise InputError("the image is black inside the mask: there is nothing to separate")
+    part = stored_part(inside)
     layers = {"diffuse": "RGB", "specular": "RGB", "residual": "RGB", "confidence": "Y"}
-    channels = _channels(
-        {"image": image, **{name: getattr(separation, name) for name in layers}},
-        {"image": "RGB", **layers},
-    )
+    maps = {name: part.cut(getattr(separation, name)) for name in layers}
+    channels = layer_channels({"image": part.cut(image), **maps}, {"image": "RGB", **layers})
     with new_folder(folder, (*SEPARATION_FILES, MASK)) as partial:
-        write_channels(partial / "separation.exr", channels)
+        write_channels(partial / "separation.exr", channels, part.corner, part.shape)
         for name in ("diffuse", "specular"):
-            coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
-            Image.fromarray(np.rint(255 * coded).astype(np.uint8)).save(partial / f"{name}.png")
+            codes = np.rint(255 * linear_to_srgb(np.clip(maps[name], 0, 1))).astype(np.uint8)
+            Image.fromarray(part.placed(codes)).save(partial / f"{name}.png")
         if cover is not None:
             (partial / MASK).write_bytes(encoded_mask(cover))
         sheet = separation_sheet(separation, image, inside, title)
@@ -376,59 +344,6 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _planes(values: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
-    return {
-        name: values[..., index] if values.ndim == 3 else values for index, name in enumerate(names)
-    }
-
-
-def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict[str, np.ndarray]:
-    channels: dict[str, np.ndarray] = {}
-    for name, letters in layers.items():
-        if letters == "RGB":
-            channels[name] = maps[name]
-        else:
-            channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
-    return channels
-
-
-def _layers(
-    channels: Mapping[str, np.ndarray], layers: Mapping[str, str], path: Path
-) -> dict[str, np.ndarray]:
-    names = {
-        layer: [f"{layer}.{letter}" for letter in letters] or [layer]
-        for layer, letters in layers.items()
-    }
-    if missing := [name for group in names.values() for name in group if name not in channels]:
-        raise InputError(
-            f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is "
-            "damaged"
-        )
-    if broken := [
-        name for group in names.values() for name in group if not np.isfinite(channels[name]).all()
-    ]:
-        raise InputError(
-            f"{path} has NaN or infinite values in {broken[0]}: it is damaged; decompose the "
-            "photo again"
-        )
-    part = FramePart.around(channels["mask.A"] > 0.5, 0)
-    return {
-        layer: _stacked([channels[name] for name in group], part) for layer, group in names.items()
-    }
-
-
-def _stacked(planes: list[np.ndarray], part: FramePart) -> np.ndarray:
-    """The planes of a layer as one array; only the object's part of the frame is copied if they are
-    constant around it.
-    """
-    if len(planes) == 1:
-        return planes[0]
-    around = [part.constant_around(plane) for plane in planes]
-    if part.is_whole or None in around:
-        return np.stack(planes, -1)
-    return part.placed(np.stack([part.cut(plane) for plane in planes], -1), np.array(around))
-
-
 def _read_json(path: Path) -> dict[str, Any]:
     description = read_json(path)
     version = description.get("schema_version") if isinstance(description, dict) else None
@@ -462,15 +377,13 @@ def _camera(description: Mapping[str, Any], folder: Path) -> Camera | None:
         ) from error
 
 
-def _brdf(
-    description: Mapping[str, Any], channels: Mapping[str, np.ndarray], folder: Path
-) -> LobeFit | None:
+def _brdf(description: Mapping[str, Any], stored: StoredMaps, folder: Path) -> LobeFit | None:
     """The fit; None without one, as in results of earlier versions."""
     if description.get("brdf") is None:
         return None
     from .lobe_json import lobe_fit_from_json
 
-    predicted = _layers(channels, LOBE, folder / "maps.exr")["lobe"]
+    predicted = stored.layers(LOBE)["lobe"]
     try:
         return lobe_fit_from_json(description["brdf"], predicted)
     except (KeyError, TypeError, ValueError) as error:
@@ -479,19 +392,19 @@ def _brdf(
         ) from error
 
 
-def _expected_error(channels: Mapping[str, np.ndarray], path: Path) -> ExpectedError | None:
+def _expected_error(stored: StoredMaps) -> ExpectedError | None:
     """None without one, as in results of baselines and of earlier versions."""
-    if not any(name in channels for name in EXPECTED_ERROR):
+    if not any(name in stored.channels for name in EXPECTED_ERROR):
         return None
-    maps = _layers(channels, dict.fromkeys(EXPECTED_ERROR, ""), path)
+    maps = stored.layers(dict.fromkeys(EXPECTED_ERROR, ""))
     return ExpectedError(*(maps[name] for name in EXPECTED_ERROR))
 
 
-def _refined_light(name: str, channels: Mapping[str, np.ndarray], path: Path) -> np.ndarray | None:
+def _refined_light(name: str, stored: StoredMaps) -> np.ndarray | None:
     """A layer of `REFINED_LIGHT`; None if the light was not refined."""
-    if f"{name}.R" not in channels:
+    if f"{name}.R" not in stored.channels:
         return None
-    return np.asarray(_layers(channels, {name: REFINED_LIGHT[name]}, path)[name])
+    return stored.layers({name: REFINED_LIGHT[name]})[name]
 
 
 def _environment(path: Path) -> np.ndarray | None:

@@ -9,6 +9,9 @@ from ..imaging.bounding_box import FramePart
 from .decomposition import Decomposition
 from .expected_error import ExpectedError
 
+AROUND = {"normal": np.array((0.0, 0.0, 1.0)), "visibility": np.ones(3)}
+"""Values of maps outside the object, by field of `Decomposition`; those of the others are 0."""
+
 
 def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
     """Return a part of a result.
@@ -25,7 +28,7 @@ def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
         Its maps are views; the result itself if the part is the whole frame.
     """
     x, y = part.corner
-    return d if part.is_whole else _changed(d, part.cut, (-x, -y))
+    return d if part.is_whole else _changed(d, lambda values, _: part.cut(values), (-x, -y))
 
 
 def placed_result(d: Decomposition, part: FramePart) -> Decomposition:
@@ -42,38 +45,39 @@ def placed_result(d: Decomposition, part: FramePart) -> Decomposition:
     Decomposition
         Its maps have, around the part, the values of pixels outside the mask.
     """
-    if part.is_whole:
-        return d
-    found = _changed(d, part.placed, part.corner)
-    outside = ~found.mask
-    found.normal[outside, 2] = 1
-    if found.visibility is not None:
-        found.visibility[outside] = 1
-    return found
+    return d if part.is_whole else _changed(d, part.placed, part.corner)
 
 
 def _changed(
-    d: Decomposition, change: Callable[[np.ndarray], np.ndarray], moved: tuple[int, int]
+    d: Decomposition,
+    change: Callable[[np.ndarray, np.ndarray | None], np.ndarray],
+    moved: tuple[int, int],
 ) -> Decomposition:
-    """A result whose maps are changed, and whose frame begins elsewhere."""
+    """A result whose maps are changed, and whose frame begins elsewhere; the second argument of
+    `change` is the value outside the object.
+    """
+
+    def changed(values: np.ndarray, name: str = "") -> np.ndarray:
+        return change(values, AROUND.get(name))
+
     brdf, error = d.brdf, d.expected_error
     return replace(
         d,
-        image=change(d.image),
-        diffuse=change(d.diffuse),
-        specular=change(d.specular),
-        residual=change(d.residual),
-        reflectance=change(d.reflectance),
-        shading=change(d.shading),
-        normal=change(d.normal),
-        height=change(d.height),
-        mask=change(d.mask),
-        confidence=change(d.confidence),
-        brdf=None if brdf is None else replace(brdf, predicted=change(brdf.predicted)),
+        image=changed(d.image),
+        diffuse=changed(d.diffuse),
+        specular=changed(d.specular),
+        residual=changed(d.residual),
+        reflectance=changed(d.reflectance),
+        shading=changed(d.shading),
+        normal=changed(d.normal, "normal"),
+        height=changed(d.height),
+        mask=changed(d.mask),
+        confidence=changed(d.confidence),
+        brdf=None if brdf is None else replace(brdf, predicted=changed(brdf.predicted)),
         expected_error=None
         if error is None
-        else ExpectedError(change(error.normal), change(error.reflectance)),
+        else ExpectedError(changed(error.normal), changed(error.reflectance)),
         camera=None if d.camera is None else d.camera.moved(*moved),
-        visibility=None if d.visibility is None else change(d.visibility),
-        indirect=None if d.indirect is None else change(d.indirect),
+        visibility=None if d.visibility is None else changed(d.visibility, "visibility"),
+        indirect=None if d.indirect is None else changed(d.indirect),
     )

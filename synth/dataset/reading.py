@@ -11,7 +11,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.exr import read_channels
 from isc_core.io.json_files import numbers, read_json
-from isc_core.result_files.result_folder import LAYERS
+from isc_core.result_files.maps_file import LAYERS
 
 from ..capture.truth import GroundTruth
 from .description import KIND, SCHEMA_VERSION

@@ -17,7 +17,7 @@ from PIL import Image
 from isc_core.io.atomic import new_folder
 from isc_core.io.exr import write_channels
 from isc_core.result_files.contact_sheet import contact_sheet
-from isc_core.result_files.result_folder import LAYERS
+from isc_core.result_files.maps_file import LAYERS
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition, Provenance
 
 from ..capture.recipe import Recipe

@@ -17,7 +17,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.io.exr import read_channels
 from isc_core.photo import read_photo
 from isc_core.progress import Monitor, ProgressEvent
-from isc_core.result_files.result_folder import LAYERS
+from isc_core.result_files.maps_file import LAYERS
 from isc_core.shading.spherical_harmonics import real_sh
 from synth.capture.recipe import PictureSettings, Recipe, photograph
 from synth.capture.sensor import Sensor

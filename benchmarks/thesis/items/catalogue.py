@@ -26,7 +26,8 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.io.exr import read_channels
-from isc_core.result_files.result_folder import LAYERS, save
+from isc_core.result_files.maps_file import LAYERS
+from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.brdf.blinn_phong import BlinnPhong
 from isc_core.shading.brdf.dichromatic import Dichromatic

@@ -9,6 +9,7 @@ import numpy as np
 import OpenEXR
 
 from ...errors import InputError
+from ..exr import in_frame, place_in_frame
 from ..exr_header import ExrPart, check_exr, size_of
 from ..limits import Limits
 from ..native_io import memory_file
@@ -59,7 +60,10 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     names = _exr_channels(list(by_name), path)
     if len({by_name[name][0].shape for name in names}) > 1:
         raise InputError(f"{path}: its channels differ in size: save it as a plain RGB EXR")
-    planes = [_in_display_window(*by_name[name]) for name in names]
+    planes = [
+        in_frame(pixels, *place_in_frame(header))
+        for pixels, header in (by_name[name] for name in names)
+    ]
     rgb = len(planes) >= 3
     if len(planes) == 2:
         planes = [planes[0]] * 3 + planes[1:]
@@ -113,14 +117,3 @@ def _exr_channels(names: list[str], path: Path) -> list[str]:
     raise InputError(
         f"{path}: no channels R, G, B or Y, only {', '.join(names[:8])}: save it as a plain RGB EXR"
     )
-
-
-def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray:
-    (low, _), (frame_low, frame_high) = header["dataWindow"], header["displayWindow"]
-    (x, y), (width, height) = low - frame_low, frame_high - frame_low + 1
-    left, right = max(x, 0), max(min(x + pixels.shape[1], width), 0)
-    top, bottom = max(y, 0), max(min(y + pixels.shape[0], height), 0)
-    frame = np.zeros((height, width), np.float32)
-    if right > left and bottom > top:
-        frame[top:bottom, left:right] = pixels[top - y : bottom - y, left - x : right - x]
-    return frame

@@ -1,0 +1,150 @@
+"""The maps as files: of a large frame, they store the object's part, and nothing is lost."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+import pytest
+from PIL import Image
+
+from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
+from isc_core.io.exr import read_windowed, write_channels
+from isc_core.result_files.maps_file import (
+    EXPECTED_ERROR,
+    MAPS,
+    SINGLE,
+    StoredMaps,
+    map_channels,
+    stored_part,
+)
+from isc_core.result_files.result_folder import load, save, save_separation
+from isc_core.scene.decomposition import Decomposition, Separation
+from isc_core.scene.expected_error import ExpectedError
+from isc_core.scene.part_of_result import placed_result
+from tests.core.ball_scene import ball
+
+FRAME = (1500, 1600)
+PLACE = FramePart(slice(700, 748), slice(1100, 1160), FRAME)
+
+
+def in_a_large_frame() -> Decomposition:
+    """A ball in a corner of a frame, with all optional layers."""
+    d = ball((48, 60), 20.0, (22, 33))
+    inside = d.mask[..., None]
+    error = ExpectedError(np.where(d.mask, np.float32(14.5), 0), 0.2 * d.confidence)
+    d = replace(
+        d,
+        expected_error=error,
+        visibility=np.where(inside, 0.5, 1.0).repeat(3, -1).astype(np.float32),
+        indirect=np.where(inside, 0.25, 0.0).repeat(3, -1).astype(np.float32),
+    )
+    return placed_result(d, PLACE)
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("result") / "ball"
+    save(in_a_large_frame(), folder)
+    return folder
+
+
+def assert_equal(after: Decomposition, before: Decomposition) -> None:
+    compared = 0
+    for field in fields(before):
+        values = getattr(before, field.name)
+        if isinstance(values, np.ndarray):
+            found = getattr(after, field.name)
+            assert found.shape == values.shape and found.dtype == values.dtype, field.name
+            assert (found == values).all(), field.name
+            compared += 1
+    assert compared >= 13
+    error = after.expected_error
+    assert error is not None and before.expected_error is not None
+    assert (error.normal == before.expected_error.normal).all()
+    assert (error.reflectance == before.expected_error.reflectance).all()
+
+
+def windows(path: Path) -> tuple[list[int], list[int]]:
+    """Data and display window, as (left, top, right, bottom)."""
+    with OpenEXR.File(str(path)) as file:
+        data, display = (
+            np.ravel(file.header()[key]).tolist() for key in ("dataWindow", "displayWindow")
+        )
+    return data, display
+
+
+def test_files_of_a_large_frame_store_the_object_with_a_pixel_around_it(saved: Path) -> None:
+    rows, columns = np.nonzero(in_a_large_frame().mask)
+    box = [columns.min() - 1, rows.min() - 1, columns.max() + 1, rows.max() + 1]
+    for name in (MAPS, *(f"maps/{layer}.exr" for layer in SINGLE)):
+        assert windows(saved / name) == (box, [0, 0, FRAME[1] - 1, FRAME[0] - 1]), name
+    assert (saved / MAPS).stat().st_size < 1 << 19
+
+
+def test_they_are_read_back_in_the_frame_bit_by_bit(saved: Path) -> None:
+    assert_equal(load(saved), in_a_large_frame())
+
+
+def test_files_that_store_the_whole_frame_are_read_too(saved: Path, tmp_path: Path) -> None:
+    """Results of earlier versions."""
+    d = in_a_large_frame()
+    for file in ("decomposition.json", "mesh.glb"):
+        (tmp_path / file).write_bytes((saved / file).read_bytes())
+    write_channels(tmp_path / MAPS, map_channels(d))
+    assert windows(tmp_path / MAPS)[0] == [0, 0, FRAME[1] - 1, FRAME[0] - 1]
+    assert_equal(load(tmp_path), d)
+
+
+def test_a_small_frame_is_stored_whole(tmp_path: Path) -> None:
+    d = ball((48, 60), 5.0, (22, 33))
+    assert stored_part(d.mask).is_whole
+    save(d, tmp_path / "small")
+    assert windows(tmp_path / "small" / MAPS) == ([0, 0, 59, 47],) * 2
+
+
+def test_a_large_object_is_stored_in_its_whole_frame() -> None:
+    assert stored_part(np.ones(FRAME, bool)).is_whole
+
+
+def test_data_outside_the_frame_are_no_result(saved: Path, tmp_path: Path) -> None:
+    stored = StoredMaps.read(saved / MAPS)
+    for corner in ((-1, 0), (0, -1), (FRAME[1] - 10, 0), (0, FRAME[0] - 10)):
+        write_channels(tmp_path / MAPS, stored.channels, corner, FRAME)
+        with pytest.raises(InputError, match="data outside its frame"):
+            StoredMaps.read(tmp_path / MAPS)
+
+
+def test_a_frame_beyond_the_limit_is_refused_before_it_is_allocated(tmp_path: Path) -> None:
+    channels = {f"layer{k}.Y": np.ones((4, 4), np.float32) for k in range(40)}
+    write_channels(tmp_path / MAPS, channels, (0, 0), (8000, 8000))
+    with pytest.raises(InputError, match=r"unpacks to 10\.2 GB"):
+        StoredMaps.read(tmp_path / MAPS)
+
+
+def test_the_error_layers_have_names_of_their_own(saved: Path) -> None:
+    assert set(EXPECTED_ERROR) < set(read_windowed(saved / MAPS).channels)
+
+
+def test_a_separation_of_a_large_frame_stores_the_object_too(tmp_path: Path) -> None:
+    d = in_a_large_frame()
+    split = Separation(d.diffuse, d.specular, d.residual, d.confidence)
+    image = np.where(d.mask[..., None], d.image, np.float32(0.3))
+    save_separation(split, image, tmp_path / "out", mask=d.mask)
+    data, display = windows(tmp_path / "out" / "separation.exr")
+    assert display == [0, 0, FRAME[1] - 1, FRAME[0] - 1]
+    assert data == windows_of(d.mask)
+    found = read_windowed(tmp_path / "out" / "separation.exr")
+    part = stored_part(d.mask)
+    for index, letter in enumerate("RGB"):
+        assert (found.channels[f"diffuse.{letter}"] == part.cut(d.diffuse)[..., index]).all()
+    with Image.open(tmp_path / "out" / "diffuse.png") as picture:
+        codes = np.asarray(picture)
+    assert codes.shape == (*FRAME, 3)
+    assert codes[d.mask].any() and not codes[~d.mask].any()
+
+
+def windows_of(mask: np.ndarray) -> list[int]:
+    part = stored_part(mask)
+    return [part.columns.start, part.rows.start, part.columns.stop - 1, part.rows.stop - 1]
