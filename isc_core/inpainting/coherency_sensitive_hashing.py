@@ -303,23 +303,20 @@ def _check(options: CshOptions, source: Patches) -> None:
 
 
 def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
-    """The width at which the median patch, with projections `values` (n, k), shares its bin with
-    `occupancy` patches, within about a tenth.
+    """The width at which half of the patches, with projections `values` (n, k), share their bins
+    with more than `occupancy` patches, within about a tenth.
     """
     spread = max(float(np.ptp(values, axis=0).max()), 1e-30)
     low, high = float(np.log(1e-4 * spread)), float(np.log(2 * spread))
     factors = np.random.default_rng(options.seed).integers(1 << 40, size=options.hashed)
     offset = np.zeros(options.hashed, np.float32)
+    bins, bits = np.empty(len(values), np.int32), len(values).bit_length()
     while high - low > 0.2:
         middle = (low + high) / 2
-        bins, starts, _ = _buckets(
-            values, np.float32(np.exp(middle)), offset, factors, len(values).bit_length()
-        )
-        low, high = (
-            (low, middle)
-            if np.median(np.diff(starts)[bins]) > options.occupancy
-            else (middle, high)
-        )
+        _hash(values, np.float32(np.exp(middle)), offset, factors, bits, bins)
+        sizes = np.bincount(bins)
+        crowded = 2 * sizes[sizes > options.occupancy].sum() > len(values)
+        low, high = (low, middle) if crowded else (middle, high)
     return np.float32(np.exp(low))
 
 

@@ -7,9 +7,9 @@ a lower bound of the distance: with r_a the norm of the rest of a, sum over the 
 b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
 
 Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1): only
-additions, 24 for each row and column by the fast transform. Colour channels are mixed beforehand by
-an orthonormal matrix with rows grey, red-green, yellow-blue, so that brightness, which carries most
-of the energy, is one channel.
+additions, by the fast transform. Neighbouring patches of a row share the sums of their columns.
+Colour channels are mixed beforehand by an orthonormal matrix with rows grey, red-green, yellow-
+blue, so that brightness, which carries most of the energy, is one channel.
 
 Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI
 27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. The kept coefficients are those with the most
@@ -30,6 +30,7 @@ _CELLS = PATCH * PATCH
 _OPPONENT = np.array([[1, 1, 1], [1, -1, 0], [1, 1, -2]]) / np.sqrt([[3], [2], [6]])
 # The energies of coefficients are measured on this many patches.
 _SAMPLE = 4096
+_RUN = 64  # columns transformed at a time
 
 
 def opponent(image: np.ndarray) -> np.ndarray:
@@ -105,48 +106,72 @@ def project(
 
 @jit(types="f4[3] i8[1:] i8[1:] i8[1] f4[2]")
 def _project(image, rows, columns, chosen, out):
-    width, channels = image.shape[1], image.shape[2]
-    strip = np.empty((8, width), np.float32)
-    halfway = np.empty((channels, width, 8), np.float32)
-    work = np.empty((8, 8), np.float32)
-    full = np.empty(64 * channels, np.float32)
-    row = -1
-    for n in range(rows.shape[0]):
-        if rows[n] != row:
-            row = rows[n]
-            # Patches of one row share their columns, which are transformed once.
-            for c in range(channels):
-                for i in range(8):
-                    for x in range(width):
-                        strip[i, x] = image[row + i, x, c]
-                _butterflies(strip)
-                for x in range(width):
-                    for i in range(8):
-                        halfway[c, x, i] = strip[i, x]
+    channels = image.shape[2]
+    strip, below = np.empty((8, _RUN + 7), np.float32), np.empty((8, _RUN + 7), np.float32)
+    full, rest = np.empty((64 * channels, _RUN), np.float32), np.empty(_RUN, np.float32)
+    first = 0
+    while first < rows.shape[0]:
+        last = _end_of_run(rows, columns, first)
+        row, left = rows[first], columns[first]
+        count = columns[last] - left + 1
         for c in range(channels):
-            for j in range(8):
-                for i in range(8):
-                    work[j, i] = halfway[c, columns[n] + j, i]
-            _butterflies(work)
-            for j in range(8):
-                for i in range(8):
-                    full[64 * c + 8 * j + i] = work[j, i]
-        rest = np.float32(0)
+            for i in range(8):
+                for x in range(count + 7):
+                    strip[i, x] = image[row + i, left + x, c]
+            _butterflies(strip, count + 7)
+            for i in range(8):
+                _across(strip, i, below, full, 64 * c + i, count)
+        rest[:count] = 0
         for k in range(full.shape[0]):
-            rest += full[k] * full[k]
+            for x in range(count):
+                rest[x] += full[k, x] * full[k, x]
         for k in range(chosen.shape[0]):
-            out[n, k] = full[chosen[k]] * np.float32(0.125)
-            rest -= full[chosen[k]] * full[chosen[k]]
-        out[n, -1] = np.sqrt(max(rest, np.float32(0))) * np.float32(0.125)
+            for x in range(count):
+                rest[x] -= full[chosen[k], x] * full[chosen[k], x]
+        for n in range(first, last + 1):
+            x = columns[n] - left
+            for k in range(chosen.shape[0]):
+                out[n, k] = full[chosen[k], x] * np.float32(0.125)
+            out[n, -1] = np.sqrt(max(rest[x], np.float32(0))) * np.float32(0.125)
+        first = last + 1
 
 
 @jit
-def _butterflies(work):
-    """The Hadamard transform of each column of `work` (8, n), in place."""
+def _end_of_run(rows, columns, first):
+    """The last patch that shares its row, and the transforms of its columns, with patch `first`."""
+    last, end = first, columns[first] + _RUN
+    while (
+        last + 1 < rows.shape[0]
+        and rows[last + 1] == rows[first]
+        and columns[last] < columns[last + 1] < min(columns[last] + 8, end)
+    ):
+        last += 1
+    return last
+
+
+@jit
+def _butterflies(work, count):
+    """The Hadamard transform of the first `count` columns of `work` (8, n), in place."""
     for step in (1, 2, 4):
         for i in range(8):
             if i & step == 0:
-                for j in range(work.shape[1]):
+                for j in range(count):
                     a, b = work[i, j], work[i + step, j]
                     work[i, j] = a + b
                     work[i + step, j] = a - b
+
+
+@jit
+def _across(strip, i, work, full, at, count):
+    """The transforms of strip[i, x : x + 8], x < `count`, to rows `at`, `at` + 8 ... of `full`."""
+    for x in range(count + 6):
+        work[0, x] = strip[i, x] + strip[i, x + 1]
+        work[1, x] = strip[i, x] - strip[i, x + 1]
+    for j in range(2):
+        for x in range(count + 4):
+            work[2 + j, x] = work[j, x] + work[j, x + 2]
+            work[4 + j, x] = work[j, x] - work[j, x + 2]
+    for j in range(4):
+        for x in range(count):
+            full[at + 8 * j, x] = work[2 + j, x] + work[2 + j, x + 4]
+            full[at + 8 * j + 32, x] = work[2 + j, x] - work[2 + j, x + 4]

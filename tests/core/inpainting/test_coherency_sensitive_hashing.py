@@ -120,7 +120,7 @@ def test_same_seed_same_matches_and_no_worse_than_the_start() -> None:
 
 
 def test_projections_keep_distances_and_bound_them() -> None:
-    patches = everywhere(texture(40, 40, 4))
+    patches = everywhere(texture(24, 90, 4))
     all_cells = vectors(patches, np.arange(len(patches)))
     whole = walsh_hadamard.project(patches.image, patches.rows, patches.columns, np.arange(192))
     true = ((all_cells[1:] - all_cells[0]) ** 2).sum(axis=1)
