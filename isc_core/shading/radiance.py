@@ -25,6 +25,8 @@ from .brdf.directions import unit
 from .brdf.model import Model, check_range
 from .spherical_harmonics import real_sh
 
+_MOST_VALUES = 1 << 16  # of the model at a time, unless one light has more
+
 
 @dataclass(frozen=True)
 class DistantLights:
@@ -137,15 +139,19 @@ def radiance(
     InputError
         If a vector does not have length 1.
     """
-    normal = unit(normal, "normal")
+    normal, directions = unit(normal, "normal"), unit(lights.directions, "directions")
     total = np.zeros(np.broadcast_shapes(normal.shape, np.shape(view)))
-    for direction, irradiance in zip(
-        unit(lights.directions, "directions"), lights.irradiance, strict=True
-    ):
-        reflected = model.value(normal, view, direction)
-        if reflected.ndim < total.ndim:
+    count = max(1, _MOST_VALUES // max(1, total.size // 3))
+    for first in range(0, len(directions), count):
+        some = slice(first, first + count)
+        toward = directions[some].reshape(-1, *[1] * (total.ndim - 1), 3)
+        reflected = model.value(normal, view, toward)
+        if reflected.ndim == total.ndim:
             reflected = reflected[..., None]
-        total += reflected * np.maximum(normal @ direction, 0)[..., None] * irradiance
+        for one, direction, irradiance in zip(
+            reflected, directions[some], lights.irradiance[some], strict=True
+        ):
+            total += one * np.maximum(normal @ direction, 0)[..., None] * irradiance
     return total
 
 

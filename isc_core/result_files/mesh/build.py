@@ -27,10 +27,10 @@ differ by an error quadratic in the change of the normal within a triangle.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from ...errors import InputError
 from ...imaging.bounding_box import mask_slices
+from ...imaging.channels import total
 from ...imaging.row_blocks import row_blocks
 from ...photo.camera import Camera
 from ...shading.lights import VIEW
@@ -233,7 +233,7 @@ def _triangulated(
     There are at most `budget` (0: unlimited), unless the object is too thin for cells of a larger
     stride.
     """
-    cells = _cells_inside(mask, 1)
+    cells = _all_of_four(mask, 1)
     if not cells.any():
         raise InputError(
             "the mask has no block of 2 x 2 pixels to build a mesh from: mark a larger region or "
@@ -244,13 +244,13 @@ def _triangulated(
     cosine, stride = np.empty(mask.shape, np.float32), 1
     for block in row_blocks(mask.shape):
         toward = view if view.ndim == 1 else view[block.rows]
-        cosine[block.rows] = (normal[block.rows] * toward).sum(axis=-1)
+        cosine[block.rows] = total(normal[block.rows] * toward)
     while True:
         thin = height if stride == 1 else height[::stride, ::stride] / stride
         thinned = thin, cells, cosine[::stride, ::stride]
         if (found := adaptive_triangles(*thinned, budget)) is not None:
             return stride, found, True
-        coarser = _cells_inside(mask, 2 * stride)
+        coarser = _all_of_four(cells, 2)
         if not coarser.any():
             found = adaptive_triangles(*thinned, 0)
             assert found is not None
@@ -258,12 +258,10 @@ def _triangulated(
         stride, cells = 2 * stride, coarser
 
 
-def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
-    size = stride + 1
-    inside = ndimage.minimum_filter(
-        mask.astype(np.uint8), size, mode="constant", origin=-(size // 2)
-    ).astype(bool)
-    return inside[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
+def _all_of_four(flags: np.ndarray, step: int) -> np.ndarray:
+    """Which 2 x 2 blocks of `flags`, `step` apart, are set."""
+    rows = flags[:-1:step] & flags[1::step]
+    return rows[:, :-1:step] & rows[:, 1::step]
 
 
 def _full_grid(cells: np.ndarray) -> Triangulation:

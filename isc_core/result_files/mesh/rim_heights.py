@@ -12,7 +12,8 @@ Limits: a true spike at the silhouette is flattened, too.
 """
 
 import numpy as np
-from scipy import ndimage
+
+_ALONG = 2  # pixels, the reach of the average along the outermost ring
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
@@ -28,33 +29,47 @@ def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
     -------
     (H, W) float64 ndarray
     """
-    depth = ndimage.distance_transform_cdt(np.pad(mask, 1), "chessboard")[1:-1, 1:-1]
-    depth = np.minimum(depth, rings + 2).astype(np.int16)  # 1 in the outermost ring
-    limited = np.where(mask, height, 0.0).astype(np.float64, copy=False)
-    step = np.zeros(mask.shape, np.float64)
+    depth = np.pad(_depths(mask, rings + 2), _ALONG)  # 1 in the outermost ring
+    limited = np.pad(np.where(mask, height, 0.0).astype(np.float64, copy=False), _ALONG)
+    flat, step = limited.reshape(-1), np.zeros(limited.size)
     for ring in range(rings + 1, 0, -1):
-        at = np.nonzero(depth == ring)
-        base, weight = _neighbour_mean(limited, depth > ring, at)
-        at, base = tuple(part[weight > 0] for part in at), base[weight > 0]
+        at = np.flatnonzero(depth == ring)
+        base, count = _neighbour_mean(limited, depth > ring, at)
+        at, base = at[count > 0], base[count > 0]
         if ring <= rings:
-            slack = 1.5 * _neighbour_mean(step, depth > ring, at)[0] + 0.5
-            limited[at] = np.clip(limited[at], base - slack, base + slack)
-        step[at] = np.abs(limited[at] - base)
+            inner = _neighbour_mean(step.reshape(limited.shape), depth > ring, at)[0]
+            slack = 1.5 * inner + 0.5
+            flat[at] = np.clip(flat[at], base - slack, base + slack)
+        step[at] = np.abs(flat[at] - base)
     if rings > 0:
         outermost = depth == 1
-        at = np.nonzero(outermost)
-        limited[at] = _neighbour_mean(limited, outermost, at, 5)[0]
-    return limited
+        at = np.flatnonzero(outermost)
+        flat[at] = _neighbour_mean(limited, outermost, at, _ALONG)[0]
+    return limited[_ALONG:-_ALONG, _ALONG:-_ALONG]
+
+
+def _depths(mask: np.ndarray, most: int) -> np.ndarray:
+    """The number (H, W) of each pixel's ring, counted from the outside, at most `most`."""
+    depth, inside = mask.astype(np.int16), mask
+    for _ in range(most - 1):
+        wide = np.pad(inside, 1)
+        rows = wide[:-2] & wide[1:-1] & wide[2:]
+        inside = rows[:, :-2] & rows[:, 1:-1] & rows[:, 2:]
+        depth += inside
+    return depth
 
 
 def _neighbour_mean(
-    values: np.ndarray, valid: np.ndarray, at: tuple[np.ndarray, ...], size: int = 3
+    values: np.ndarray, valid: np.ndarray, at: np.ndarray, reach: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of the valid pixels in the `size` x `size` neighbourhood of pixels `at`, and their
-    number, each (n,).
+    """Mean of the valid pixels at most `reach` rows and columns from the pixels of flat indices
+    `at`, and their number, each (n,).
     """
-    total = np.where(valid, values, 0.0)
-    ndimage.uniform_filter(total, size, output=total, mode="constant")
-    weight = ndimage.uniform_filter(valid.astype(np.float32), size, mode="constant")
-    count = np.rint(weight[at].astype(np.float64) * size**2)
-    return total[at] * size**2 / np.maximum(count, 1), count
+    total, count = np.zeros(len(at)), np.zeros(len(at), int)
+    for row in range(-reach, reach + 1):
+        for column in range(-reach, reach + 1):
+            near = at + row * values.shape[1] + column
+            known = valid.reshape(-1)[near]
+            total += np.where(known, values.reshape(-1)[near], 0)
+            count += known
+    return total / np.maximum(count, 1), count

@@ -14,6 +14,8 @@ Limits: normals that face away from the viewer are rotated until their tangent i
 
 import numpy as np
 
+from ...imaging.channels import length
+from ...imaging.row_blocks import row_blocks
 from .adaptive_triangles import Triangulation, covered_pixels
 
 _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
@@ -70,8 +72,9 @@ def mean_normals(
     """
     sums = np.zeros((len(grid.vertices), 3))
     for patch in covered_pixels(grid, stride):
-        seen = normal[patch.pixels[..., 0], patch.pixels[..., 1]]
-        part = np.einsum("pk,tpc->tkc", patch.weights, seen).reshape(-1, 3)
+        row, column = patch.pixels.T
+        part = np.einsum("pk,ptc->ktc", patch.weights, normal[row, column])
+        part = part.swapaxes(0, 1).reshape(-1, 3)
         for axis in range(3):
             sums[:, axis] += np.bincount(patch.faces.reshape(-1), part[:, axis], len(sums))
     return facing(sums.astype(np.float32), directions_at(view, *(grid.vertices * stride).T))
@@ -100,12 +103,16 @@ def detail_normals(
     tangents : (V, 3) ndarray
         Of the vertices.
     """
-    detail = flat_normals(normal.shape[:2]).copy()
+    detail = np.full((*normal.shape[:2], 3), np.nan, np.float32)
     for patch in covered_pixels(grid, stride):
-        row, column = patch.pixels[..., 0], patch.pixels[..., 1]
-        base = np.einsum("pk,tkc->tpc", patch.weights.astype(np.float32), smooth[patch.faces])
-        toward = directions_at(view, row, column)
-        detail[row, column] = _local(normal[row, column], facing(base, toward), toward)
+        base = np.einsum("pk,ktc->tpc", patch.weights.astype(np.float32), smooth[patch.faces.T])
+        detail[patch.pixels[..., 0], patch.pixels[..., 1]] = base
+    for block in row_blocks(detail.shape):  # each pixel once: triangles share those on their sides
+        rows = detail[block.rows]
+        covered = ~np.isnan(rows[..., 0])
+        toward = view if view.ndim == 1 else view[block.rows][covered]
+        rows[covered] = _local(normal[block.rows][covered], facing(rows[covered], toward), toward)
+        rows[~covered] = flat_normals(())
     return detail, _tangents(smooth, directions_at(view, *(grid.vertices * stride).T))
 
 
@@ -146,7 +153,7 @@ def _tangents(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
         tangent = np.stack([normal[..., 2], np.zeros_like(normal[..., 0]), -normal[..., 0]], -1)
     else:  # on the surface, and in the plane of the pixel's row through the camera
         tangent = np.cross(normal, np.cross((1.0, 0.0, 0.0), view)).astype(normal.dtype)
-    return np.asarray(tangent / np.linalg.norm(tangent, axis=-1, keepdims=True))
+    return np.asarray(tangent / length(tangent)[..., None])
 
 
 def _local(normal: np.ndarray, base: np.ndarray, view: np.ndarray) -> np.ndarray:
@@ -170,11 +177,11 @@ def facing(vectors: np.ndarray, view: np.ndarray) -> np.ndarray:
     (..., 3) ndarray
     """
     vectors, view = vectors.copy(), view.astype(vectors.dtype)
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    vectors = np.where(length > 0, vectors / np.where(length > 0, length, 1), view)
+    size = length(vectors)[..., None]
+    vectors = np.where(size > 0, vectors / np.where(size > 0, size, 1), view)
     if view.ndim == 1:
         vectors[..., 2] = np.maximum(vectors[..., 2], _LEAST_FACING)
     else:
         cosine = (vectors * view).sum(axis=-1, keepdims=True)
         vectors += np.maximum(_LEAST_FACING - cosine, 0) * view
-    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return vectors / length(vectors)[..., None]
