@@ -31,6 +31,7 @@ from enum import StrEnum
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.channels import channel_means
 from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
@@ -181,7 +182,7 @@ def lamp_shading(d: Decomposition, direction: np.ndarray) -> float:
         a above, or the brightest shading where the shading does not show the lamp.
     """
     facing = np.maximum(d.normal[d.mask].astype(float) @ direction, 0)
-    shading = d.shading[d.mask].mean(-1, dtype=float)
+    shading = channel_means(d.shading, d.mask)
     lamp, _ = nonnegative_pair(facing, np.ones_like(facing), shading)
     brightest = float(np.percentile(shading, _BRIGHTEST_SHADING))
     return float(lamp) if lamp > _MIN_LAMP * brightest else brightest

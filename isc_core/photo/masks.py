@@ -6,6 +6,7 @@ from scipy.ndimage import label
 from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
+from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import MIN_SIDE, Raster
 from ..io.decoders.raster import as_rgb
@@ -14,6 +15,7 @@ from .found_mask import FoundMask, MaskFinder
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
 _LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
+_CHUNK = 1 << 16  # pixels compared at a time
 _HARD = 0.02  # of the largest value: lossy files differ from 0 and 1 by as much
 
 
@@ -144,18 +146,20 @@ def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
     -------
     (H, W) float32 ndarray or None
         0 to 1: the alpha channel, else the values over that of most of the object. None where all
-        are practically 0 or 1, or where the background is not 0.
+        are practically 0 or 1, or where most of the background is not 0.
     """
-    if raster.transparency is not None:
-        values = np.asarray(raster.transparency, np.float32)
-    else:
-        values = finite_or_zero(largest(raster.values)).astype(np.float32)
-        values /= max(float(np.median(values[mask])), 1e-12)
-    cover = np.clip(values, 0, 1)
-    partly = (cover > _HARD) & (cover < 1 - _HARD)
-    beyond = cover[~mask]
-    plain = not beyond.size or float(np.median(beyond)) <= _HARD
-    return cover if plain and partly.any() else None
+    alpha = raster.transparency
+    values = largest(raster.values) if alpha is None else alpha
+    full = 1.0 if alpha is not None else float(np.median(finite_or_zero(values[mask])))
+    cover, partly, empty = np.empty(mask.shape, np.float32), False, 0
+    for block in row_blocks(mask.shape, pixels=_CHUNK):
+        part = finite_or_zero(values[block.rows]).astype(np.float32) / max(full, 1e-12)
+        np.clip(part, 0, 1, out=cover[block.rows])
+        part = cover[block.rows]
+        partly |= bool(((part > _HARD) & (part < 1 - _HARD)).any())
+        empty += np.count_nonzero((part <= _HARD) & ~mask[block.rows])
+    plain = 2 * empty >= mask.size - np.count_nonzero(mask)
+    return cover if plain and partly else None
 
 
 def normalised_to_white(linear: np.ndarray, white: float) -> np.ndarray:
@@ -222,6 +226,8 @@ def finite_or_zero(values: np.ndarray) -> np.ndarray:
     Returns
     -------
     ndarray
-        Of the shape and dtype of `values`.
+        Of the shape and dtype of `values`; integers unchanged.
     """
+    if values.dtype.kind != "f":
+        return values
     return np.where(np.isfinite(values), values, np.zeros(1, values.dtype))

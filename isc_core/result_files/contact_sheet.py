@@ -68,9 +68,9 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     frame = Frame.around(d.mask)
     small = {name: frame.scaled(getattr(d, name)) for name in _SHOWN}
     photo, albedo, light = (
-        exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
+        exposure(frame.inside(values)) for values in (d.image, d.reflectance, d.shading)
     )
-    share = f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light"
+    share = f"{100 * _share(d.specular, d.image, frame):.1f} % of the light"
     colors = [
         ("image", photo, "Input", ""),
         ("diffuse", photo, "Diffuse", ""),
@@ -157,8 +157,9 @@ def separation_sheet(
     -------
     PIL.Image.Image
     """
-    frame, gain = Frame.around(mask), exposure(image[mask])
-    share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
+    frame = Frame.around(mask)
+    gain = exposure(frame.inside(image))
+    share = f"{100 * _share(separation.specular, image, frame):.1f} % of the light"
     maps = [
         (image, "Input", ""),
         (separation.diffuse, "Diffuse", ""),
@@ -209,7 +210,8 @@ def comparison_sheet(
     -------
     PIL.Image.Image
     """
-    frame, gain = Frame.around(mask), exposure(image[mask])
+    frame = Frame.around(mask)
+    gain = exposure(frame.inside(image))
 
     def panel(values: np.ndarray, label: str, remark: str = "") -> Panel:
         return Panel(frame.scaled(values), frame.coverage, label, remark)
@@ -221,7 +223,7 @@ def comparison_sheet(
             panel(image / np.maximum(total, 1e-9), "Chromaticity"),
         )
     else:
-        share = f"{100 * _share(truth[1], image, mask):.1f} % of the light"
+        share = f"{100 * _share(truth[1], image, frame):.1f} % of the light"
         second = (
             panel(gain * truth[0], "True diffuse"),
             panel(gain * truth[1], "True specular", share),
@@ -229,7 +231,7 @@ def comparison_sheet(
     panels = [panel(gain * image, "Input"), *second]
     for entry in separations:
         split = entry.split
-        share = f"{100 * _share(split.specular, image, mask):.1f} % of the light"
+        share = f"{100 * _share(split.specular, image, frame):.1f} % of the light"
         panels += [
             panel(gain * split.diffuse, entry.label, entry.remark),
             panel(gain * split.specular, "Specular", share),
@@ -322,10 +324,9 @@ def _error_colors(error: np.ndarray) -> np.ndarray:
     )
 
 
-def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
-    return float(
-        part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9)
-    )
+def _share(part: np.ndarray, whole: np.ndarray, frame: Frame) -> float:
+    light, of = (float(frame.inside(one).sum(dtype=np.float64)) for one in (part, whole))
+    return light / max(of, 1e-9)
 
 
 def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -347,7 +348,7 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _relief(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
     """The height map shaded by a light at the upper left, with contour lines."""
-    heights = d.height[d.mask]
+    heights = frame.inside(d.height)
     low, high = float(heights.min()), float(heights.max())
     spacing = _round_step((high - low) / 12)
     normal = unit_normals(small["normal"])

@@ -142,7 +142,7 @@ def relit_panel(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray])
     inside = frame.coverage > 0
     reflectance, light = small["reflectance"][inside], small["shading"][inside]
     direction, side = _other_side(d)
-    tint = d.shading[d.mask].mean(axis=0, dtype=np.float64)
+    tint = frame.inside(d.shading).mean(axis=0, dtype=np.float64)
     rig = DirectionalLight(direction, np.pi * _KEY * tint, _FILL * tint)
     diffuse = reflectance * rig.shading(unit_normals(small["normal"][inside]))
     before = float(luminance(reflectance * light).sum())

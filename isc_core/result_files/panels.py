@@ -95,9 +95,22 @@ class Frame:
         """
         if values.ndim == 3:
             return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
-        found = self._resized(np.where(self.mask, values, 0))
+        found = self._resized(np.where(self.mask[self._part], values[self._part], 0))
         found *= self._gain
         return found
+
+    def inside(self, values: np.ndarray) -> np.ndarray:
+        """Return the values of the object.
+
+        Parameters
+        ----------
+        values : (H, W) or (H, W, C) ndarray
+
+        Returns
+        -------
+        (n,) or (n, C) ndarray
+        """
+        return values[self._part][self.mask[self._part]]
 
     def place(self, x: float, y: float) -> tuple[float, float]:
         """Convert a position in the map to the panel.
@@ -117,6 +130,12 @@ class Frame:
         across, down = width / (end_column - first_column + 2), height / (end_row - first_row + 2)
         return left + across * (x - first_column + 1), top + down * (y - first_row + 1)
 
+    @property
+    def _part(self) -> tuple[slice, slice]:
+        """Rows and columns of the box."""
+        first_row, end_row, first_column, end_column = self.box
+        return slice(first_row, end_row), slice(first_column, end_column)
+
     @cached_property
     def _window(self) -> tuple[int, int, int, int]:
         """Top, left, height and width, in the panel, of the box with a border of one pixel."""
@@ -129,7 +148,7 @@ class Frame:
 
     @cached_property
     def _weight(self) -> np.ndarray:
-        return self._resized(self.mask)
+        return self._resized(self.mask[self._part])
 
     @cached_property
     def _gain(self) -> np.ndarray:
@@ -137,9 +156,9 @@ class Frame:
         return np.where(self._weight > 1e-3, 1 / np.maximum(self._weight, 1e-3), np.float32(0))
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
-        first_row, end_row, first_column, end_column = self.box
+        """A plane of the box in the panel, (N, N)."""
         # An empty border, so that the object's outline is antialiased on all sides.
-        window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
+        window = np.pad(plane.astype(np.float32), 1)
         top, left, height, width = self._window
         panel = np.zeros((SIDE, SIDE), np.float32)
         panel[top : top + height, left : left + width] = Image.fromarray(window).resize(

@@ -3,6 +3,7 @@
 import argparse
 
 from ...errors import InputError
+from ...imaging.bounding_box import mask_slices
 from ...masking.hints import Hints
 from ...masking.search import connected_components
 from ...photo.grabcut import Box
@@ -83,7 +84,7 @@ def mask_notes(photo: Photo) -> list[str]:
     notes = []
     if found := how_found(photo):
         notes.append(f"{found}: check mask.png in the result; --box, --point and --not correct it")
-    parts = len(connected_components(photo.mask))
+    parts = len(connected_components(photo.mask[mask_slices(photo.mask)]))
     if parts > 1:
         notes.append(
             f"the mask has {parts} separate parts, which are treated as one object: use --each to "

@@ -90,7 +90,7 @@ def decode_pillow(
         if "icc_profile" in image.info:
             space, more = space_of_profile(image.info["icc_profile"], 1 if mode == "L" else 3)
             notes = (*notes, *more)
-        codes = np.asarray(image.convert(mode))
+        codes = np.asarray(image if image.mode == mode else image.convert(mode))
         raster = raster_of_codes(codes, 255, orientation, space=space, notes=notes)
         return with_focal_length(raster, image)
     raise InputError(

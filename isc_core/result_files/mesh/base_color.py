@@ -12,6 +12,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...imaging.bounding_box import mask_slices
+from ...imaging.channels import largest
 from ...imaging.row_blocks import row_blocks
 
 _BRIGHT = 0.9  # linear base colour of the 99.5th percentile of the reflectance
@@ -36,9 +37,10 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
         k * reflectance, linear.
     k : float
     """
-    bright = float(np.percentile(reflectance[mask].max(-1).astype(np.float64), 99.5))
+    inside = reflectance[mask]
+    bright = float(np.percentile(largest(inside).astype(np.float64), 99.5))
     k = _BRIGHT / bright if bright > 0 else 1.0
-    mean = reflectance[mask].mean(0, dtype=np.float64)
+    mean = inside.mean(0, dtype=np.float64)
     depth = _depth_near(mask, 2 * _widest_fading(mask) + 3)
     rings = dark_rings(reflectance, depth)
     inner = depth > rings
