@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..imaging.channels import channel_means
+from ..imaging.channels import channel_means, largest
 from ..photo.photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
@@ -130,7 +130,7 @@ def fit_specular(
 
 
 def _shines(specular: np.ndarray, photo: Photo) -> bool:
-    white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
+    white = float(np.percentile(largest(photo.image[photo.mask]), 99.5))
     return float(channel_means(specular, photo.mask).max()) > _NOTHING * white
 
 

@@ -47,7 +47,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.bounding_box import mask_slices
-from ..imaging.channels import channel_means
+from ..imaging.channels import channel_means, length
 from ..imaging.row_blocks import row_blocks
 from ..imaging.upsampling import enlarged
 from ..scene.light_estimate import LightEstimate
@@ -207,7 +207,7 @@ def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
         near = enlarged(sums, here.shape, step, (block.rows.start, 0))
         means = near[..., :3] / np.maximum(near[..., 3:], 1e-9)
         means[..., 2] = np.maximum(means[..., 2], _MIN_Z)
-        unit = means / np.linalg.norm(means, axis=-1, keepdims=True)
+        unit = means / length(means)[..., None]
         of_box[block.rows][here] = unit[here]
     return blurred
 

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..imaging.channels import largest, total
 from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import srgb_codes, srgb_to_linear
 from ..imaging.upsampling import enlarged
@@ -162,12 +163,12 @@ class CoatedSurface:
         """
         if level <= 0:
             return None
-        mask = self.normal.any(-1)
+        mask = largest(self.normal != 0)
         normal = self.normal[mask].astype(float)
         view = self.view if self.view.ndim == 1 else self.view[mask]
         model = _layer(level, roughness)
         mirrored = MirroredEnvironment(model, self.environment).toward(normal, view)
-        share = specular_share(level, roughness, (normal * view).sum(-1))[:, None]
+        share = specular_share(level, roughness, total(normal * view))[:, None]
         inside = np.concatenate([mirrored / np.maximum(self.shading[mask], _DARKEST), share], -1)
         if self.variation is not None:
             inside *= self.variation[mask][:, None]

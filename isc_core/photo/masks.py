@@ -1,5 +1,7 @@
 """Finding the object's mask in a photo, and checking it."""
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.ndimage import label
 
@@ -151,15 +153,17 @@ def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
     alpha = raster.transparency
     values = largest(raster.values) if alpha is None else alpha
     full = 1.0 if alpha is not None else float(np.median(finite_or_zero(values[mask])))
-    cover, partly, empty = np.empty(mask.shape, np.float32), False, 0
-    for block in row_blocks(mask.shape, pixels=_CHUNK):
-        part = finite_or_zero(values[block.rows]).astype(np.float32) / max(full, 1e-12)
-        np.clip(part, 0, 1, out=cover[block.rows])
-        part = cover[block.rows]
-        partly |= bool(((part > _HARD) & (part < 1 - _HARD)).any())
-        empty += np.count_nonzero((part <= _HARD) & ~mask[block.rows])
-    plain = 2 * empty >= mask.size - np.count_nonzero(mask)
-    return cover if plain and partly else None
+
+    def shares() -> Iterator[np.ndarray]:
+        for block in row_blocks(mask.shape, pixels=_CHUNK):
+            part = finite_or_zero(values[block.rows]).astype(np.float32)
+            yield np.clip(part / max(full, 1e-12), 0, 1)
+
+    if not any(((part > _HARD) & (part < 1 - _HARD)).any() for part in shares()):
+        return None
+    cover = np.concatenate([*shares()])
+    empty = np.count_nonzero((cover <= _HARD) & ~mask)
+    return cover if 2 * empty >= mask.size - np.count_nonzero(mask) else None
 
 
 def normalised_to_white(linear: np.ndarray, white: float) -> np.ndarray:

@@ -14,6 +14,7 @@ view along z.
 
 import numpy as np
 
+from ..imaging.row_blocks import row_blocks
 from .brdf.model import Model
 from .environment_map import directions, solid_angles
 from .lights import VIEW
@@ -21,6 +22,7 @@ from .perspective import far_view_normals
 from .radiance import DistantLights, radiance
 
 _TABLE = 65  # samples of the stereographic plane along an axis
+_CHUNK = 1 << 17  # numbers looked up at a time, so that temporary arrays stay in the cache
 
 
 class MirroredEnvironment:
@@ -61,13 +63,19 @@ class MirroredEnvironment:
         """
         if view.ndim > 1:
             normal = far_view_normals(normal, view)
+        found = np.empty(normal.shape)
+        for block in row_blocks(normal.shape, pixels=_CHUNK):
+            found[block.rows] = self._looked_up(normal[block.rows])
+        return found
+
+    def _looked_up(self, normal: np.ndarray) -> np.ndarray:
+        """The table (N, 3) at normals for the view along z."""
         places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
         first = np.clip(places.astype(np.int64), 0, _TABLE - 2)
         u, v = np.clip(places - first, 0, 1).T[..., None]
-        (i, j), table = first.T, self._table
-        nearer = (1 - v) * table[i, j] + v * table[i, j + 1]
-        farther = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
-        return np.asarray((1 - u) * nearer + u * farther)
+        at, table = first[:, 0] * _TABLE + first[:, 1], self._table.reshape(-1, 3)
+        a, b, c, d = (table.take(at + step, axis=0) for step in (0, 1, _TABLE, _TABLE + 1))
+        return np.asarray((1 - u) * ((1 - v) * a + v * b) + u * ((1 - v) * c + v * d))
 
 
 def _table_normals() -> np.ndarray:

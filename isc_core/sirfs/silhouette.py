@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..imaging.channels import length
 from ..imaging.row_blocks import row_blocks
 from .precision import scaled_precision
 from .priors.priors import SilhouetteProfile
@@ -106,7 +107,7 @@ def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarr
         mean = profile.at(distance[rows] / deepest)[0]
         in_plane = np.where(mask[rows], np.clip(mean, -_MAX_IN_PLANE, _MAX_IN_PLANE), 0)
         part = np.dstack([in_plane * right, -in_plane * down, np.sqrt(1 - in_plane**2)])
-        normal[rows] = part / np.linalg.norm(part, axis=-1, keepdims=True)
+        normal[rows] = part / length(part)[..., None]
     return normal
 
 
@@ -133,8 +134,8 @@ def _smoothed(distance: np.ndarray, deepest: float) -> np.ndarray:
 def _descent(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The unit direction of steepest descent of a map, down and right, each (H, W)."""
     down, right = np.gradient(height)
-    length = np.maximum(np.hypot(down, right), 1e-6)
-    return -down / length, -right / length
+    slope = np.maximum(np.hypot(down, right), 1e-6)
+    return -down / slope, -right / slope
 
 
 def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> SilhouetteNormals:
