@@ -28,7 +28,9 @@ def test_a_matt_sphere_under_one_light_is_the_clamped_cosine() -> None:
     assert np.allclose(seen, expected[..., None] * [1, 2, 3])
 
 
-def test_lights_add_up() -> None:
+@pytest.mark.parametrize("at_a_time", [1, 100, 1000])  # groups of 1, 2 and all lights
+def test_lights_add_up(at_a_time: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("isc_core.shading.radiance._MOST_VALUES", at_a_time)
     normal, lights = (
         random_units(50),
         DistantLights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3))),
