@@ -27,7 +27,7 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.masking.finder import refusal_reason
+from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask

@@ -5,16 +5,17 @@ from typing import TYPE_CHECKING
 from ..lazy import exports
 
 if TYPE_CHECKING:
+    from .components import connected_components
     from .finder import MaskSearch, read_each_object
     from .hints import Hints
-    from .search import connected_components, find_mask, find_masks
+    from .search import find_mask, find_masks
 else:
     __getattr__ = exports(
         __name__,
         {
             "Hints": ".hints",
             "MaskSearch": ".finder",
-            "connected_components": ".search",
+            "connected_components": ".components",
             "find_mask": ".search",
             "find_masks": ".search",
             "read_each_object": ".finder",

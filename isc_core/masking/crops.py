@@ -15,7 +15,10 @@ import numpy as np
 
 from ..imaging.resampling import resampled
 from ..networks.mask_network import POINT_RADIUS, SIDE, MaskNetwork, predict_mask
+from ..photo.grabcut import Box
 from .hints import Hints
+
+_MARGIN = 0.25  # around a box, of its longer side
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,48 @@ class Crop:
             slice(self.top, self.top + self.height),
             slice(self.left, self.left + self.width),
         )
+
+
+def with_margin(box: Box, shape: tuple[int, ...]) -> Crop:
+    """Return a box with the margin that the second pass and the refinement need.
+
+    Parameters
+    ----------
+    box : tuple of int
+        (x, y, width, height).
+    shape : tuple of int
+        Rows and columns of the photo, first of all.
+
+    Returns
+    -------
+    Crop
+        Clipped to the photo.
+    """
+    x, y, width, height = box
+    margin = int(np.ceil(_MARGIN * max(width, height)))
+    left, top = max(x - margin, 0), max(y - margin, 0)
+    right, bottom = min(x + width + margin, shape[1]), min(y + height + margin, shape[0])
+    return Crop(left, top, right - left, bottom - top)
+
+
+def cut_to_box(cover: np.ndarray, box: Box) -> np.ndarray:
+    """Return coverage that is 0 outside a box.
+
+    Parameters
+    ----------
+    cover : (H, W) ndarray
+    box : tuple of int
+        (x, y, width, height).
+
+    Returns
+    -------
+    (H, W) ndarray
+    """
+    left, top, width, height = box
+    inside = slice(top, top + height), slice(left, left + width)
+    cut = np.zeros_like(cover)
+    cut[inside] = cover[inside]
+    return cut
 
 
 @dataclass(frozen=True)

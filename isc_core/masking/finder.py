@@ -3,12 +3,7 @@
 Problem: a photo without a mask is either masked, or refused with a message that says what to do. A
 wrong mask spoils everything that follows.
 
-Equation: without hints, a mask is used if its confidence (`confidence`) is at least
-`MIN_CONFIDENCE`, and if it has no second component of at least .3 of the area of the largest. With
-hints, the user decides, and a mask is used at any confidence.
-
-Limits: the thresholds were chosen on composites, see docs/methods/automatic_mask.md. Objects that
-touch are found as one, and used as one.
+Method: a mask is found (`search`) and used unless there is a reason not to (`refusal`).
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,18 +14,16 @@ import numpy as np
 from ..errors import InputError
 from ..io.decoders import Raster, read_raster
 from ..io.limits import DEFAULT_LIMITS, Limits
-from ..networks.mask_network import Count
 from ..photo.found_mask import FoundMask
 from ..photo.masks import MIN_MASK_PIXELS, check_mask
 from ..photo.photo import Photo
 from ..photo.reading import photo_from_raster
+from .components import connected_components
 from .hints import Hints
-from .search import connected_components, find_mask, find_masks
+from .refusal import MIN_CONFIDENCE, REMEDY, refusal_reason
+from .search import find_mask, find_masks
 
-MIN_CONFIDENCE = 0.3  # of a mask that is used without hints
 _MIN_LENIENT_CONFIDENCE = 0.5  # the same if the whole photo can be used instead
-_SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
-_REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 
 @dataclass(frozen=True)
@@ -85,54 +78,6 @@ class MaskSearch:
         raise InputError(f"{name}: {problem}")
 
 
-def refusal_reason(
-    found: FoundMask, hints: Hints | None = None, minimum: float = MIN_CONFIDENCE
-) -> str:
-    """Return why a mask is refused.
-
-    Parameters
-    ----------
-    found : FoundMask
-    hints : Hints, optional
-        With hints, the confidence is not checked.
-    minimum : float, optional
-        Minimum confidence of a mask that is used.
-
-    Returns
-    -------
-    str
-        What is wrong and what to do; "" if the mask is used.
-    """
-    enough = int(found.mask.sum()) >= MIN_MASK_PIXELS
-    if hints:
-        return "" if enough else "no object found there: put --point on it, or --box around it"
-    several = enough and shows_several(found.mask)
-    if enough and found.confidence >= minimum and not several:
-        return ""
-    kind = Count(int(found.counts.argmax()))
-    if several or kind == Count.SEVERAL:
-        return f"it seems to show several objects: {_REMEDY}; --each processes each of them"
-    if kind == Count.NONE or not enough:
-        return f"no distinct object found: {_REMEDY}"
-    return f"its mask is uncertain (confidence {found.confidence:.0%}): {_REMEDY}"
-
-
-def shows_several(mask: np.ndarray) -> bool:
-    """Return whether a mask shows several objects.
-
-    Parameters
-    ----------
-    mask : (H, W) bool ndarray
-        Not empty.
-
-    Returns
-    -------
-    bool
-        Whether a second component is about as large as the first.
-    """
-    return len(connected_components(mask, _SEVERAL)) > 1
-
-
 class EachObjectSearch:
     """A `photo.found_mask.MaskFinder` that finds each of several separate objects.
 
@@ -169,7 +114,7 @@ class EachObjectSearch:
         """
         self.found = [one for one in find_masks(light) if int(one.mask.sum()) >= MIN_MASK_PIXELS]
         if not self.found:
-            raise InputError(f"{name}: no distinct objects found: {_REMEDY}")
+            raise InputError(f"{name}: no distinct objects found: {REMEDY}")
         cover = np.max([one.cover for one in self.found], axis=0)
         least_certain = min(self.found, key=lambda one: one.confidence)
         return replace(least_certain, cover=cover)

@@ -22,7 +22,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
-from isc_core.masking.finder import shows_several
+from isc_core.masking.components import shows_several
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.numerics.logistic import logistic_weights

@@ -4,8 +4,8 @@ import argparse
 
 from ...errors import InputError
 from ...imaging.bounding_box import mask_slices
+from ...masking.components import connected_components
 from ...masking.hints import Hints
-from ...masking.search import connected_components
 from ...photo.grabcut import Box
 from ...photo.photo import Photo
 from .options import add_pixels

@@ -1,0 +1,60 @@
+"""The connected components of a mask."""
+
+import numpy as np
+from scipy import ndimage
+
+from ..imaging.bounding_box import mask_box
+
+_SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
+
+
+def connected_components(mask: np.ndarray, share: float = 0.1) -> list[np.ndarray]:
+    """Return the connected components of a mask (8 neighbours), without small ones.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    share : float
+        Minimum area of a component, relative to that of the largest.
+
+    Returns
+    -------
+    list of (H, W) bool ndarray
+        From left to right.
+    """
+    labels, _ = ndimage.label(mask, np.ones((3, 3)))
+    areas = np.bincount(labels.ravel())
+    areas[0] = 0
+    chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))
+    components = [labels == number for number in chosen]
+    return sorted(components, key=lambda component: mask_box(component)[:2])
+
+
+def is_one_piece(mask: np.ndarray) -> bool:
+    """Return whether a mask has one component; small ones do not count.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    bool
+    """
+    return bool(mask.any()) and len(connected_components(mask)) == 1
+
+
+def shows_several(mask: np.ndarray) -> bool:
+    """Return whether a mask shows several objects.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Returns
+    -------
+    bool
+        Whether a second component is about as large as the first.
+    """
+    return len(connected_components(mask, _SEVERAL)) > 1
