@@ -8,7 +8,7 @@ import pytest
 
 from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
-from isc_core.result_files.result_folder import load, save
+from isc_core.result_files.result_folder import SCHEMA_VERSION, load, save
 from isc_core.scene.diagnostics import AssumptionWarning, LobeFitOutcome, WarningKind
 from tests.core.ball_scene import ball
 
@@ -65,7 +65,7 @@ def test_it_is_saved_in_the_present_schema(old: Path, tmp_path: Path) -> None:
     found = load(old)
     save(found, tmp_path / "again")
     about = json.loads((tmp_path / "again" / "decomposition.json").read_text())
-    assert about["schema_version"] == 2
+    assert about["schema_version"] == SCHEMA_VERSION
     assert about["status"]["warnings"] == [{"kind": "several lights", "value": None}]
     assert load(tmp_path / "again").provenance.diagnostics == found.provenance.diagnostics
 
