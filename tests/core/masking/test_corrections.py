@@ -82,3 +82,9 @@ def test_a_point_on_the_background_removes_the_other_object() -> None:
     light, (left, _) = balls(TWO)
     after = find_mask(light, Hints(background=((150, 75),)))
     assert overlap(after.mask, left) > 0.8
+
+
+def test_a_point_on_another_object_gets_that_object() -> None:
+    """The network's mask with the point lies apart from the mask without it."""
+    hints, hinted = Hints(points=((165, 100),)), found(OTHER)
+    assert corrected(LIGHT, found(BODY), hinted, hints, usable=True) == hinted
