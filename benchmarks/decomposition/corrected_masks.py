@@ -30,15 +30,17 @@ from isc_core.masking.hints import Hints, Point
 from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count
-from training.masks.composites import CompositeDraws, Composites
 from training.masks.difficulty import SIMPLE, Difficulty
-from training.masks.held_out import PARTS, SIDE, held_out_composites, held_out_ingredients
+from training.masks.held_out import (
+    PARTS,
+    composites_of_targets,
+    held_out_composites,
+    held_out_ingredients,
+)
 from training.masks.packs import Ingredients
 
 _KINDS = {"one": SIMPLE, "compound": Difficulty(compound=1), "cut by the frame": Difficulty(cut=1)}
 _OF_SEVERAL = "one of several"
-_BATCH = 8
-_LEAST = 200  # pixels of an object
 _RIGHT = 0.85  # overlap of a mask that needs no further point
 
 
@@ -141,26 +143,10 @@ def composites(
     for kind, difficulty in _KINDS.items():
         for photo in held_out_composites(ingredients, Count.ONE, count, seed, difficulty):
             yield kind, photo.light, photo.cover >= 0.5
-    for light, truth in _of_several(ingredients, count, seed):
-        yield _OF_SEVERAL, light, truth
-
-
-def _of_several(
-    ingredients: Ingredients, count: int, seed: int
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Photos of several objects, with the mask of one."""
     torch.manual_seed(seed)
-    rng, made = np.random.default_rng([seed, 77]), 0
-    draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0, 1), backgrounds=(0, 0))
-    compose = Composites(ingredients, draw, SIDE)
-    while made < count:
-        batch = compose(rng)
-        for photo, frame, mask in zip(batch.photo, batch.frame, batch.mask, strict=True):
-            place = np.ix_(*(frame[0].numpy().any(axis) for axis in (1, 0)))
-            truth = mask[0].numpy()[place] >= 0.5
-            if made < count and truth.sum() >= _LEAST:
-                made += 1
-                yield photo.permute(1, 2, 0).numpy()[place], truth
+    rng = np.random.default_rng([seed, 77])
+    for light, truth in composites_of_targets(ingredients, (0, 0, 1), count, rng):
+        yield _OF_SEVERAL, light, truth
 
 
 def report(found: list[Corrections]) -> str:

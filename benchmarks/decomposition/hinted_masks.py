@@ -29,15 +29,13 @@ from isc_core.imaging.bounding_box import mask_box
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import MaskNetwork
-from training.masks.composites import CompositeDraws, Composites
-from training.masks.held_out import SIDE, masked_cutout
+from training.masks.held_out import composites_of_targets, masked_cutout
 from training.masks.ingredients import panoramas_in
 from training.masks.packs import Ingredients
 
 KINDS = ("box", "points", "points and not")
-_BATCH, _SEED = 8, 5
+_SEED = 5
 _MOST_MARGIN = 0.15  # of a box, of the object's width or height
-_LEAST = 200  # pixels of an object
 _RIGHT = 0.5  # overlap
 _BINS = (0.0, 0.5, 0.8, 0.95, 1.01)  # of confidence
 
@@ -80,17 +78,8 @@ def composites(
     torch.manual_seed(_SEED)
     pictures = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
     rooms, patterns = panoramas_in(panoramas, 0, held_out=True), np.zeros((1, 8, 8), np.uint8)
-    draw = CompositeDraws(_BATCH, hinted=1, shares=(0, 0.5, 0.5), backgrounds=(0, 0))
-    compose = Composites(Ingredients(np.stack(pictures), rooms, patterns), draw, SIDE)
-    made = 0
-    while made < count:
-        batch = compose(rng)
-        for photo, frame, mask in zip(batch.photo, batch.frame, batch.mask, strict=True):
-            place = np.ix_(*(frame[0].numpy().any(axis) for axis in (1, 0)))
-            truth = mask[0].numpy()[place] >= 0.5
-            if made < count and truth.sum() >= _LEAST:
-                made += 1
-                yield photo.permute(1, 2, 0).numpy()[place], truth
+    ingredients = Ingredients(np.stack(pictures), rooms, patterns)
+    yield from composites_of_targets(ingredients, (0, 0.5, 0.5), count, rng)
 
 
 def drawn_hints(truth: np.ndarray, kind: str, rng: np.random.Generator) -> Hints:

@@ -194,14 +194,6 @@ class FramePart:
         """Whether it is the whole frame."""
         return self.share == 1
 
-    @property
-    def far_corner(self) -> tuple[slice, slice]:
-        """Row and column of a pixel in a corner of the frame, outside the part if there is one."""
-        height, width = self.shape
-        row = 0 if self.rows.start > 0 or self.rows.stop == height else height - 1
-        column = 0 if self.columns.start > 0 or self.columns.stop == width else width - 1
-        return slice(row, row + 1), slice(column, column + 1)
-
     def cut(self, values: np.ndarray) -> np.ndarray:
         """Return the values of the part.
 
@@ -216,24 +208,6 @@ class FramePart:
             A view.
         """
         return values[self.rows, self.columns]
-
-    def constant_around(self, values: np.ndarray) -> float | None:
-        """Return the value of all pixels around the part.
-
-        Parameters
-        ----------
-        values : (H, W) ndarray
-            Of the frame.
-
-        Returns
-        -------
-        float or None
-            None if they differ.
-        """
-        value = values[self.far_corner][0, 0]
-        beside = values[self.rows, : self.columns.start], values[self.rows, self.columns.stop :]
-        parts = values[: self.rows.start], values[self.rows.stop :], *beside
-        return float(value) if all((part == value).all() for part in parts) else None
 
     def placed(self, values: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
         """Return values in the frame.

@@ -29,6 +29,7 @@ from .packs import Ingredients
 SIDE = 320  # pixels of a composite's longer side
 _CUTOUT_SIDE = 256  # pixels
 _BATCH = 8
+_LEAST = 200  # pixels of a target
 PARTS = ("A", "B")
 
 
@@ -140,3 +141,39 @@ def held_out_composites(
             light = batch.photo[k].permute(1, 2, 0).numpy()[place]
             yield HeldOut(light, batch.mask[k, 0].numpy()[place], count)
             made += 1
+
+
+def composites_of_targets(
+    ingredients: Ingredients,
+    shares: tuple[float, float, float],
+    number: int,
+    rng: np.random.Generator,
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Compose photos of which one object is the target; PyTorch's generator is used, too.
+
+    Parameters
+    ----------
+    ingredients : Ingredients
+    shares : tuple of float
+        Of photos by `Count`.
+    number : int
+        Of photos.
+    rng : numpy.random.Generator
+
+    Yields
+    ------
+    light : (H, W, 3) float32 ndarray
+        Linear, 1 is white.
+    truth : (H, W) bool ndarray
+        Mask of the target, of at least 200 pixels.
+    """
+    draw = CompositeDraws(_BATCH, hinted=1, shares=shares, backgrounds=(0, 0))
+    compose, made = Composites(ingredients, draw, SIDE), 0
+    while made < number:
+        batch = compose(rng)
+        for photo, frame, mask in zip(batch.photo, batch.frame, batch.mask, strict=True):
+            place = np.ix_(*(frame[0].numpy().any(axis) for axis in (1, 0)))
+            truth = mask[0].numpy()[place] >= 0.5
+            if made < number and truth.sum() >= _LEAST:
+                made += 1
+                yield photo.permute(1, 2, 0).numpy()[place], truth
