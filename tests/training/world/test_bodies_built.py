@@ -10,7 +10,7 @@ from training.world.bodies.body import finished
 from training.world.bodies.built import KINDS, build
 from training.world.bodies.screening import MOST, fault
 
-WITH_BLENDER = {"boolean", "lettering", "metaball", "skin"}
+WITH_BLENDER = {"assembly", "boolean", "lettering", "metaball", "skin"}
 
 
 def skip_without_blender(kind: str) -> None:
@@ -44,5 +44,5 @@ def test_a_number_gives_the_same_body_and_another_number_another(kind: str) -> N
 
 
 def test_an_unknown_kind_is_one_line() -> None:
-    with pytest.raises(InputError, match="unknown kind of body 'tree': choose boolean"):
+    with pytest.raises(InputError, match="unknown kind of body 'tree': choose assembly"):
         build("tree", 0)

@@ -13,6 +13,7 @@ from isc_core.errors import InputError
 
 from ..geometry.surface import Surface, in_fixed_order
 from . import (
+    assemblies,
     booleans,
     boxes,
     cloth,
@@ -35,6 +36,7 @@ from . import (
 
 CREDIT = "made by training.world.bodies.built"
 _MAKERS: dict[str, Callable[[np.random.Generator], Surface]] = {
+    "assembly": assemblies.make,
     "boolean": booleans.make,
     "box": boxes.make,
     "cloth": cloth.make,
