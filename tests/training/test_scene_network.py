@@ -23,6 +23,9 @@ from isc_core.networks.scene_network import (
 )
 from training.networks.highlight_module import HighlightNetworkModule
 from training.networks.scene_module import SceneNetworkModule, light_nll, network_channels
+from training.networks.scene_network import with_small_highlights
+from training.world.lit_pictures import LitPictures
+from training.world.recipes import Kind
 from training.world.samples import OBJECT, OUTPUT, Sample
 
 WIDTHS = (6, 8, 8, 10)
@@ -224,3 +227,21 @@ def test_weights_of_another_network_are_refused_in_one_line() -> None:
     for wrong in (arrays, HighlightNetworkModule().arrays()):
         with pytest.raises(InputError, match="weights of another network"):
             SceneNetworkModule.of(wrong)
+
+
+def test_small_highlights_are_added_to_opaque_bodies_alone() -> None:
+    torch.manual_seed(0)
+    count = 200
+    kinds = torch.arange(count) % 2 * Kind.GLASS
+    layers = torch.rand(count, 13, 4, 4).half()
+    blank = {name: torch.zeros(count) for name in LitPictures.__dataclass_fields__}
+    blank |= {"layers": layers, "cover": torch.ones(count, 1, 4, 4), "kind": kinds}
+    found = with_small_highlights(
+        LitPictures(**blank | {"strongest": torch.zeros(count, 3)})
+    ).layers
+    added = found - layers.float()
+    assert torch.equal(added[:, :3], torch.zeros_like(added[:, :3]))
+    assert torch.equal(added[:, 6:], torch.zeros_like(added[:, 6:]))
+    brighter = added[:, 3:6].sum((1, 2, 3)) > 0
+    assert not brighter[kinds == Kind.GLASS].any()
+    assert 0.2 < brighter[kinds == Kind.OPAQUE].float().mean() < 0.5

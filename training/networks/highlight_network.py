@@ -47,7 +47,6 @@ _PHOTOS = 8  # of each lit view: their gloss and colours differ, too
 _MATT = 0.35  # share of photos without gloss
 _GAIN = (0.3, 0.6)  # mean and deviation of the factor's logarithm
 _SHARP = 0.6  # share of the others that have small highlights, too
-_BRIGHTEST = 6e4  # of half floats
 
 
 def varied(pictures: LitPictures) -> LitPictures:
@@ -68,13 +67,12 @@ def varied(pictures: LitPictures) -> LitPictures:
     gain = torch.where(torch.rand(count, device=device) < _MATT, 0.0, gain)
     order = torch.rand(count, 3, device=device).argsort(1)
     order = order[..., None, None].expand(-1, -1, *layers.shape[2:])
-    diffuse, gloss, rest = layers[:, :3], layers[:, 3:6], layers[:, 6:]
+    diffuse, gloss = layers[:, :3], layers[:, 3:6]
     sharp = (gain > 0) & (torch.rand(count, device=device) < _SHARP)
     gain = torch.where(sharp, gain * torch.rand(count, device=device), gain)
     gloss = gloss.gather(1, order) * gain[:, None, None, None]
     gloss = gloss + small_highlights(pictures) * sharp[:, None, None, None]
-    altered = torch.cat([diffuse.gather(1, order), gloss.clamp(max=_BRIGHTEST), rest], 1)
-    return replace(pictures, layers=altered)
+    return pictures.with_light(diffuse.gather(1, order), gloss)
 
 
 def main() -> None:

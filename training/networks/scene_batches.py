@@ -198,7 +198,8 @@ def read_world(
     InputError
         If a folder is no world, or there are no views.
     """
-    packs = [read_pack(path) for path in paths if path.is_file()]
+    with ThreadPoolExecutor() as pool:  # unpacking leaves other threads alone
+        packs = list(pool.map(read_pack, [path for path in paths if path.is_file()]))
     folders = [path for path in paths if not path.is_file()]
     views = {split: _prepared_views(packs, folders, split) for split in splits}
     if not all(views.values()):

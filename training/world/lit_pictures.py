@@ -1,6 +1,6 @@
 """Lit views as pictures, from which photos are taken."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 
@@ -46,6 +46,22 @@ class LitPictures(TensorBatch):
     strongest: torch.Tensor
     kind: torch.Tensor
     aspect: torch.Tensor
+
+    def with_light(self, diffuse: torch.Tensor, specular: torch.Tensor) -> "LitPictures":
+        """Return pictures with other light.
+
+        Parameters
+        ----------
+        diffuse, specular : (B, 3, SIDE, SIDE) tensor
+            Not negative. Specular light is limited to what half floats hold.
+
+        Returns
+        -------
+        LitPictures
+        """
+        rest = self.layers[:, 6:].float()
+        layers = torch.cat([diffuse, specular.clamp(max=_BRIGHTEST), rest], 1)
+        return replace(self, layers=layers)
 
 
 def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank) -> LitPictures:
