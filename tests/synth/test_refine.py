@@ -34,16 +34,9 @@ LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
 
 
-def dome(size: int = 48, *, wall: bool = False) -> Decomposition:
-    """A flat dome, or a floor with a wall along the middle, of one colour."""
-    y, x = np.mgrid[:size, :size] + 0.5 - size / 2
-    mask = np.hypot(x, y) < 0.45 * size
-    height = np.where(np.abs(x) < 2, 15.0, 0.0) if wall else np.sqrt(size**2 - x**2 - y**2)
-    normal = np.zeros((size, size, 3), np.float32)
-    normal[..., 2] = 1
-    if not wall:
-        normal[mask] = (np.stack([x, -y, height], -1) / size)[mask]
-    shading = np.zeros((size, size, 3), np.float32)
+def of_one_colour(normal: np.ndarray, height: np.ndarray, mask: np.ndarray) -> Decomposition:
+    """The result of a surface of one colour under `LIGHT`."""
+    shading = np.zeros(normal.shape, np.float32)
     shading[mask] = np.exp(real_sh(normal[mask].astype(float)) @ LIGHT)
     reflectance = np.where(mask[..., None], np.float32(0.5), np.float32(0)) * np.ones(3, np.float32)
     diffuse = reflectance * shading
@@ -53,6 +46,18 @@ def dome(size: int = 48, *, wall: bool = False) -> Decomposition:
         np.where(mask, height, 0).astype(np.float32), mask, mask.astype(np.float32), LIGHT,
         Provenance(input={"sha256": "0" * 64}),
     )  # fmt: skip
+
+
+def dome(size: int = 48, *, wall: bool = False) -> Decomposition:
+    """A flat dome, or a floor with a wall along the middle."""
+    y, x = np.mgrid[:size, :size] + 0.5 - size / 2
+    mask = np.hypot(x, y) < 0.45 * size
+    height = np.where(np.abs(x) < 2, 15.0, 0.0) if wall else np.sqrt(size**2 - x**2 - y**2)
+    normal = np.zeros((size, size, 3), np.float32)
+    normal[..., 2] = 1
+    if not wall:
+        normal[mask] = (np.stack([x, -y, height], -1) / size)[mask]
+    return of_one_colour(normal, height, mask)
 
 
 def objective(d: Decomposition) -> tuple[LightObjective, LightField]:
@@ -94,9 +99,7 @@ def bowl(size: int = 96, depth: float = 0.5) -> Decomposition:
     normal = np.zeros((size, size, 3), np.float32)
     normal[..., 2] = 1
     normal[mask] = (np.stack([-x, y, below], -1) / radius)[mask]
-    d = dome(size)
-    height = np.where(mask, below.max() - below, 0).astype(np.float32)
-    return replace(d, normal=normal, height=height, mask=mask)
+    return of_one_colour(normal, below.max() - below, mask)
 
 
 def test_a_bowl_lights_itself_by_its_form_factor() -> None:
@@ -157,9 +160,8 @@ def command(words: list[str]) -> list[str]:
     return command_module.run(options, Monitor())
 
 
-def shadowed_dome(size: int = 96) -> Decomposition:
-    """A dome whose image has more contrast than its shading explains."""
-    d = dome(size)
+def contrasted(d: Decomposition) -> Decomposition:
+    """The result with an image of more contrast than its shading explains."""
     factor = np.exp(1.5 * d.normal[..., :1]).astype(np.float32)
     diffuse = np.where(d.mask[..., None], d.diffuse * factor, 0).astype(np.float32)
     return replace(d, image=diffuse, diffuse=diffuse, reflectance=d.reflectance * factor)
@@ -172,7 +174,7 @@ def test_a_refined_result_keeps_every_identity_and_its_files(
 ) -> None:
     traced = Mock(side_effect=light_transport)
     monkeypatch.setattr("synth.refine.refine.light_transport", traced)
-    start = shadowed_dome(size)
+    start = contrasted(dome(size))
     done = refine(start)
     assert done.kept and done.after < done.before
     assert (traced.call_count == 1) == (size == 96), "the working scale has the pixels of the maps"
@@ -206,7 +208,7 @@ def test_the_start_is_kept_if_it_is_optimal(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
-    start = shadowed_dome()
+    start = contrasted(dome(96))
     save(start, tmp_path / "start", cover=start.mask * 0.7)
     for name in ("first", "second"):
         lines = command([str(tmp_path / "start"), "--light", "-o", str(tmp_path / name)])

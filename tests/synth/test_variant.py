@@ -75,6 +75,7 @@ def test_a_variant_that_does_not_run_here_is_refused(
 def test_a_card_without_optix_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
     drjit = pytest.importorskip("drjit", reason="needs the extra `synth`")
     monkeypatch.setattr(drjit, "has_backend", lambda backend: backend == drjit.JitBackend.CUDA)
+    monkeypatch.delenv("DRJIT_LIBOPTIX_PATH", raising=False)
     monkeypatch.setattr(variant, "OPTIX", "libno-such-library.so.1")
     assert not cuda_is_usable()
     monkeypatch.setattr(variant, "OPTIX", None)  # the process itself, which can be opened
