@@ -1,5 +1,6 @@
 """The choice of Mitsuba's variant, and the message without Mitsuba."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -109,7 +110,12 @@ def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package
         "print(variant.slower_without())\n"
     )
     done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        env={name: value for name, value in os.environ.items() if name != CHOICE},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("\n") == 1
