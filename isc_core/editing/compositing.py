@@ -19,24 +19,52 @@ Limits: detail that the maps do not resolve changes only with its colour. Where 
 clipped, so is the edit.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.area_resize import reduced_count
-from ..imaging.bounding_box import mask_box
+from ..imaging.bounding_box import FramePart, mask_box, mask_slices
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
 from ..photo import Photo
 from ..scene.decomposition import Decomposition
+from ..scene.part_of_result import ResultPart
 from .edited import Edited
 
 _EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white are unreliable
 _CHUNK = 1_000_000  # pixels at a time
 _BOX_TOLERANCE = 3.0  # pixels of the maps: tolerance between the two boxes
+_BORDER = 5  # pixels of the maps around the object: beyond the tolerance and interpolation
 
 
-def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class EditedPart:
+    """The part of a photo with its object, after an edit.
+
+    Attributes
+    ----------
+    photo : Photo
+        The part before the edit.
+    image : (h, w, 3) float32 ndarray
+        Linear, not negative.
+    changed : (h, w) bool ndarray
+        Where it differs from the photo; never outside the mask.
+    place : FramePart
+        The place of the part in the photo.
+    """
+
+    photo: Photo
+    image: np.ndarray
+    changed: np.ndarray
+    place: FramePart
+
+
+def composite(
+    d: Decomposition, edit: Edited, photo: Photo, part: FramePart | None = None
+) -> EditedPart:
     """Apply an edit to the photo at full size.
 
     Parameters
@@ -45,39 +73,43 @@ def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray,
     edit : Edited
     photo : Photo
         The photo that the result was made of, at full size, with the same mask.
+    part : FramePart, optional
+        The part of the maps' frame that `d` and `edit` are of; by default all of it.
 
     Returns
     -------
-    image : (H, W, 3) float32 ndarray
-        Linear, not negative.
-    changed : (H, W) bool ndarray
-        Where it differs from the photo; never outside the mask.
+    EditedPart
 
     Raises
     ------
     InputError
         If photo, mask and result do not match.
     """
-    scale = scale_of(d, photo)
+    part = part or FramePart.whole((d.mask.shape[0], d.mask.shape[1]))
+    scale = scale_of(d, photo, part)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
+    place = FramePart.around(photo.mask, 0)
+    near = photo.cut(place)
     full = (
-        change
-        if scale == 1 and change.shape == photo.image.shape
-        else enlarged_change(d, change, photo, scale)
+        place.cut(part.placed(change))
+        if scale == 1 and part.shape == photo.mask.shape
+        else enlarged_change(ResultPart(d, part), change, near, place, scale)
     )
-    changed = photo.mask & (full != 0).any(-1)
-    image = photo.image.copy()
+    changed = near.mask & (full != 0).any(-1)
+    image = near.image.copy()
     image[changed] = np.maximum(image[changed] + full[changed], 0)
-    return image, changed
+    return EditedPart(near, image, changed, place)
 
 
-def scale_of(d: Decomposition, photo: Photo) -> float:
+def scale_of(d: Decomposition, photo: Photo, part: FramePart) -> float:
     """Return the size of the maps over that of the photo.
 
     Parameters
     ----------
     d : Decomposition
     photo : Photo
+    part : FramePart
+        The part of the maps' frame that `d` is of.
 
     Returns
     -------
@@ -96,12 +128,13 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
         )
     height, width = photo.mask.shape
     expected = tuple(reduced_count(count, recorded) for count in (height, width))
-    if size != [width, height] or expected != d.mask.shape:
+    if size != [width, height] or expected != part.shape:
         raise InputError(
             f"the result was made from a photo of {' x '.join(map(str, size))} pixels, not of "
             f"{width} x {height}: give the same photo"
         )
-    boxes = np.array(mask_box(photo.mask)) * recorded, np.array(mask_box(d.mask))
+    box = np.add(mask_box(d.mask), (*part.corner, 0, 0))
+    boxes = np.array(mask_box(photo.mask)) * recorded, box
     if np.abs(boxes[0] - boxes[1]).max() > _BOX_TOLERANCE:
         raise InputError(
             "the photo's mask differs from the one of the result: give the same mask with --mask"
@@ -109,14 +142,20 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
     return float(recorded)
 
 
-def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: float) -> np.ndarray:
+def enlarged_change(
+    stored: ResultPart, change: np.ndarray, photo: Photo, place: FramePart, scale: float
+) -> np.ndarray:
     """Upsample the change of the maps' image, guided by the colours of the full photo.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     change : (h, w, 3) ndarray
+        Of its image.
     photo : Photo
+        A part of the photo.
+    place : FramePart
+        The place of that part.
     scale : float
         Size of the maps over that of the photo.
 
@@ -125,7 +164,7 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
     (H, W, 3) float32 ndarray
         0 outside the photo's mask.
     """
-    result = np.zeros(photo.image.shape, np.float32)
+    result, d = np.zeros(photo.image.shape, np.float32), stored.result
     if not change.any():
         return result
     epsilon = _EPSILON * white_of(d.image, d.mask) ** 2
@@ -142,12 +181,14 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
     )
     rest = change - np.einsum("hwgc,hwg->hwc", slope, d.image) - offset
     planes = np.concatenate([slope.reshape(*d.mask.shape, 9), offset + rest], -1)
-    nearest = ndimage.distance_transform_edt(~d.mask, return_distances=False, return_indices=True)
-    planes = planes[tuple(nearest)].astype(np.float32)
+    planes, first = _continued(planes.astype(np.float32), stored)
     rows, columns = np.nonzero(photo.mask)
     for start in range(0, len(rows), _CHUNK):
         at = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
-        places = [(index + 0.5) * scale - 0.5 for index in at]
+        places = [
+            (index + along.start + 0.5) * scale - 0.5 - start
+            for index, along, start in zip(at, (place.rows, place.columns), first, strict=True)
+        ]
         found = np.stack(
             [
                 ndimage.map_coordinates(planes[..., k], places, order=1, mode="nearest")
@@ -159,3 +200,20 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
             np.einsum("ngc,ng->nc", found[:, :9].reshape(-1, 3, 3), photo.image[at]) + found[:, 9:]
         )
     return result
+
+
+def _continued(planes: np.ndarray, stored: ResultPart) -> tuple[np.ndarray, tuple[int, int]]:
+    """`planes` (h, w, C) of the part continued beyond the object by their nearest values, in the
+    frame or near the object; and the row and the column in the frame where they begin.
+    """
+    mask, part = stored.result.mask, stored.part
+    if part.is_whole:
+        near = part
+    else:
+        mask = part.placed(mask)
+        near = FramePart(*mask_slices(mask, _BORDER), part.shape)
+        mask = near.cut(mask)
+    nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    moved = (near.rows.start - part.rows.start, near.columns.start - part.columns.start)
+    at = tuple(index + by for index, by in zip(nearest, moved, strict=True))
+    return planes[at], (near.rows.start, near.columns.start)

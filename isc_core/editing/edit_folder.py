@@ -12,12 +12,13 @@ only if its file is an EXR with plain R, G, B; else they are rounded by the prod
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..imaging.bounding_box import FramePart
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
 from ..io.decoders import write_png
@@ -109,6 +110,7 @@ def require_writable_edit(folder: Path | str, inputs: Iterable[Path | None] = ()
 def save_edit(
     d: Decomposition, edit: Edited, folder: Path | str, record: Record, sheet: Sheet, *,
     original: Original | None = None, clusters: Clusters | None = None,
+    part: FramePart | None = None,
 ) -> None:  # fmt: skip
     """Write the folder of an edit.
 
@@ -123,16 +125,20 @@ def save_edit(
         The edit is applied to this photo; by default the picture has the size of the maps.
     clusters : Clusters, optional
         Shown in `clusters.png`.
+    part : FramePart, optional
+        The part of the maps' frame that `d` and `edit` are of; by default all of it. The pictures
+        show the frame.
 
     Raises
     ------
     InputError
         If the folder cannot be replaced or written, or the photo is not the result's.
     """
-    image, mask, before, raster = _picture(d, edit, original)
+    part = part or FramePart.whole((d.mask.shape[0], d.mask.shape[1]))
+    picture = _picture(d, edit, part) if original is None else _photo(d, edit, part, original)
     pair = [
-        MapPanel(before, mask, "Before"),
-        MapPanel(image, mask, "After" if sheet.layers else "In the best light"),
+        MapPanel(picture.before, picture.mask, "Before"),
+        MapPanel(picture.image, picture.mask, "After" if sheet.layers else "In the best light"),
     ]
     layers = (
         [
@@ -143,9 +149,9 @@ def save_edit(
         else []
     )
     with new_folder(folder, FILES) as partial:
-        if raster.peak is not None:
-            write_png(partial / "edited.png", raster)
-        write_channels(partial / "edited.exr", _linear_planes(image, mask, raster, original))
+        if picture.raster.peak is not None:
+            write_png(partial / "edited.png", picture.raster)
+        write_channels(partial / "edited.exr", _linear_planes(picture, original))
         edit_sheet(
             sheet.title,
             sheet.subtitle,
@@ -166,26 +172,52 @@ def save_edit(
         )
 
 
-def _linear_planes(
-    image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None
-) -> dict[str, np.ndarray]:
-    """R, G, B times alpha, and A; outside the mask, the values of the photo's EXR file, which the
-    product might round.
+@dataclass(frozen=True)
+class _Picture:
+    """An edited picture: the part with the object, in linear light, and the stored values of all of
+    it.
     """
-    alpha = raster.alpha
-    cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
-    planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
-    if (
-        original is not None
-        and original.path is not None
-        and original.path.suffix.lower() == ".exr"
-        and to_rec709(original.raster.space) is None
-    ):
-        stored = read_channels(original.path)
-        for name in planes:
-            if name in stored and stored[name].shape == mask.shape:
-                planes[name] = np.where(mask, planes[name], stored[name])
+
+    image: np.ndarray  # (h, w, 3)
+    mask: np.ndarray  # (h, w)
+    before: np.ndarray  # (h, w, 3)
+    place: FramePart
+    raster: Raster
+
+
+def _linear_planes(picture: _Picture, original: Original | None) -> dict[str, np.ndarray]:
+    """R, G, B times alpha, and A."""
+    place, alpha = picture.place, picture.raster.alpha
+    if original is None:  # the image is 0 outside the mask, which is the alpha
+        planes = {name: place.placed(picture.image[..., c]) for c, name in enumerate("RGB")}
+    else:
+        planes = {name: original.photo.image[..., c].copy() for c, name in enumerate("RGB")}
+        cover = None if alpha is None else np.where(alpha > 0, alpha, np.float32(1))
+        for c, plane in enumerate(planes.values()):
+            place.cut(plane)[...] = picture.image[..., c]
+            if cover is not None:
+                plane *= cover
+        planes |= _stored_outside(planes, original)
     return planes if alpha is None else planes | {"A": alpha}
+
+
+def _stored_outside(planes: Mapping[str, np.ndarray], original: Original) -> dict[str, np.ndarray]:
+    """Planes with the values of the photo's EXR file outside the mask, which the product might
+    round; those that the file has.
+    """
+    path, mask = original.path, original.photo.mask
+    if (
+        path is None
+        or path.suffix.lower() != ".exr"
+        or to_rec709(original.raster.space) is not None
+    ):
+        return {}
+    stored = read_channels(path)
+    return {
+        name: np.where(mask, plane, stored[name])
+        for name, plane in planes.items()
+        if name in stored and stored[name].shape == mask.shape
+    }
 
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
@@ -212,26 +244,24 @@ def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
     return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", maps)
 
 
-def _picture(
-    d: Decomposition, edit: Edited, original: Original | None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, Raster]:
-    """The edited light, its mask, the light before, and the values to be stored."""
-    if original is not None:
-        photo = original.photo
-        image, changed = composite(d, edit, photo)
-        return (
-            image,
-            photo.mask,
-            photo.image,
-            encode_like(original.raster, photo.original.transfer, image, changed),
-        )
+def _photo(d: Decomposition, edit: Edited, part: FramePart, original: Original) -> _Picture:
+    """The photo with the edit."""
+    done, raster = composite(d, edit, original.photo, part), original.raster
+    transfer = original.photo.original.transfer
+    coded = encode_like(raster, transfer, done.image, done.changed, done.place)
+    return _Picture(done.image, done.photo.mask, done.photo.image, done.place, coded)
+
+
+def _picture(d: Decomposition, edit: Edited, part: FramePart) -> _Picture:
+    """The edited maps, with the mask as alpha."""
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
     if transfer == PROFILE or given.get("colour_profile") == CAMERA_RAW:
         transfer = "srgb"  # a PNG cannot represent the photo's encoding
     peak = None if bits == 32 else 65535 if bits > 8 else 255
     kind = np.float32 if peak is None else np.uint16 if bits > 8 else np.uint8
-    empty = Raster(
-        np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits
-    )
-    return edit.image, d.mask, d.image, encode_like(empty, transfer, edit.image, d.mask)
+    empty = Raster(np.zeros(d.image.shape, kind), None, peak, 32 if peak is None else bits)
+    codes = encode_like(empty, transfer, edit.image, d.mask).values
+    alpha = part.placed(d.mask.astype(np.float32))
+    whole = replace(empty, values=part.placed(codes), alpha=alpha)
+    return _Picture(edit.image, d.mask, d.image, part, whole)

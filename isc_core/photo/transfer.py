@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.bounding_box import FramePart
 from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..io.decoders.colour.space import ColourSpace
@@ -130,7 +131,13 @@ def curves_of(raster: Raster, transfer: str) -> tuple[Callable[[np.ndarray], np.
     return (np.asarray,) if transfer == "linear" else (srgb_to_linear,)
 
 
-def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.ndarray) -> Raster:
+def encode_like(
+    raster: Raster,
+    transfer: str,
+    image: np.ndarray,
+    changed: np.ndarray,
+    part: FramePart | None = None,
+) -> Raster:
     """Encode the changed pixels of an image like a raster; other values keep every bit.
 
     A raster of a colour space that a PNG cannot represent becomes one of 16-bit sRGB.
@@ -140,9 +147,11 @@ def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.nd
     raster : Raster
         A grey one gets three channels if the new pixels have colour.
     transfer : {"srgb", "linear", "profile"}
-    image : (H, W, 3) ndarray
+    image : (h, w, 3) ndarray
         Linear Rec.709; codes are rounded and clipped to the coding's range.
-    changed : (H, W) bool ndarray
+    changed : (h, w) bool ndarray
+    part : FramePart, optional
+        The part of the raster that `image` and `changed` are of; by default all of it.
 
     Returns
     -------
@@ -159,7 +168,8 @@ def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.nd
         light = np.clip(light @ np.linalg.inv(matrix).T.astype(np.float32), 0, 1)
     coded = _encoded(light[:, : values.shape[2]], raster, transfer)
     result = values.copy()
-    result[changed] = coded if raster.peak is None else np.rint(np.clip(coded, 0, 1) * raster.peak)
+    inside = result if part is None else part.cut(result)
+    inside[changed] = coded if raster.peak is None else np.rint(np.clip(coded, 0, 1) * raster.peak)
     return replace(raster, values=result)
 
 

@@ -4,7 +4,8 @@ Problem: in a photo by a phone, the object often covers a tenth of the frame. Ar
 constant, but thirty channels of twelve megapixels take ten seconds to write and to read.
 
 Method: the files of a large frame store the object's part, with a pixel around it. Their data
-window says where it is in the frame, the display window; `AROUND` has the values around it.
+window says where it is in the frame, the display window; `AROUND` of `scene.part_of_result` has
+the values around it.
 
 Limits: programs that ignore the display window show the part only. Frames of up to 2 megapixels
 are stored whole.
@@ -21,7 +22,6 @@ from ..imaging.bounding_box import FramePart
 from ..io.exr import read_windowed, write_channels
 from ..io.limits import Limits
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from ..scene.part_of_result import AROUND
 
 MAPS = "maps.exr"
 ENVIRONMENT = "environment.exr"
@@ -178,7 +178,7 @@ class StoredMaps:
         return cls(path, stored.channels, part)
 
     def layers(self, layers: Mapping[str, str]) -> dict[str, np.ndarray]:
-        """Return layers in the frame.
+        """Return layers of the part.
 
         Parameters
         ----------
@@ -187,7 +187,7 @@ class StoredMaps:
 
         Returns
         -------
-        dict of str to (H, W) or (H, W, 3) ndarray
+        dict of str to (h, w) or (h, w, 3) ndarray
 
         Raises
         ------
@@ -209,12 +209,11 @@ class StoredMaps:
                 f"{self.path} has NaN or infinite values in {broken[0]}: it is damaged; decompose "
                 "the photo again"
             )
-        return {layer: self._placed(layer, group) for layer, group in names.items()}
+        return {layer: self._joined(group) for layer, group in names.items()}
 
-    def _placed(self, layer: str, names: list[str]) -> np.ndarray:
+    def _joined(self, names: list[str]) -> np.ndarray:
         planes = [self.channels[name] for name in names]
-        values = planes[0] if len(planes) == 1 else np.stack(planes, -1)
-        return self.part.placed(values, AROUND.get(layer))
+        return planes[0] if len(planes) == 1 else np.stack(planes, -1)
 
 
 def layer_channels(

@@ -36,7 +36,7 @@ from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
-from ..scene.part_of_result import cut_result
+from ..scene.part_of_result import ResultPart, cut_result, placed_result
 from .arrays_file import ARRAYS, finer_by, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
@@ -191,6 +191,27 @@ def load(folder: Path | str) -> Decomposition:
     InputError
         If a file is missing, damaged, or inconsistent.
     """
+    stored = load_part(folder)
+    return placed_result(stored.result, stored.part)
+
+
+def load_part(folder: Path | str) -> ResultPart:
+    """Read the object's part of a result, for work that does not need its frame.
+
+    Parameters
+    ----------
+    folder : Path or str
+
+    Returns
+    -------
+    ResultPart
+        The whole frame where that is small, or mostly the object, see `maps_file`.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, damaged, or inconsistent.
+    """
     folder = Path(folder)
     if not (folder / "decomposition.json").is_file():
         raise InputError(
@@ -200,18 +221,21 @@ def load(folder: Path | str) -> Decomposition:
     description = _read_json(folder / "decomposition.json")
     stored = StoredMaps.read(folder / MAPS)
     maps = stored.layers(LAYERS)
-    return Decomposition(
+    x, y = stored.part.corner
+    camera = _camera(description, folder)
+    result = Decomposition(
         **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
         mask=maps["mask"] > 0.5,
         illumination=_coefficients(description, folder),
         provenance=_provenance(description, folder),
         brdf=_brdf(description, stored, folder),
         expected_error=_expected_error(stored),
-        camera=_camera(description, folder),
+        camera=None if camera is None else camera.moved(-x, -y),
         visibility=_refined_light("visibility", stored),
         indirect=_refined_light("indirect", stored),
         environment=_environment(folder / ENVIRONMENT),
     )
+    return ResultPart(result, stored.part)
 
 
 def save_separation(

@@ -1,7 +1,7 @@
 """A result as a part of a larger frame, and a part of a result."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,22 @@ from .expected_error import ExpectedError
 
 AROUND = {"normal": np.array((0.0, 0.0, 1.0)), "visibility": np.ones(3)}
 """Values of maps outside the object, by field of `Decomposition`; those of the others are 0."""
+
+
+@dataclass(frozen=True)
+class ResultPart:
+    """The object's part of a result.
+
+    Attributes
+    ----------
+    result : Decomposition
+        Its maps are those of the part.
+    part : FramePart
+        Its place in the frame of the maps.
+    """
+
+    result: Decomposition
+    part: FramePart
 
 
 def cut_result(d: Decomposition, part: FramePart) -> Decomposition:

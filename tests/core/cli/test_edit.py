@@ -11,7 +11,8 @@ import pytest
 from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.exr import read_channels, write_channels
-from isc_core.result_files.result_folder import save
+from isc_core.result_files import maps_file
+from isc_core.result_files.result_folder import load_part, save
 from tests.core.ball_scene import LIGHT, ball
 
 FILES = {"edit.json", "edited.png", "edited.exr", "before_after.png"}
@@ -86,6 +87,60 @@ def test_every_action_writes_its_pictures(
         == (words[0] == "light-direction")
         == ("predicted: " in output.out)
     )
+
+
+@pytest.fixture(scope="module")
+def corner(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small ball in a frame, of which files store `part`, or `whole` the frame; and its photo."""
+    folder = tmp_path_factory.mktemp("corner")
+    scene = ball((96, 120), 20.0, (60.0, 85.0))
+    scene.provenance.input.update(bit_depth=8, transfer="srgb", mask_from="alpha")
+    save(scene, folder / "whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(maps_file, "_LEAST_PIXELS", 100)
+        save(scene, folder / "part")
+    picture = np.where(scene.mask[..., None], scene.image, 0.3)
+    codes = np.rint(255 * np.clip(linear_to_srgb(picture), 0, 1)).astype(np.uint8)
+    cover = np.where(scene.mask, 255, np.arange(120, dtype=np.uint8))
+    cv2.imwrite(str(folder / "photo.png"), np.dstack([codes[..., ::-1], cover]))
+    region = np.random.default_rng(1).integers(0, 255, (96, 120), np.uint8)
+    cv2.imwrite(str(folder / "region.png"), region)
+    return folder
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        "dichromatic --diffuse-sharpen 2 --specular-gain 0.5",
+        "recolour --hue 80 --region {}/region.png --photo {}/photo.png",
+        *(
+            pytest.param(words, marks=pytest.mark.slow)
+            for words in (
+                "light-direction",
+                "highlight --like specular",
+                "gloss --look metallic --photo {}/photo.png",
+                "recolour --cluster 1 --colour 2060c0",
+                "recolour --hue 80 --region {}/region.png",
+                "relight --yaw 40 --photo {}/photo.png",
+            )
+        ),
+    ],
+)
+def test_files_of_an_edit_are_those_of_the_whole_frame(
+    corner: Path, tmp_path: Path, action: str
+) -> None:
+    """Results of large frames store, and edits read, the object's part."""
+    words = action.format(corner, corner).split()
+    for name in ("part", "whole"):
+        assert load_part(corner / name).part.is_whole == (name == "whole")
+        output = str(tmp_path / name)
+        assert main(["edit", str(corner / name), *words, "-o", output, "--quiet"]) == 0
+    files = {path.name for path in (tmp_path / "whole").iterdir()}
+    assert files >= FILES and files == {path.name for path in (tmp_path / "part").iterdir()}
+    for name in files:
+        part, whole = ((tmp_path / of / name).read_bytes() for of in ("part", "whole"))
+        named = (str(corner / of).encode() for of in ("part", "whole"))
+        assert part.replace(*named) == whole, name
 
 
 def before_and_after(work: Path, folder: Path, words: str) -> tuple[np.ndarray, np.ndarray]:

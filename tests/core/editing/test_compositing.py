@@ -3,22 +3,29 @@ the edit arrives at full size.
 """
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from isc_core.editing.compositing import composite
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edit_folder import Original, Record, Sheet, save_edit
 from isc_core.editing.edited import Edited
+from isc_core.editing.highlights import add_highlight
 from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster
+from isc_core.photo.camera import Camera
 from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.scene.part_of_result import cut_result
+from isc_core.shading.lights import DirectionalLight, toward
 from tests.core.ball_scene import ball
 
 SCALE = 0.5
@@ -43,6 +50,14 @@ def half_size(full: Decomposition) -> Decomposition:
     )
 
 
+def composited(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
+    """The photo after an edit, and where it changed."""
+    done = composite(d, edit, photo)
+    image, changed = photo.image.copy(), done.place.placed(done.changed)
+    done.place.cut(image)[...] = done.image
+    return image, changed
+
+
 @pytest.fixture(scope="module")
 def full() -> Decomposition:
     return ball((192, 240), 80.0, (96.5, 120.5))
@@ -51,7 +66,7 @@ def full() -> Decomposition:
 def test_at_the_photo_s_own_size_the_edit_is_the_edit() -> None:
     scene = ball()
     edit = recolour(scene, ColourEdit(hue=90))
-    image, changed = composite(scene, edit, photo_of(scene))
+    image, changed = composited(scene, edit, photo_of(scene))
     assert image[scene.mask] == pytest.approx(edit.image[scene.mask], abs=1e-6)
     assert np.array_equal(image[~scene.mask], photo_of(scene).image[~scene.mask])
     assert not changed[~scene.mask].any()
@@ -60,7 +75,7 @@ def test_at_the_photo_s_own_size_the_edit_is_the_edit() -> None:
 def test_no_edit_is_the_photo_bit_by_bit_at_any_size(full: Decomposition) -> None:
     half = half_size(full)
     photo = photo_of(full)
-    image, changed = composite(half, Edited(half.image, half.diffuse, half.specular), photo)
+    image, changed = composited(half, Edited(half.image, half.diffuse, half.specular), photo)
     assert np.array_equal(image, photo.image) and not changed.any()
 
 
@@ -69,7 +84,7 @@ def test_an_enlarged_edit_is_near_the_edit_made_at_full_size(
     full: Decomposition, change: DichromaticEdit
 ) -> None:
     half, photo = half_size(full), photo_of(full)
-    image, _ = composite(half, edit_layers(half, change), photo)
+    image, _ = composited(half, edit_layers(half, change), photo)
     wanted = edit_layers(full, change).image
     inner = full.mask & (full.normal[..., 2] > 0.3)
     done = np.abs(image - wanted)[inner].mean()
@@ -84,7 +99,7 @@ def test_edges_of_the_paint_stay_as_sharp_as_the_photo_s(full: Decomposition) ->
     texture = 1 + 0.2 * generator.uniform(-1, 1, full.mask.shape)[..., None].astype(np.float32)
     half, photo = half_size(full), photo_of(full)
     photo = replace(photo, image=photo.image * texture)
-    image, _ = composite(
+    image, _ = composited(
         half, edit_layers(half, DichromaticEdit(LayerEdit(gain=0.5), LayerEdit(gain=0.5))), photo
     )
     inner = full.mask & (full.normal[..., 2] > 0.5)
@@ -95,6 +110,29 @@ def test_edges_of_the_paint_stay_as_sharp_as_the_photo_s(full: Decomposition) ->
     assert fine[1] == pytest.approx(0.5 * fine[0], rel=0.15)
 
 
+@pytest.mark.parametrize("scale", [1.0, SCALE])
+def test_the_object_s_part_of_a_result_gives_the_bytes_of_the_whole(scale: float) -> None:
+    """Before a camera, and with a mask that lies beside that of the maps, as far as allowed."""
+    full = ball((240, 320), 50.0, (80.5, 230.5))
+    maps = full if scale == 1 else ball((120, 160), 25.0, (40.0, 115.0))
+    given = {"scale": scale, "size": [320, 240], "name": "ball.png"}
+    camera = Camera(300.0, (maps.mask.shape[1] / 2, maps.mask.shape[0] / 2))
+    maps = replace(maps, provenance=Provenance(input=given), camera=camera)
+    photo = photo_of(full)
+    shift = -2 if scale == 1 else -5  # with the dilation, three pixels of the maps
+    photo = replace(photo, mask=np.roll(ndimage.binary_dilation(photo.mask), shift, axis=1))
+    part = FramePart.around(maps.mask, 1)
+    near = cut_result(maps, part)
+    assert part.share < 0.3
+    light = DirectionalLight(toward(-0.5, 0.4, 0.7), np.ones(3))
+    for edit in (partial(add_highlight, light=light), partial(recolour, change=ColourEdit(90))):
+        whole = composite(maps, edit(maps), photo)
+        found = composite(near, edit(near), photo, part)
+        assert found.changed.any() and found.place == whole.place
+        np.testing.assert_array_equal(found.image, whole.image)
+        np.testing.assert_array_equal(found.changed, whole.changed)
+
+
 def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
     half, photo = half_size(full), photo_of(full)
     edit = edit_layers(half, DIFFUSE_ONLY)
@@ -103,6 +141,11 @@ def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
     for wrong in (smaller, shifted):
         with pytest.raises(InputError, match="give the same"):
             composite(half, edit, wrong)
+    part = FramePart(slice(5, 90), slice(15, 105), half.mask.shape)
+    near = cut_result(half, part)
+    for wrong in (smaller, shifted):
+        with pytest.raises(InputError, match="give the same"):
+            composite(near, edit_layers(near, DIFFUSE_ONLY), wrong, part)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -151,7 +194,7 @@ def test_png_keeps_depth_coding_alpha_and_all_other_pixels(
     assert np.array_equal(written[~full.mask][:, :3], values[~full.mask][:, ::-1])
     assert not np.array_equal(written[full.mask][:, :3], values[full.mask][:, ::-1])
     again = read_linear(tmp_path / "out" / "edited.png", transfer)
-    exact, _ = composite(half, recolour(half, ColourEdit(hue=120)), photo)
+    exact, _ = composited(half, recolour(half, ColourEdit(hue=120)), photo)
     step = 1 / np.iinfo(kind).max
     assert np.abs(linear_to_srgb(again) - linear_to_srgb(np.clip(exact, 0, 1)))[full.mask].max() < (
         step if transfer == "srgb" else 13 * step

@@ -11,6 +11,7 @@ from PIL import Image
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
 from isc_core.io.exr import read_windowed, write_channels
+from isc_core.photo.camera import Camera
 from isc_core.result_files.maps_file import (
     EXPECTED_ERROR,
     MAPS,
@@ -19,10 +20,10 @@ from isc_core.result_files.maps_file import (
     map_channels,
     stored_part,
 )
-from isc_core.result_files.result_folder import load, save, save_separation
+from isc_core.result_files.result_folder import load, load_part, save, save_separation
 from isc_core.scene.decomposition import Decomposition, Separation
 from isc_core.scene.expected_error import ExpectedError
-from isc_core.scene.part_of_result import placed_result
+from isc_core.scene.part_of_result import cut_result, placed_result
 from tests.core.ball_scene import ball
 
 FRAME = (1500, 1600)
@@ -85,6 +86,16 @@ def test_files_of_a_large_frame_store_the_object_with_a_pixel_around_it(saved: P
 
 def test_they_are_read_back_in_the_frame_bit_by_bit(saved: Path) -> None:
     assert_equal(load(saved), in_a_large_frame())
+
+
+def test_the_part_alone_can_be_read(tmp_path: Path) -> None:
+    d = replace(in_a_large_frame(), camera=Camera(900.3, (800.3, 750.0)))
+    save(d, tmp_path / "ball")
+    found = load_part(tmp_path / "ball")
+    assert found.part == stored_part(d.mask)
+    assert_equal(found.result, cut_result(d, found.part))
+    assert found.result.camera == cut_result(d, found.part).camera
+    assert load(tmp_path / "ball").camera == d.camera
 
 
 def test_files_that_store_the_whole_frame_are_read_too(saved: Path, tmp_path: Path) -> None:

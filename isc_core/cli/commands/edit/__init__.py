@@ -11,7 +11,7 @@ from ....errors import InputError
 from ....imaging.srgb import linear_to_srgb
 from ....photo import read_raster
 from ....progress import Monitor
-from ....result_files.result_folder import load
+from ....result_files.result_folder import load_part
 from ....scene.decomposition import Decomposition
 from ...interface.options import limits_of
 from ...interface.parser import GENERAL, describe, hints
@@ -98,14 +98,15 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.photo is None and (options.mask is not None or options.transfer is not None):
         raise InputError("--mask and --transfer require --photo: add it")
     monitor.report("reading", 0.0)
-    d = load(options.result)
+    stored = load_part(options.result)
+    d = stored.result
     if not d.mask.any():
         raise InputError(
             f"{options.result} has an empty mask: it is damaged; decompose the photo again"
         )
     _check_result(d, options.result)
     monitor.report("editing", 0.2)
-    done = options.act(d, options)
+    done = options.act(stored, options)
     original = None if options.photo is None else _original(d, options)
     notes = [*done.edit.notes, *_notes(d, done, original)]
     monitor.report("writing", 0.7)
@@ -116,7 +117,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     sheet = Sheet(f"{name}: {options.action}", _changed_options(options), done.panels, done.layers)
     record = Record(options.action, parameters, done.measured)
     edit = replace(done.edit, notes=tuple(notes))
-    save_edit(d, edit, options.output, record, sheet, original=original, clusters=done.clusters)
+    save_edit(
+        d, edit, options.output, record, sheet,
+        original=original, clusters=done.clusters, part=stored.part,
+    )  # fmt: skip
     monitor.report("writing", 1.0)
     return [
         *done.lines,

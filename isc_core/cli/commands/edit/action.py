@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ....editing.clusters import Clusters
 from ....editing.edited import Edited
 from ....result_files.panels import Panel
-from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 
 
 @dataclass(frozen=True)
@@ -49,12 +49,12 @@ class EditAction:
     summary : str
         One line of help.
     act : callable
-        Does the work.
+        Does the work, on the object's part of a result.
     add_options : callable
         Adds the action's options to its parser.
     """
 
     name: str
     summary: str
-    act: Callable[[Decomposition, argparse.Namespace], ActionResult]
+    act: Callable[[ResultPart, argparse.Namespace], ActionResult]
     add_options: Callable[[argparse.ArgumentParser], None]

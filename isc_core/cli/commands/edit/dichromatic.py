@@ -4,12 +4,12 @@ import argparse
 
 from ....editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from ....errors import InputError
-from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 from ...interface.values import finite
 from .action import ActionResult, EditAction
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
     layers = []
     for layer in ("diffuse", "specular"):
         values = {
@@ -23,7 +23,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
                 )
             values["gain"] = 0.0
         layers.append(LayerEdit(**values))
-    return ActionResult(edit_layers(d, DichromaticEdit(*layers)), {})
+    return ActionResult(edit_layers(stored.result, DichromaticEdit(*layers)), {})
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ import argparse
 
 from ....editing.blinn_phong_extension import METHODS, Gloss, change_gloss
 from ....errors import InputError
-from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 from ...interface.values import finite
 from .action import ActionResult, EditAction
 
@@ -15,7 +15,7 @@ _LOOKS = {
 }
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
     preset: dict[str, float] = _LOOKS.get(options.look, {})
     if options.present is not None and options.exponent is None and "sharper" not in preset:
         raise InputError("--present requires a new sharpness: add --exponent or --look")
@@ -27,7 +27,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     metal = options.metal if options.metal is not None else preset.get("metal", 0.0)
     gain = options.gain if options.gain is not None else preset.get("gain", 1.0)
     gloss = Gloss(options.exponent, sharper, options.present, gain, metal, options.method)
-    return ActionResult(change_gloss(d, gloss), {})
+    return ActionResult(change_gloss(stored.result, gloss), {})
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:

@@ -13,6 +13,7 @@ from ....lobe_fitting.light_direction import (
     explain_specular,
 )
 from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 from ....shading.lights import DirectionalLight, toward
 from ....shading.lobe_rendering import Lobe
 from ...interface.values import finite
@@ -23,7 +24,8 @@ from .panels import sphere_panel
 _DEFAULT_LEVEL = 0.7
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
+    d = stored.result
     lobe = lobe_of(options) or known_lobe(d) or Lobe()
     light = _chosen_light(d, options)
     level = options.strength if options.replace or options.strength is not None else _DEFAULT_LEVEL

@@ -13,6 +13,7 @@ from ....networks.scene_network import predict_scene
 from ....result_files.panels import Panel
 from ....scene.decomposition import Decomposition
 from ....scene.light_estimate import LightEstimate
+from ....scene.part_of_result import ResultPart
 from ....shading.lights import DirectionalLight, toward
 from .action import ActionResult, EditAction
 from .options import plain
@@ -27,8 +28,9 @@ _OTHER_LIGHTS = (
 )
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
     del options
+    d = stored.result
     shading, specular = explain_shading(d), explain_specular(d)
     edit = relight(d, NewLight(directional=shading.light), Relighting(highlights="keep"))
     panels = [recovered_light_panel(d)]

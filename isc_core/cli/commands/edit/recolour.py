@@ -10,25 +10,26 @@ from ....editing.recolour import ColourEdit, recolour
 from ....errors import InputError
 from ....io.limits import Limits
 from ....photo import read_raster
-from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 from ...interface.options import limits_of
 from ...interface.values import count, finite
 from .action import ActionResult, EditAction
 from .options import add_colour, plain
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
     change = ColourEdit(
         options.hue, options.saturation, options.value, options.color, options.match_brightness
     )
     if options.cluster is not None and options.region is not None:
         raise InputError("--cluster and --region both select pixels: give one of them")
+    d = stored.result
     clusters = find_clusters(d, options.clusters, options.seed)
     region = None
     if options.cluster is not None:
         region = clusters.weight(options.cluster)
     elif options.region is not None:
-        region = _read_region(options.region, d, limits_of(options))
+        region = _read_region(options.region, stored, limits_of(options))
     measured = {
         "clusters": [
             {"color": plain(c), "share": float(s)}
@@ -38,29 +39,31 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     return ActionResult(recolour(d, change, region), measured, (), clusters)
 
 
-def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
-    """The region (H, W) in [0, 1] at the maps' size, from an image of that size or the photo's: its
-    alpha channel if that is not opaque; else its values, with 1 as white if none is larger.
+def _read_region(path: Path, stored: ResultPart, limits: Limits) -> np.ndarray:
+    """The region (h, w) in [0, 1] of the maps' part, from an image of the size of their frame or of
+    the photo: its alpha channel if that is not opaque; else its values, with 1 as white if none is
+    larger.
     """
-    raster = read_raster(path, limits)
-    region = raster.transparency
-    if region is None:
-        codes = np.nan_to_num(raster.values.astype(float), nan=0.0, posinf=1.0, neginf=0.0)
-        white = 1.0 if raster.peak is None or codes.max() <= 1 else float(raster.peak)
-        region = np.clip(codes.mean(axis=2) / white, 0, 1)
-    if region.shape == d.mask.shape:
-        return region
-    scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
-    if not isinstance(scale, int | float) or [*region.shape[::-1]] != size:
-        raise InputError(
-            f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: use one of the "
-            "photo's size"
+    raster, part = read_raster(path, limits), stored.part
+    height, width = raster.values.shape[:2]
+    rows, columns = (np.arange(along.start, along.stop) for along in (part.rows, part.columns))
+    if (height, width) != part.shape:
+        given = stored.result.provenance.input
+        scale = given.get("scale")
+        if not isinstance(scale, int | float) or [width, height] != given.get("size"):
+            raise InputError(
+                f"{path}: the region is {width} x {height} pixels: use one of the photo's size"
+            )
+        rows, columns = (
+            np.clip(((places + 0.5) / scale).astype(int), 0, count - 1)
+            for places, count in ((rows, height), (columns, width))
         )
-    rows, columns = (
-        np.clip(((np.arange(n) + 0.5) / scale).astype(int), 0, m - 1)
-        for n, m in zip(d.mask.shape, region.shape, strict=True)
-    )
-    return region[np.ix_(rows, columns)]
+    at = np.ix_(rows, columns)
+    if raster.transparency is not None:
+        return raster.transparency[at]
+    white = 1.0 if raster.peak is None or raster.values.max() <= 1 else float(raster.peak)
+    codes = np.nan_to_num(raster.values[at].astype(float), nan=0.0, posinf=1.0, neginf=0.0)
+    return np.clip(codes.mean(axis=2) / white, 0, 1)
 
 
 def _add_options(parser: argparse.ArgumentParser) -> None:

@@ -12,6 +12,7 @@ from ....io.npy import read_array
 from ....photo import read_linear
 from ....result_files.known_inputs import read_light
 from ....scene.decomposition import Decomposition
+from ....scene.part_of_result import ResultPart
 from ....shading.lights import DirectionalLight, toward, turn, turned_light
 from ...interface.options import limits_of
 from ...interface.values import finite
@@ -22,7 +23,8 @@ from .panels import recovered_light_panel, sphere_panel
 _COEFFICIENTS = ("", ".json", ".npy")  # suffixes of lights that are not images
 
 
-def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(stored: ResultPart, options: argparse.Namespace) -> ActionResult:
+    d = stored.result
     rotation = turn(options.yaw, options.pitch, options.roll)
     light, fixed = _new_light(d, options, rotation)
     lobe = lobe_of(options)
