@@ -60,6 +60,7 @@ LEFT_OUT = (
     "benchmarks/refinement/closed_loop.py",
     "benchmarks/mesh",
     "benchmarks/records.py",
+    "benchmarks/separation/clipped_fill.py",
     "benchmarks/separation/print_rule.py",
     "benchmarks/separation/print_set.py",
     "benchmarks/separation/prints.py",

@@ -36,7 +36,7 @@ from ...inpainting.pull_push import fill
 _RING = 4  # pixels held out around a hole, half a patch
 _BETTER = 0.8  # of the smooth fill's error on the ring, to be undercut by patches
 _DARK = 1e-3  # of the brightest value: the least in logarithms
-_LARGE = 1 << 20  # pixels: larger objects are not searched as a whole
+_LARGEST_WHOLE = 1 << 20  # pixels: objects with a larger box are not searched as a whole
 _CELL = 64  # pixels: holes that are nearer than about two cells are filled together
 _TOUCHING = np.ones((3, 3))
 
@@ -47,6 +47,7 @@ def inpaint_clipped(
     clipped: np.ndarray,
     mask: np.ndarray,
     log_shading: np.ndarray,
+    largest_whole: int = _LARGEST_WHOLE,
 ) -> np.ndarray:
     """Inpaint the diffuse layer of clipped pixels from its surroundings.
 
@@ -57,6 +58,8 @@ def inpaint_clipped(
     clipped, mask : (H, W) ndarray of bool
     log_shading : (H, W, 3) ndarray
         Expected; read inside the mask.
+    largest_whole : int, optional
+        Pixels of the largest box of an object that is searched as a whole.
 
     Returns
     -------
@@ -67,7 +70,7 @@ def inpaint_clipped(
     if not holes.any() or not known.any():
         return diffuse
     filled, dark = diffuse.copy(), _DARK * image[mask].max()
-    for place, own in _windows(mask, holes, known):
+    for place, own in _windows(mask, holes, known, largest_whole):
         shading = np.where(mask[place][..., None], log_shading[place], 0).astype(np.float32)
         given = np.asarray(diffuse[place], np.float32)
         there = _continued(given, known[place], holes[place], shading, dark)
@@ -76,13 +79,13 @@ def inpaint_clipped(
 
 
 def _windows(
-    mask: np.ndarray, holes: np.ndarray, known: np.ndarray
+    mask: np.ndarray, holes: np.ndarray, known: np.ndarray, largest_whole: int
 ) -> Iterator[tuple[Place, np.ndarray]]:
     """Parts of the object to fill holes from, each with those of its holes that belong to it: the
     whole object, or the surroundings of holes that are near each other on a large one.
     """
     box = mask_slices(mask)
-    if holes[box].size <= _LARGE:
+    if holes[box].size <= largest_whole:
         yield box, holes[box]
         return
     of_box = holes[box]

@@ -46,17 +46,39 @@ def test_stripes_go_on_under_a_clipped_highlight() -> None:
 def test_holes_of_a_large_object_are_filled_from_their_surroundings(
     apart: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(clipped_texture, "_LARGE", 100)
     monkeypatch.setattr(clipped_texture, "_CELL", 8)
     diffuse, log_shading, mask = ball(0.4)
     photo, smooth, clipped = lit(diffuse, mask)
     if apart:
         clipped[70, 30:33] = True
         photo[70, 30:33] = 1
-    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading, 100)
     assert error(found, diffuse) < 0.5 * error(smooth, diffuse)
     np.testing.assert_array_equal(found[~clipped], smooth[~clipped])
     assert apart == bool((found[70, 30:33] != smooth[70, 30:33]).any())
+
+
+@pytest.mark.slow
+def test_paint_far_from_a_hole_does_not_matter_on_a_large_object() -> None:
+    side = 560
+    rng = np.random.default_rng(3)
+    mask, clipped = np.ones((side, side), bool), np.zeros((side, side), bool)
+    clipped[100:106, 100:109] = True
+    stripes = np.sin(np.arange(side) / 3) > 0
+    diffuse = np.broadcast_to(0.2 + 0.3 * stripes[:, None, None], (side, side, 3))
+    diffuse = (diffuse + rng.uniform(0, 0.05, diffuse.shape)).astype(np.float32)
+    changed = diffuse.copy()
+    changed[450:, 450:] = rng.uniform(0, 1, (side - 450, side - 450, 3))
+
+    def filled(paint: np.ndarray, **options: int) -> np.ndarray:
+        hole = clipped[..., None]
+        given, photo = np.where(hole, 0, paint), np.where(hole, 1, paint)
+        flat = np.zeros_like(paint)
+        return inpaint_clipped(given, photo, clipped, mask, flat, **options)[clipped]
+
+    near = {"largest_whole": side**2 - 1}
+    np.testing.assert_array_equal(filled(diffuse, **near), filled(changed, **near))
+    assert (filled(diffuse) != filled(changed)).any()
 
 
 def test_plain_paint_is_not_worse_than_the_smooth_fill() -> None:
