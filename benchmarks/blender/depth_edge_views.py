@@ -32,7 +32,7 @@ from training.world.recipes import Shares, draw_recipe
 from training.world.view_batches import batch_of, prepared
 
 CHOSEN_ON, REPORTED = range(3), range(3, 6)
-_FIRST = 5000  # worlds have less than a hundred bodies of a kind
+_FIRST = 5000  # worlds have less than a thousand bodies of a kind
 _PATTERNS, _SEED, _NOISE, _BRIGHT = 60, 5, 0.004, 0.85
 _HALF = views.SIDE / 2
 

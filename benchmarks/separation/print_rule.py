@@ -13,7 +13,7 @@ of `ODDS` costs and gains with either weights; `prints` reports on others. With 
 bodies without print are added to both parts. The shipped weights were fitted with a former network,
 on bodies that it had learned from.
 
-    isc world build -o NEW --built 2000 --families 800 --count 853 --views 1
+    isc world build -o NEW --built 17000 --families 1200 --count 1200 --views 1
 """
 
 import argparse

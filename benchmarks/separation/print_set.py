@@ -49,9 +49,8 @@ from training.world.views import View
 PHOTO_SIDE = 160  # pixels; the body is 140 long
 _MAP_SIDE = 128
 _LEAST_PIXELS = 2500
-# Numbers from which no network has learned from a made body of a kind: the worlds of the networks
-# had 1,200 built bodies of 18 kinds, and 600 of six families at most.
-_FIRST_NEW = {Source.BUILT: 67, Source.FAMILY: 100}
+# Numbers from which no network has learned from a made body of a kind.
+_FIRST_NEW = {Source.BUILT: 450, Source.FAMILY: 100}
 _TRIES = 12  # lights and paints for a body, until a highlight crosses the paint
 # A highlight: specular light, averaged over _SPOT pixels, above _BRIGHT of the mean light, on a
 # share of the body within _EXTENT, of which _ACROSS lies on the paint; three quarters of the body

@@ -260,13 +260,13 @@ def test_white_print_of_the_same_hue_is_no_highlight(white: tuple[float, float, 
 
 
 def airbrushed() -> tuple[np.ndarray, np.ndarray]:
-    """Photo and mask of a matt blue ball with a spot of pale paint whose edge is soft."""
+    """Photo and mask of a matt blue ball with a disc of pale paint whose edge is soft."""
     side = np.linspace(-1.1, 1.1, 96)
     x, y = np.meshgrid(side, -side)
     mask = x**2 + y**2 < 1
     z = np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     shading = 0.15 + 0.85 * np.clip(-0.35 * x + 0.45 * y + 0.82 * z, 0, 1)
-    share = np.exp(-((x + 0.2) ** 2 + (y - 0.2) ** 2) / 0.05)[..., None]
+    share = 1 / (1 + np.exp((np.hypot(x + 0.2, y - 0.2) - 0.35) / 0.04))[..., None]
     paint = (1 - share) * np.array([0.05, 0.08, 0.5]) + share * np.array([0.75, 0.6, 0.5])
     return (paint * (shading * mask)[..., None]).astype(np.float32), mask
 
