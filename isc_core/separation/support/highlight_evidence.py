@@ -22,8 +22,8 @@ of a user decide about the nearest region.
 Citation: logistic regression: D. R. Cox 1958, doi:10.1111/j.2517-6161.1958.tb00292.x. That a
 highlight leaves C unchanged: K.-J. Yoon, Y. Choi, I. S. Kweon 2006, doi:10.1109/ICIP.2006.312650.
 The weights are those of `benchmarks.separation.print_rule --mixed` on rendered objects, half of
-them with print, and of a former scene network; docs/methods/print.md explains why they were kept
-and how the odds were chosen.
+them with print, and of a former scene network; docs/methods/print.md explains why they were kept,
+all but the constant, and how that and the odds were chosen.
 
 Limits: a region that contains both a highlight and print is kept or restored as a whole. Pale print
 of the same chroma as the paint around it looks like light. Coloured light changes C, as paint does.
@@ -50,7 +50,7 @@ _LEAST, _FEWEST = 6, 3  # pixels: of a region that can be classified, of its fla
 _MOST_RATIO = 6.0  # of mean y over mean b
 _SLOPES = (-1.0, 0.5)  # of C against m: above, shading does more than light
 _CLEAR = 0.25  # of a region's flanks: with fewer unclipped pixels the slope is the ring's
-WEIGHTS = (-2.14, 0.706, 2.099, 4.585)
+WEIGHTS = (-2.545, 0.706, 2.099, 4.585)
 
 
 @dataclass(frozen=True)
