@@ -133,24 +133,21 @@ def _fallen(item: Surface, pieces: list[Surface]) -> Surface:
     """The item, lowered until it touches the ground at y = 0 or one of the pieces."""
     low = item.vertices[:, 1].min()
     if pieces:
-        corner = np.concatenate([one.vertices for one in [*pieces, item]])[:, ::2].min(0)
-        cell = np.ptp(np.concatenate([one.vertices for one in [*pieces, item]])[:, ::2], axis=0)
-        cell = cell.max() / _CELLS
-        ground = _extreme(np.maximum, pieces, corner, cell)
-        below = -_extreme(np.maximum, [placed(item, scale=(1, -1, 1))], corner, cell)
+        plane = np.concatenate([one.vertices for one in [*pieces, item]])[:, ::2]
+        corner, cell = plane.min(0), np.ptp(plane, axis=0).max() / _CELLS
+        ground = _highest(pieces, corner, cell)
+        below = -_highest([placed(item, scale=(1, -1, 1))], corner, cell)
         both = np.isfinite(ground) & np.isfinite(below)
         low = min(low, (below - np.maximum(ground, 0))[both].min(initial=np.inf))
     return placed(item, (0, -low - _SUNK, 0))
 
 
-def _extreme(
-    choose: np.ufunc, surfaces: list[Surface], corner: np.ndarray, cell: float
-) -> np.ndarray:
-    """The highest vertex above each cell; minus infinity without any."""
+def _highest(surfaces: list[Surface], corner: np.ndarray, cell: float) -> np.ndarray:
+    """The highest vertex above each cell of the plane; minus infinity without any."""
     found = np.full((_CELLS + 1, _CELLS + 1), -np.inf)
     for one in surfaces:
         column, row = ((one.vertices[:, ::2] - corner) / cell).astype(int).T
-        choose.at(found, (row, column), one.vertices[:, 1])
+        np.maximum.at(found, (row, column), one.vertices[:, 1])
     return found
 
 
