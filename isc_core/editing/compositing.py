@@ -30,7 +30,6 @@ from ..imaging.bounding_box import FramePart, mask_box, mask_slices
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
 from ..photo import Photo
-from ..scene.decomposition import Decomposition
 from ..scene.part_of_result import ResultPart
 from .edited import Edited
 
@@ -62,19 +61,16 @@ class EditedPart:
     place: FramePart
 
 
-def composite(
-    d: Decomposition, edit: Edited, photo: Photo, part: FramePart | None = None
-) -> EditedPart:
+def composite(stored: ResultPart, edit: Edited, photo: Photo) -> EditedPart:
     """Apply an edit to the photo at full size.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     edit : Edited
+        Of this part.
     photo : Photo
         The photo that the result was made of, at full size, with the same mask.
-    part : FramePart, optional
-        The part of the maps' frame that `d` and `edit` are of; by default all of it.
 
     Returns
     -------
@@ -85,15 +81,15 @@ def composite(
     InputError
         If photo, mask and result do not match.
     """
-    part = part or FramePart.whole((d.mask.shape[0], d.mask.shape[1]))
-    scale = scale_of(d, photo, part)
+    d, part = stored.result, stored.part
+    scale = scale_of(stored, photo)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
     place = FramePart.around(photo.mask, 0)
     near = photo.cut(place)
     full = (
         place.cut(part.placed(change))
         if scale == 1 and part.shape == photo.mask.shape
-        else enlarged_change(ResultPart(d, part), change, near, place, scale)
+        else enlarged_change(stored, change, near, place, scale)
     )
     changed = near.mask & (full != 0).any(-1)
     image = near.image.copy()
@@ -101,15 +97,13 @@ def composite(
     return EditedPart(near, image, changed, place)
 
 
-def scale_of(d: Decomposition, photo: Photo, part: FramePart) -> float:
+def scale_of(stored: ResultPart, photo: Photo) -> float:
     """Return the size of the maps over that of the photo.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     photo : Photo
-    part : FramePart
-        The part of the maps' frame that `d` is of.
 
     Returns
     -------
@@ -120,6 +114,7 @@ def scale_of(d: Decomposition, photo: Photo, part: FramePart) -> float:
     InputError
         If the photo or its mask is not that of the result.
     """
+    d, part = stored.result, stored.part
     recorded = d.provenance.input.get("scale")
     size = d.provenance.input.get("size")
     if not isinstance(recorded, int | float) or not 0 < recorded <= 1 or not isinstance(size, list):

@@ -30,6 +30,7 @@ from ..photo.transfer import PROFILE
 from ..result_files.contact_sheet import MapPanel, edit_sheet
 from ..result_files.panels import Panel
 from ..scene.decomposition import Decomposition
+from ..scene.part_of_result import ResultPart
 from .clusters import Clusters
 from .compositing import composite
 from .edited import Edited, light_color
@@ -108,16 +109,17 @@ def require_writable_edit(folder: Path | str, inputs: Iterable[Path | None] = ()
 
 
 def save_edit(
-    d: Decomposition, edit: Edited, folder: Path | str, record: Record, sheet: Sheet, *,
+    stored: ResultPart, edit: Edited, folder: Path | str, record: Record, sheet: Sheet, *,
     original: Original | None = None, clusters: Clusters | None = None,
-    part: FramePart | None = None,
 ) -> None:  # fmt: skip
     """Write the folder of an edit.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
+        The pictures show its frame.
     edit : Edited
+        Of this part.
     folder : Path or str
     record : Record
     sheet : Sheet
@@ -125,17 +127,14 @@ def save_edit(
         The edit is applied to this photo; by default the picture has the size of the maps.
     clusters : Clusters, optional
         Shown in `clusters.png`.
-    part : FramePart, optional
-        The part of the maps' frame that `d` and `edit` are of; by default all of it. The pictures
-        show the frame.
 
     Raises
     ------
     InputError
         If the folder cannot be replaced or written, or the photo is not the result's.
     """
-    part = part or FramePart.whole((d.mask.shape[0], d.mask.shape[1]))
-    picture = _picture(d, edit, part) if original is None else _photo(d, edit, part, original)
+    d = stored.result
+    picture = _picture(stored, edit) if original is None else _photo(stored, edit, original)
     pair = [
         MapPanel(picture.before, picture.mask, "Before"),
         MapPanel(picture.image, picture.mask, "After" if sheet.layers else "In the best light"),
@@ -244,16 +243,17 @@ def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
     return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", maps)
 
 
-def _photo(d: Decomposition, edit: Edited, part: FramePart, original: Original) -> _Picture:
+def _photo(stored: ResultPart, edit: Edited, original: Original) -> _Picture:
     """The photo with the edit."""
-    done, raster = composite(d, edit, original.photo, part), original.raster
+    done, raster = composite(stored, edit, original.photo), original.raster
     transfer = original.photo.original.transfer
     coded = encode_like(raster, transfer, done.image, done.changed, done.place)
     return _Picture(done.image, done.photo.mask, done.photo.image, done.place, coded)
 
 
-def _picture(d: Decomposition, edit: Edited, part: FramePart) -> _Picture:
+def _picture(stored: ResultPart, edit: Edited) -> _Picture:
     """The edited maps, with the mask as alpha."""
+    d, part = stored.result, stored.part
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
     if transfer == PROFILE or given.get("colour_profile") == CAMERA_RAW:

@@ -28,6 +28,21 @@ class ResultPart:
     result: Decomposition
     part: FramePart
 
+    @classmethod
+    def whole(cls, result: Decomposition) -> "ResultPart":
+        """Return a whole result as its own part.
+
+        Parameters
+        ----------
+        result : Decomposition
+
+        Returns
+        -------
+        ResultPart
+        """
+        height, width = result.mask.shape
+        return cls(result, FramePart.whole((height, width)))
+
 
 def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
     """Return a part of a result.

@@ -118,8 +118,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     record = Record(options.action, parameters, done.measured)
     edit = replace(done.edit, notes=tuple(notes))
     save_edit(
-        d, edit, options.output, record, sheet,
-        original=original, clusters=done.clusters, part=stored.part,
+        stored, edit, options.output, record, sheet, original=original, clusters=done.clusters
     )  # fmt: skip
     monitor.report("writing", 1.0)
     return [
