@@ -69,7 +69,7 @@ def corrected(
     usable = usable and not _shows_another(found.mask, hinted.mask, hints)
     base = found if usable or not hints.points else hinted
     for candidate in _candidates(light, base, hinted, hints):
-        share = _agreement(candidate.mask, hints)
+        share = agreement(candidate.mask, hints)
         if share == 1 and candidate.mask.any():
             break
     return replace(candidate, confidence=candidate.confidence * share)
@@ -96,8 +96,20 @@ def _shows_another(mask: np.ndarray, hinted: np.ndarray, hints: Hints) -> bool:
     return not inside and not (ndimage.binary_dilation(hinted, iterations=_RIM) & mask).any()
 
 
-def _agreement(mask: np.ndarray, hints: Hints) -> float:
-    """The share of points with which a mask agrees."""
+def agreement(mask: np.ndarray, hints: Hints) -> float:
+    """Return the share of points with which a mask agrees.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    hints : Hints
+        With at least one point.
+
+    Returns
+    -------
+    float
+        In [0, 1].
+    """
     agrees = [bool(mask[y, x]) for x, y in hints.points]
     agrees += [not mask[y, x] for x, y in hints.background]
     return sum(agrees) / len(agrees)

@@ -32,7 +32,7 @@ from .confidence import (
     features_of_replacement,
     features_without_object,
 )
-from .corrections import corrected, marked_pixels
+from .corrections import agreement, corrected, marked_pixels
 from .crops import Crop, CropPrediction, cut_to_box, predict_crop, with_margin
 from .hints import Hints
 from .refinement import refined
@@ -78,15 +78,19 @@ def find_mask(
 
 
 def _with_points(light: np.ndarray, hints: Hints, network: MaskNetwork) -> FoundMask:
-    """Find the mask without the points, and correct it by them."""
+    """Find the mask without the points, and correct it by them. It stays if it would be used and
+    all points agree: then the network is not run again.
+    """
     small, scaled = _at_working_size(light, hints)
     found = _both_passes(small, Hints(box=scaled.box), network)
     if scaled.box is None:
         usable = not refusal_reason(found)
     else:
         usable = _fills_box(found.mask, scaled.box)
-    hinted = _both_passes(small, scaled, network) if hints.points else found
-    return _upsampled(corrected(small, found, hinted, scaled, usable=usable), light.shape)
+    if not usable or agreement(found.mask, scaled) < 1:
+        hinted = _both_passes(small, scaled, network) if hints.points else found
+        found = corrected(small, found, hinted, scaled, usable=usable)
+    return _upsampled(found, light.shape)
 
 
 def _both_passes(small: np.ndarray, hints: Hints, network: MaskNetwork) -> FoundMask:

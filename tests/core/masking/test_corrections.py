@@ -6,6 +6,7 @@ import pytest
 from isc_core.masking.corrections import corrected
 from isc_core.masking.hints import Hints
 from isc_core.masking.search import find_mask
+from isc_core.networks.mask_network import MaskNetwork
 from isc_core.photo.found_mask import FoundMask
 from tests.core.masking.ball_photos import ONE, TWO, balls, overlap
 
@@ -71,11 +72,27 @@ def test_the_confidence_falls_with_the_points_that_cannot_be_met() -> None:
     assert after.confidence < mask.confidence
 
 
-def test_a_point_in_the_middle_of_a_found_object_keeps_its_mask() -> None:
+def test_a_point_in_the_middle_of_a_found_object_keeps_its_mask(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """And the network is not run again; it is for a point that contradicts the mask."""
+    calls, run = [], MaskNetwork.__call__
+
+    def counted(network: MaskNetwork, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        calls.append(channels.shape)
+        return run(network, channels)
+
+    monkeypatch.setattr(MaskNetwork, "__call__", counted)
     light, _ = balls(ONE)
     before = find_mask(light)
-    after = find_mask(light, Hints(points=((100, 75),)))
-    assert (after.cover == before.cover).all()
+    once = len(calls)
+    for hints in (Hints(points=((100, 75),)), Hints(((100, 75),), ((5, 5),))):
+        calls.clear()
+        after = find_mask(light, hints)
+        assert (after.cover == before.cover).all() and after.confidence == before.confidence
+        assert len(calls) == once
+    find_mask(light, Hints(points=((5, 5),)))
+    assert len(calls) > 2 * once
 
 
 def test_a_point_on_the_background_removes_the_other_object() -> None:
