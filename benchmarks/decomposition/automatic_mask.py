@@ -25,6 +25,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.masking.refusal import refusal_reason
@@ -152,17 +153,13 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
 
 
 def _with_interval(values: np.ndarray, quantile: float) -> str:
-    rng = np.random.default_rng(0)
-    again = values[rng.integers(len(values), size=(2000, len(values)))]
-    low, high = np.quantile(np.quantile(again, quantile, axis=1), (0.025, 0.975))
+    low, high = interval(np.quantile(bootstrap_samples(values), quantile, axis=1))
     return f"{np.quantile(values, quantile):.3f} ({low:.2f}-{high:.2f})"
 
 
 def _share(chosen: np.ndarray | list[bool]) -> str:
     values = np.asarray(chosen, float)
-    rng = np.random.default_rng(0)
-    means = values[rng.integers(len(values), size=(2000, len(values)))].mean(axis=1)
-    low, high = np.quantile(means, (0.025, 0.975))
+    low, high = interval(bootstrap_samples(values).mean(axis=1))
     return f"{values.mean():.1%} ({low:.0%}-{high:.0%})"
 
 

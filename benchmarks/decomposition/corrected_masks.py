@@ -25,6 +25,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.refusal import refusal_reason
@@ -180,9 +181,7 @@ def report(found: list[Corrections]) -> str:
 
 def _mean(values: np.ndarray) -> str:
     """The mean with its interval."""
-    rng = np.random.default_rng(0)
-    again = values[rng.integers(len(values), size=(2000, len(values)))].mean(axis=1)
-    low, high = np.quantile(again, (0.025, 0.975))
+    low, high = interval(bootstrap_samples(values).mean(axis=1))
     return f"{values.mean():.3f} ({low:.2f}-{high:.2f})"
 
 

@@ -24,6 +24,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.masking.hints import Hints, Point
@@ -194,10 +195,9 @@ def report(found: list[MaskScore]) -> str:
 
 def _right(overlap: np.ndarray) -> str:
     """The share of right masks with its interval."""
-    rng = np.random.default_rng(0)
-    again = (overlap[rng.integers(len(overlap), size=(2000, len(overlap)))] >= _RIGHT).mean(axis=1)
-    low, high = np.quantile(again, (0.025, 0.975))
-    return f"{(overlap >= _RIGHT).mean():.1%} ({100 * low:.0f}-{100 * high:.0f})"
+    right = overlap >= _RIGHT
+    low, high = interval(bootstrap_samples(right).mean(axis=1))
+    return f"{right.mean():.1%} ({100 * low:.0f}-{100 * high:.0f})"
 
 
 def main() -> None:

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decomposition.pipeline import assemble
 from isc_core.scene.decomposition import Decomposition, Provenance
@@ -145,9 +146,8 @@ def report(title: str, found: list[dict[str, list[float]]]) -> list[str]:
         errors = errors[np.isfinite(errors).all(axis=1)]
         if not len(errors):
             continue
-        rng = np.random.default_rng(0)
-        again = errors[rng.integers(len(errors), size=(4000, len(errors)))].mean(axis=1)
-        low, high = np.quantile(again / again[:, :1], (0.025, 0.975), axis=0)
+        again = bootstrap_samples(errors, count=4000).mean(axis=1)
+        low, high = interval(again / again[:, :1])
         mean = errors.mean(axis=0)
         cells = [f"{mean[0]:.3g}"] + [
             f"{mean[k]:.3g} ({mean[k] / mean[0]:.2f}, {low[k]:.2f}-{high[k]:.2f})"

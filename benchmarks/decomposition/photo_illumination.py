@@ -33,6 +33,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.channels import saturation
@@ -240,10 +241,8 @@ def report(ways: list[str], errors: np.ndarray) -> str:
     str
         A Markdown table.
     """
-    rng = np.random.default_rng(0)
-    again = rng.integers(len(errors), size=(2000, len(errors)))
-    middles = np.median(errors[again], axis=1)
-    low, high = np.quantile(middles / middles[:, :1], (0.025, 0.975), axis=0)
+    middles = np.median(bootstrap_samples(errors), axis=1)
+    low, high = interval(middles / middles[:, :1])
     plain = np.median(errors, axis=0)
     means = np.exp(np.log(errors / errors[:, :1]).mean(axis=0))
     lines = ["| way | " + " | ".join(METRICS) + " |", "|---" * (len(METRICS) + 1) + "|"]

@@ -22,6 +22,7 @@ import numpy as np
 import torch
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
@@ -134,8 +135,7 @@ def report(title: str, errors: np.ndarray) -> None:
     for name, row in zip(_METHODS, errors.mean(axis=0), strict=True):
         print(f"| {name} | {row[0]:.4f} | {row[1]:.4f} |")
     change = errors[:, 2, 0] - errors[:, 1, 0]
-    drawn = np.random.default_rng(0).integers(0, len(change), (4000, len(change)))
-    low, high = np.percentile(change[drawn].mean(axis=1), (2.5, 97.5))
+    low, high = interval(bootstrap_samples(change, count=4000).mean(axis=1))
     print(
         f"\nLimits change the error of the outer pixels by {change.mean():+.4f} "
         f"({low:+.4f} to {high:+.4f}), and lower it on {(change < 0).mean():.0%} of the photos."

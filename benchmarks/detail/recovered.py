@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 
 import isc_core
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.layers import normals_and_shading
 from isc_core.decomposition.models import solve
 from isc_core.decomposition.settings import Settings
@@ -40,7 +41,6 @@ from .rendering import SetKind
 from .sets import PHOTO, Truth, read_truth
 from .settings import settings_of
 
-_RESAMPLED = 2000
 Estimator = Callable[[Path, Truth], np.ndarray]
 
 
@@ -162,15 +162,15 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
     for kind in (SetKind.RELIEF, SetKind.MIXED, SetKind.PARTS):
         if bodies := of_kind[kind]:
             explained = np.array([row["explained"] for row in bodies])
-            again = explained[rng.integers(len(bodies), size=(_RESAMPLED, len(bodies)))].mean(1)
+            again = bootstrap_samples(explained, rng).mean(1)
             lines.append(_line(f"{kind}: explained", bodies, explained.mean(0), again))
     relief = of_kind[SetKind.RELIEF]
     for kind in (SetKind.PRINT, SetKind.DRAWN):
         if relief and (bodies := of_kind[kind]):
             energy = np.array([row["energy"] for row in relief])
             error = np.array([row["error"] for row in bodies])
-            above = error[rng.integers(len(bodies), size=(_RESAMPLED, len(bodies)))].mean(1)
-            below = energy[rng.integers(len(relief), size=(_RESAMPLED, len(relief)))].mean(1)
+            above = bootstrap_samples(error, rng).mean(1)
+            below = bootstrap_samples(energy, rng).mean(1)
             figures = error.mean(0) / energy.mean(0)
             lines.append(_line(f"{kind}: invented", bodies, figures, above / below))
     return "\n".join(lines)
@@ -179,7 +179,7 @@ def table(rows: Sequence[Mapping[str, Any]]) -> str:
 def _line(
     title: str, rows: Sequence[Mapping[str, Any]], figures: np.ndarray, again: np.ndarray
 ) -> str:
-    low, high = np.quantile(again, (0.025, 0.975), axis=0)
+    low, high = interval(again)
     cells = [f"{f:.3f} ({a:.3f} to {b:.3f})" for f, a, b in zip(figures, low, high, strict=True)]
     base, seconds = (float(np.median([row[name] for row in rows])) for name in ("base", "seconds"))
     return f"| {title} | {len(rows)} | {' | '.join(cells)} | {base:.2f} | {seconds:.1f} |"

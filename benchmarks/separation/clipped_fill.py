@@ -26,6 +26,7 @@ from zlib import crc32
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_layers
 from isc_core.separation.support.clipped_texture import inpaint_clipped
@@ -39,7 +40,6 @@ _SPREAD = 2  # pixels around clipped ones that mix with them
 _RADIUS, _RIM = (2.5, 60.0), 20  # of made holes; of their centres from the outline; pixels
 _DARK = 1e-3  # of the brightest value: the least in logarithms
 _LEAST = 1e-6  # an error that is as good as none
-_RESAMPLED = 2000
 _WHOLE, _NEAR = 1 << 40, 0  # largest box that is searched as a whole, pixels
 
 
@@ -178,14 +178,10 @@ def table(errors: list[FillErrors]) -> str:
         whole, near = (np.array([getattr(one, name) for one in rows]) for name in ("whole", "near"))
         change = np.log((near + _LEAST) / (whole + _LEAST))
         bodies = np.unique([one.body for one in rows], return_inverse=True)[1]
-        groups = [np.flatnonzero(bodies == k) for k in range(int(bodies.max()) + 1)]
-        rng = np.random.default_rng(0)
-        drawn = [
-            np.concatenate([groups[k] for k in rng.integers(len(groups), size=len(groups))])
-            for _ in range(_RESAMPLED)
-        ]
-        first = np.exp(np.quantile([change[at].mean() for at in drawn], (0.025, 0.975)))
-        second = np.quantile([near[at].mean() / whole[at].mean() for at in drawn], (0.025, 0.975))
+        columns = (np.ones(len(rows)), change, near, whole)
+        sums = np.stack([np.bincount(bodies, column) for column in columns], -1)
+        number, changed, error, before = bootstrap_samples(sums).sum(axis=1).T
+        first, second = np.exp(interval(changed / number)), interval(error / before)
         seconds = sum(one.near_seconds for one in rows) / sum(one.whole_seconds for one in rows)
         lines.append(
             f"| {kind or 'all'} | {len(rows)} "

@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.joint import detect_residual_highlights
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import predict_scene
@@ -35,7 +36,7 @@ from .print_set import Part, PrintScene, print_scenes
 
 ODDS = (1.5, 2.0, 3.0, 4.0, 6.0)
 _RIDGE = 0.01
-_FOLDS, _RESAMPLED = 5, 2000
+_FOLDS = 5
 
 
 @dataclass(frozen=True)
@@ -173,9 +174,8 @@ def loss_line(losses: np.ndarray) -> str:
     -------
     str
     """
-    apart, rng = losses[:, 0] - losses[:, 1], np.random.default_rng(0)
-    again = apart[rng.integers(len(apart), size=(_RESAMPLED, len(apart)))].sum(axis=1)
-    low, high = np.quantile(again, (0.025, 0.975))
+    apart = losses[:, 0] - losses[:, 1]
+    low, high = interval(bootstrap_samples(apart).sum(axis=1))
     new, shipped = losses.sum(axis=0)
     return (
         f"log loss on other bodies: fitted {new:.4f}, shipped {shipped:.4f}; "

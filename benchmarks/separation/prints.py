@@ -27,6 +27,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.joint import JointOptions, SupportedLayers, supported_layers
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
@@ -39,7 +40,6 @@ from isc_core.separation import COLOUR_ALONE, separate
 from .print_set import Part, PrintScene, print_scenes
 
 METHODS = ("isc", "network", "joint")
-_RESAMPLED = 2000
 _COLUMNS = 10
 _SHEET_SIDE, _PHOTO_COLUMNS = 200, 7
 
@@ -156,8 +156,7 @@ def table(matt: dict[str, np.ndarray], glossy: dict[str, np.ndarray]) -> str:
     rng = np.random.default_rng(0)
     for method, errors in glossy.items():
         share, rms = matt[method].T
-        again = errors[rng.integers(len(errors), size=(_RESAMPLED, len(errors)))].mean(axis=1)
-        low, high = np.quantile(again, (0.025, 0.975))
+        low, high = interval(bootstrap_samples(errors, rng).mean(axis=1))
         lines.append(
             f"| {method} | {share.mean():.2%} | {share.max():.1%} | {(share > 0.01).sum()} "
             f"| {rms.max():.1%} | {errors.mean():.3f} ({low:.2f}-{high:.2f}) "

@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.decomposition.models import DecompositionTask, Settings, SolveOptions, solve
 from isc_core.errors import InputError
 from isc_core.networks.scene_network import ScenePrediction, predict_scene
@@ -120,9 +121,7 @@ def report(found: np.ndarray) -> str:
         A Markdown table.
     """
     ratio = np.log(found[:, 0] / found[:, 1])
-    rng = np.random.default_rng(0)
-    again = ratio[rng.integers(len(ratio), size=(2000, len(ratio)))].mean(axis=1)
-    low, high = np.exp(np.quantile(again, (0.025, 0.975), axis=0))
+    low, high = np.exp(interval(bootstrap_samples(ratio).mean(axis=1)))
     names = (*METRICS, "evaluations")
     cells = [
         f"{middle:.3f} ({a:.2f}-{b:.2f})"
