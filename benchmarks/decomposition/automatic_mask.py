@@ -28,6 +28,7 @@ from scipy import ndimage
 from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
@@ -95,9 +96,7 @@ def score_mask(photo: HeldOut, network: MaskNetwork | None) -> MaskScore:
     start = time.perf_counter()
     found = find_mask(photo.light, network=network)
     seconds = time.perf_counter() - start
-    truth = photo.cover >= 0.5
-    union = int((found.mask | truth).sum())
-    return MaskScore(photo, found, float((found.mask & truth).sum()) / max(union, 1), seconds)
+    return MaskScore(photo, found, mask_overlap(found.mask, photo.cover >= 0.5), seconds)
 
 
 def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:

@@ -27,6 +27,7 @@ from scipy import ndimage
 
 from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
+from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
@@ -103,7 +104,7 @@ def correct(light: np.ndarray, truth: np.ndarray, most: int) -> list[float]:
     """
     found, hints = find_mask(light), Hints()
     mask = np.zeros_like(truth) if refusal_reason(found) else found.mask
-    overlaps = [_overlap(mask, truth)]
+    overlaps = [mask_overlap(mask, truth)]
     while len(overlaps) <= most:
         wrong = most_wrong_point(mask, truth)
         if wrong is None or wrong[0] in (*hints.points, *hints.background):
@@ -115,12 +116,8 @@ def correct(light: np.ndarray, truth: np.ndarray, most: int) -> list[float]:
         else:
             hints = Hints(hints.points, (*hints.background, point))
         mask = find_mask(light, hints).mask
-        overlaps.append(_overlap(mask, truth))
+        overlaps.append(mask_overlap(mask, truth))
     return overlaps
-
-
-def _overlap(mask: np.ndarray, truth: np.ndarray) -> float:
-    return float((mask & truth).sum() / max(int((mask | truth).sum()), 1))
 
 
 def composites(

@@ -27,6 +27,7 @@ from scipy import ndimage
 from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
+from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import MaskNetwork
@@ -153,7 +154,7 @@ def _score(
         found = find_mask(light, hints, network)
     except InputError:
         return 0.0, 0.0
-    return float((found.mask & truth).sum() / (found.mask | truth).sum()), found.confidence
+    return mask_overlap(found.mask, truth), found.confidence
 
 
 def report(found: list[MaskScore]) -> str:

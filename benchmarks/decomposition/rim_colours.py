@@ -24,6 +24,7 @@ from scipy import ndimage
 
 from benchmarks.bootstrap import bootstrap_samples, interval
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.refusal import refusal_reason
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count
@@ -157,8 +158,7 @@ def main() -> None:
     of_found, of_true = [], []
     for sample in samples(ingredients, given.count, given.seed, given.side):
         found, true = find_mask(sample[0]), sample[2] >= 0.5
-        overlap = (found.mask & true).sum() / max((found.mask | true).sum(), 1)
-        if overlap >= _RIGHT and not refusal_reason(found):
+        if mask_overlap(found.mask, true) >= _RIGHT and not refusal_reason(found):
             of_found.append(rim_errors(sample, found.cover))
             of_true.append(rim_errors(sample, sample[2]))
     report("found mask", np.array(of_found))

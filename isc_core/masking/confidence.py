@@ -52,7 +52,7 @@ def confidence_features(
     probabilities = [
         float(first.counts[counts].sum()),
         float(second.counts[counts].sum()),
-        _overlap(before, second.cover),
+        mask_overlap(before, second.cover),
         _decisiveness(first.cover),
         _decisiveness(second.cover),
     ]
@@ -76,7 +76,7 @@ def features_of_replacement(
     (FEATURES,) ndarray
         The overlap is that of both masks if it is less than that of the passes.
     """
-    overlap = _features(np.array([_overlap(predicted, replacement)]))[1]
+    overlap = _features(np.array([mask_overlap(predicted, replacement)]))[1]
     changed = features.copy()
     changed[_OVERLAP] = min(changed[_OVERLAP], overlap)
     return changed
@@ -114,8 +114,18 @@ def confidence_of(features: np.ndarray, weights: np.ndarray) -> float:
     return 1 / (1 + math.exp(-float((weights * features).sum())))
 
 
-def _overlap(one: np.ndarray, other: np.ndarray) -> float:
-    """Intersection over union of two coverages."""
+def mask_overlap(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the intersection over union of two masks or coverages.
+
+    Parameters
+    ----------
+    one, other : (H, W) bool or float32 ndarray
+
+    Returns
+    -------
+    float
+        In [0, 1]; 0 if both are empty.
+    """
     intersection, union = (
         float(join(one, other).sum(dtype=float)) for join in (np.minimum, np.maximum)
     )

@@ -23,6 +23,7 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.npy import read_arrays
 from isc_core.masking.components import shows_several
+from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.numerics.logistic import logistic_weights
@@ -68,8 +69,7 @@ def observed(
     rows, correct, single = [], [], []
     for photo in photos:
         found = find_mask(photo.light, network=network)
-        truth = photo.cover >= 0.5
-        overlap = (found.mask & truth).sum() / max((found.mask | truth).sum(), 1)
+        overlap = mask_overlap(found.mask, photo.cover >= 0.5)
         rows.append(found.features)
         single.append(bool(found.mask.any()) and not shows_several(found.mask))
         alone = photo.count == Count.ONE or single[-1]

@@ -5,7 +5,7 @@ them.
 """
 
 import argparse
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import chain, count
@@ -19,13 +19,12 @@ from isc_core.io.npy import read_arrays
 from ..loop import Net, RunOptions, Schedule, fit
 from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
-from ..world.lit_pictures import LitPictures
 from ..world.pack import PackedWorld, read_pack
 from ..world.patterns import Atlas
 from ..world.pictures import Bank, bank_of
 from ..world.procedural_environments import procedural_room, procedural_sky, studio
 from ..world.recipes import Shares
-from ..world.samples import OUTPUT, Draw, PhotoRenderer, Sample, draw_batch
+from ..world.samples import OUTPUT, Alteration, Draw, PhotoRenderer, Sample, draw_batch
 from ..world.view_batches import PreparedView, ViewStore, prepared
 
 _PROCEDURAL = 60  # environments of each of three kinds
@@ -105,7 +104,7 @@ class SceneBatches:
         On the CPU.
     side : int
         Of the photos, pixels.
-    alter : callable, optional
+    alter : Alteration, optional
         See `PhotoRenderer`.
     device : str
         Where photos are made.
@@ -116,7 +115,7 @@ class SceneBatches:
         draw: SceneDraws,
         bank: Bank,
         side: int = OUTPUT,
-        alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+        alter: Alteration | None = None,
         device: str = "cpu",
     ) -> None:
         self._draw, self._device = draw, device
@@ -285,7 +284,7 @@ def fit_to_photos(
     side: int,
     schedule: Schedule,
     options: RunOptions,
-    alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+    alter: Alteration | None = None,
 ) -> None:
     """Fit a network to photos that are rendered during training.
 
@@ -301,7 +300,7 @@ def fit_to_photos(
         Of the photos, pixels.
     schedule : Schedule
     options : RunOptions
-    alter : callable, optional
+    alter : Alteration, optional
         See `PhotoRenderer`.
     """
     if options.device != "cpu":

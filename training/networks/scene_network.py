@@ -99,7 +99,7 @@ def main() -> None:
         draw, views=world.views[Split.UNSEEN_BODY], environments=world.held_out_environments
     )
     glossy = "gloss" not in arguments.without
-    alter = with_small_highlights if glossy else lambda pictures: pictures
+    alter = with_small_highlights if glossy else None
     fit_to_photos(network, draw, held_out, world.bank, arguments.side, schedule, options, alter)
 
 

@@ -38,6 +38,9 @@ _LEAST = 1e-4
 _MOST_RATIO = 5.0  # of log ratios
 _SPARSE = 2  # pixels: every second row and column says how large an object is
 
+Alteration = Callable[[LitPictures], LitPictures]
+"""A change of pictures before they are photographed; it returns new ones."""
+
 
 @dataclass(frozen=True)
 class Placement:
@@ -272,8 +275,8 @@ class PhotoRenderer:
         Pictures that are kept; at least as many as one batch lights.
     side : int
         Of the photos, pixels; a multiple of 32.
-    alter : callable, optional
-        Changes pictures of the pool before they are photographed; it returns new ones.
+    alter : Alteration, optional
+        Of the pictures of the pool.
     """
 
     def __init__(
@@ -281,7 +284,7 @@ class PhotoRenderer:
         bank: Bank,
         pool: int,
         side: int = OUTPUT,
-        alter: Callable[[LitPictures], LitPictures] = lambda pictures: pictures,
+        alter: Alteration | None = None,
     ) -> None:
         self._bank, self._side, self._alter = bank, side, alter
         self._pool = Pool[LitPictures](pool)
@@ -302,7 +305,9 @@ class PhotoRenderer:
         if len(draw.chosen):
             fresh = views.batch(draw.chosen)
             self._pool.exchange(make_pictures(fresh, draw.recipes, self._bank))
-        pictures = self._alter(self._pool.picked(draw.shares))
+        pictures = self._pool.picked(draw.shares)
+        if self._alter is not None:
+            pictures = self._alter(pictures)
         return photograph(pictures, draw.cameras, draw.placements, self._side)
 
 
