@@ -1,4 +1,4 @@
-"""Separation of a photo into diffuse and specular light: one method per file, looked up by name.
+"""Separation of a photo into diffuse and specular light: one module per method, looked up by name.
 
 A method's module is imported when the method is first used, so that a program starts fast and
 without the dependencies of other methods. Each module has `separate`, a dataclass of options, and
