@@ -1,55 +1,28 @@
 """Atomic writes: a folder or a file appears completely or not at all.
 
 The content is written next to its final path under a temporary name, flushed to disk, and renamed
-once it is complete, so that the final path never has an incomplete result. Previous content is
-replaced only then, atomically where the system supports it (Linux), and a folder only if it
-contains only files that this program writes: foreign files are never deleted.
+once it is complete, so that the final path never has an incomplete result (`temporary_siblings`,
+`durable_replacement`). Previous content is replaced only then, atomically where the system supports
+it (Linux), and a folder only if it contains only files that this program writes: foreign files are
+never deleted.
 
-A writing process holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
-that writes the same name removes siblings without a lock, which belong to killed processes. The
-lock is on the sibling itself, not on a separate lock file, so that it moves with the rename;
-therefore `flock` is used and not the library `filelock`.
-
-Limits: without such locks (Windows, some network disks) and for other machines, siblings of killed
-processes remain; delete them by hand, or by `remove_unfinished` where no other process is writing.
-Entries to be removed are first renamed to `.NAME.xxxxxxxx.gone`. Without atomic exchange, a process
-killed between two renames leaves the old content as `.NAME.xxxxxxxx.old`, which the next process
-restores.
+Limits: without locks (Windows, some network disks) and for other machines, temporary siblings of
+killed processes remain; delete them by hand, or by `remove_unfinished` where no other process is
+writing.
 """
 
 import contextlib
-import ctypes
 import errno
-import hashlib
 import os
-import platform
-import re
-import secrets
-import shutil
 from collections.abc import Iterable, Iterator, Sequence, Set
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
+from .durable_replacement import flush, flush_names, put_in_place
+from .temporary_siblings import label_of, lock, origin_of, temporary_sibling, tidy
 
-try:
-    import fcntl
-except ImportError:  # Windows
-    fcntl = None  # type: ignore[assignment]
-
-_FILE_MANAGER_FILES = (
-    ".DS_Store",
-    "Thumbs.db",
-    "desktop.ini",
-)  # created by file managers
-_TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old|gone)", re.DOTALL)
-_MAX_SIBLINGS = 0x10000
-_MAX_NAME_BYTES = (
-    230  # bytes of a name, of the usual 255, with room for the suffix of a temporary sibling
-)
-_FLUSH_THREADS = 8
-_AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fs.h
+_FILE_MANAGER_FILES = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 _REASONS = {
     errno.ENOSPC: "no space is left on the disk; free some space or choose another place",
@@ -94,13 +67,13 @@ def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
     with (
         _explained(target),
         _made_parents(target),
-        _temporary_sibling(target, is_folder=True) as partial,
+        temporary_sibling(target, is_folder=True) as partial,
     ):
         yield partial
         require_replaceable(target, ours)
-        _flush(partial)
-        _put_in_place(partial, target)
-        _flush_names(target.parent)
+        flush(partial)
+        put_in_place(partial, target)
+        flush_names(target.parent)
 
 
 @contextmanager
@@ -128,12 +101,12 @@ def new_file(path: Path | str) -> Iterator[Path]:
     with (
         _explained(target),
         _made_parents(target),
-        _temporary_sibling(target, is_folder=False) as partial,
+        temporary_sibling(target, is_folder=False) as partial,
     ):
         yield partial
-        _flush(partial)
+        flush(partial)
         os.replace(partial, target)
-        _flush_names(target.parent)
+        flush_names(target.parent)
 
 
 def require_writable(
@@ -199,7 +172,7 @@ def unfinished(path: Path | str) -> frozenset[Path]:
     target = _resolved(path)
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         return frozenset(
-            entry for entry in target.parent.iterdir() if _origin(entry) == _label(target)
+            entry for entry in target.parent.iterdir() if origin_of(entry) == label_of(target)
         )
     return frozenset()
 
@@ -217,8 +190,8 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
     """
     target = _resolved(path)
     for leftover in sorted(unfinished(target) - spared):
-        with contextlib.suppress(OSError), _lock(leftover, wait=False):
-            _tidy(leftover, target)
+        with contextlib.suppress(OSError), lock(leftover, wait=False):
+            tidy(leftover, target)
 
 
 def remove_unfinished_in(folder: Path, spared: Set[Path] = frozenset()) -> None:
@@ -233,7 +206,7 @@ def remove_unfinished_in(folder: Path, spared: Set[Path] = frozenset()) -> None:
     """
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for name in {
-            origin for entry in folder.iterdir() if (origin := _origin(entry)) is not None
+            origin for entry in folder.iterdir() if (origin := origin_of(entry)) is not None
         }:
             remove_unfinished(folder / name, spared)
 
@@ -263,7 +236,7 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
         entries = sorted(
             entry
             for entry in folder.rglob("*")
-            if entry.name not in _FILE_MANAGER_FILES and _origin(entry) not in reserved
+            if entry.name not in _FILE_MANAGER_FILES and origin_of(entry) not in reserved
         )
         found = [
             entry.relative_to(folder).as_posix()
@@ -295,7 +268,7 @@ def _try_writing(target: Path) -> None:
     """
     with _explained(target):
         parent = next(folder for folder in target.parents if folder.exists())
-        with _temporary_sibling(parent / target.name, is_folder=True):
+        with temporary_sibling(parent / target.name, is_folder=True):
             pass
 
 
@@ -308,226 +281,6 @@ def _resolved(path: Path | str, use: str = "written") -> Path:
         ValueError,
     ) as error:  # a loop of links, an unknown user, a null byte
         raise InputError(f"{str(path)!r} is not a path that can be {use}: {error}") from error
-
-
-# --- temporary siblings ---------------------------------------------------------------------------
-
-
-def _label(target: Path) -> str:
-    """The target's part of a sibling's name; a digest for names that are too long."""
-    coded = os.fsencode(target.name)
-    return target.name if len(coded) <= _MAX_NAME_BYTES else hashlib.sha256(coded).hexdigest()
-
-
-def _origin(entry: Path) -> str | None:
-    """The label of the target of which `entry` is a temporary sibling, if it is one."""
-    found = _TEMPORARY.fullmatch(entry.name)
-    return None if found is None else found[1]
-
-
-def _sibling(target: Path, number: int, suffix: str) -> Path:
-    """The temporary sibling with a number. The name depends on the machine, because locks of other
-    machines may not be visible.
-    """
-    machine = hashlib.sha256(platform.node().encode()).hexdigest()[:4]
-    return target.with_name(f".{_label(target)}.{machine}{number:04x}.{suffix}")
-
-
-@contextmanager
-def _temporary_sibling(target: Path, *, is_folder: bool) -> Iterator[Path]:
-    """A new temporary sibling of `target`, locked during the block and removed at its end if it
-    still exists.
-    """
-    with contextlib.ExitStack() as stack:
-        for number in range(_MAX_SIBLINGS):
-            partial = _sibling(target, number, "partial")
-            for leftover in (_sibling(target, number, "old"), partial):
-                _sweep(leftover, target)
-            try:
-                partial.mkdir() if is_folder else partial.touch(exist_ok=False)
-                stack.enter_context(_lock(partial, wait=True))
-            except (
-                FileExistsError,
-                _Gone,
-            ):  # another process uses that name, or removed this sibling as a leftover
-                continue
-            stack.callback(_remove_same, partial, partial.stat())
-            yield partial
-            return
-    raise OSError(
-        errno.EBUSY, "too many processes write there; wait for them, or choose another place"
-    )
-
-
-def _sweep(leftover: Path, target: Path) -> None:
-    """Clean up if `leftover` belongs to a killed process that wrote `target`."""
-    with (
-        contextlib.suppress(OSError),
-        _lock(leftover, wait=False) as locked,
-    ):  # it does not exist, or is in use
-        if locked:
-            _tidy(leftover, target)
-
-
-def _tidy(leftover: Path, target: Path) -> None:
-    if leftover.suffix == ".old" and not target.exists():
-        os.replace(leftover, target)
-    else:
-        # Renamed first: without locks its writer may still run, and rename the half-removed folder
-        # to the final name.
-        gone = target.with_name(f".{_label(target)}.{secrets.token_hex(4)}.gone")
-        os.replace(leftover, gone)
-        _remove(gone)
-
-
-def _remove(entry: Path) -> None:
-    if entry.is_dir():
-        shutil.rmtree(entry, ignore_errors=True)
-    else:
-        with contextlib.suppress(OSError):
-            entry.unlink(missing_ok=True)
-
-
-def _remove_same(entry: Path, made: os.stat_result) -> None:
-    """Remove `entry` unless it was renamed: another process may use its name by now."""
-    with contextlib.suppress(OSError):
-        if os.path.samestat(made, entry.stat()):
-            _remove(entry)
-
-
-class _Gone(OSError):
-    """The file or folder to lock no longer exists."""
-
-
-@contextmanager
-def _lock(entry: Path, *, wait: bool) -> Iterator[bool]:
-    """Lock a file or folder during the block, or until the process ends. Yields False without
-    support for locks.
-
-    Raises `OSError` if another process has the lock and `wait` is false, or if the entry no longer
-    exists when locked.
-    """
-    if fcntl is None:
-        yield False
-        return
-    try:
-        descriptor = os.open(entry, os.O_RDONLY)
-    except FileNotFoundError as error:
-        raise _Gone(errno.ENOENT, "it is gone") from error
-    try:
-        locked = _acquired(descriptor, wait)
-        if not _is_named(descriptor, entry):
-            raise _Gone(errno.ENOENT, "it is gone")
-        yield locked
-    finally:
-        os.close(descriptor)
-
-
-def _is_named(descriptor: int, entry: Path) -> bool:
-    """Whether an open file or folder still has that name, by a single lookup, since it may be
-    renamed between two.
-    """
-    with contextlib.suppress(FileNotFoundError):
-        return os.path.samestat(os.fstat(descriptor), entry.stat())
-    return False
-
-
-def _acquired(descriptor: int, wait: bool) -> bool:
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        raise
-    except OSError:  # the file system does not support locks
-        return False
-    return True
-
-
-# --- flushing and renaming ------------------------------------------------------------------------
-
-
-def _flush(content: Path) -> None:
-    """Flush a file, or a folder with its content, to the disk; a full disk may be reported only
-    then.
-    """
-    folders = (
-        [content, *(entry for entry in content.rglob("*") if entry.is_dir())]
-        if content.is_dir()
-        else []
-    )
-    files = [entry for entry in content.rglob("*") if entry.is_file()] if folders else [content]
-    with ThreadPoolExecutor(_FLUSH_THREADS) as pool:  # file systems combine pending writes
-        list(pool.map(_flush_file, files))
-    for folder in folders:
-        _flush_names(folder)
-
-
-def _flush_file(file: Path) -> None:
-    descriptor = os.open(file, os.O_RDWR)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
-def _flush_names(folder: Path) -> None:
-    """Flush the entries of a folder to the disk, where the system supports it."""
-    with contextlib.suppress(OSError):
-        descriptor = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
-def _put_in_place(partial: Path, target: Path) -> None:
-    """Rename the folder `partial` to `target`, and remove the previous one."""
-    while True:
-        try:
-            os.replace(partial, target)  # works if it does not exist or is an empty folder
-            return
-        except OSError as error:
-            if (
-                error.errno not in (errno.ENOTEMPTY, errno.EEXIST) and not target.is_dir()
-            ) or not partial.exists():
-                raise
-        with (
-            contextlib.suppress(_Gone),
-            _lock(target, wait=True),
-        ):  # gone: another process has just replaced it
-            if _exchanged(partial, target):
-                _remove(partial)
-            else:
-                _replace_in_two_steps(partial, target)
-            return
-
-
-def _exchanged(one: Path, other: Path) -> bool:
-    """Exchange the names of two folders atomically; False if this is not supported."""
-    try:
-        rename = ctypes.CDLL(None, use_errno=True).renameat2
-    except (AttributeError, OSError, TypeError):
-        return False
-    done = rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0
-    if not done and ctypes.get_errno() == errno.ENOENT:
-        raise _Gone(errno.ENOENT, "another process has removed it")
-    return done
-
-
-def _replace_in_two_steps(partial: Path, target: Path) -> None:
-    """Move the previous folder aside first; restore it if the second step fails."""
-    old = next(
-        name
-        for number in range(_MAX_SIBLINGS)
-        if not (name := _sibling(target, number, "old")).exists()
-    )
-    os.replace(target, old)
-    try:
-        os.replace(partial, target)
-    finally:
-        if target.exists():
-            _remove(old)
-        else:
-            os.replace(old, target)
 
 
 @contextmanager

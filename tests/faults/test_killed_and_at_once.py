@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.io import atomic
+from isc_core.io import temporary_siblings
 from isc_core.io.atomic import new_file, new_folder, remove_unfinished, unfinished
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -126,7 +126,7 @@ def test_cleaning_up_during_a_write_never_spoils_a_result(
     target, begun = tmp_path / "out", []
     make(target, "old")
     if not locks:
-        monkeypatch.setattr(atomic, "fcntl", None)
+        monkeypatch.setattr(temporary_siblings, "fcntl", None)
 
     def remove_later(entry: Path, **options: object) -> None:
         begun.append((entry, os.open(entry, os.O_RDONLY)))
@@ -214,7 +214,7 @@ def test_replacement_in_two_steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_disk_without_locks_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(atomic, "fcntl", None)
+    monkeypatch.setattr(temporary_siblings, "fcntl", None)
     with suppress(ZeroDivisionError), new_folder(tmp_path / "out", OURS) as partial:
         name = partial.name
         raise ZeroDivisionError
