@@ -6,50 +6,36 @@ maps the 99.5th percentile of the largest channel inside the mask to 0.95. Pictu
 linear light and encoded as sRGB at the end. Maps are cropped to the object and scaled with their
 mask as weight, so that no black bleeds in at the edge.
 
-The height is shown as a relief lit from the upper left, with contour lines at round numbers; the
-light as a white sphere. `other_views` renders the object from both sides and in another light.
+`relief_panel` draws the height, `other_views` the object from both sides and in another light. The
+light is shown on a white sphere.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path, PurePath
 
 import numpy as np
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image
 
 from ..errors import InputError
-from ..imaging.srgb import srgb_codes, srgb_to_linear
+from ..imaging.srgb import srgb_to_linear
 from ..io.atomic import new_file
-from ..io.printable_names import readable
 from ..scene.decomposition import Decomposition, Separation
 from ..scene.diagnostics import LobeDiagnostics, LobeStatus
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.spherical_harmonics import real_sh
 from .error_colors import SCALE, error_colors
 from .other_views import relit_panel, turned_panels
-from .panels import MARGIN, SIDE, Frame, Panel, exposure, unit_normals
+from .panels import MARGIN, SIDE, Frame, Panel, exposure
+from .relief_panel import relief_panel
+from .sheet_layout import sheet_of
 
-_GAP, _EDGE, _LABEL, _HEAD = 20, 40, 38, 104  # pixels
-_PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
-_KEY = 10  # pixels: side of a key's square
-_RADIUS = 12  # pixels: of the cards' round corners
 _SMALL = 480  # pixels: long side of a sheet's thumbnail
-_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
-    (1.0, 0.42, 0.04),
-    (0.06, 0.3, 1.0),
-    (0.06, 0.06, 0.06),
-)  # linear
-_SHOWN = (
-    "image",
-    "diffuse",
-    "specular",
-    "reflectance",
-    "shading",
-    "normal",
-    "height",
-)  # maps that panels are drawn from
+_TOO_BRIGHT, _TOO_DARK = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0)  # linear
+_NO_ERROR = (0.06, 0.06, 0.06)
+# Maps that panels are drawn from.
+_SHOWN = ("image", "diffuse", "specular", "reflectance", "shading", "normal", "height")
 _FULL_ERROR = 0.1  # of the photo's white: errors above it have the full colour
 
 
@@ -92,10 +78,10 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     )
     with ThreadPoolExecutor(1) as pool:  # half of the work
         turned = pool.submit(turned_panels, d, frame, small, photo)
-        panels += [_relief(d, frame, small), _light_panel(d, light)]
+        panels += [relief_panel(d, frame, small), _light_panel(d, light)]
         last = [relit_panel(d, frame, small), _error_panel(d, frame)]
         panels += [*turned.result(), *last]
-    return _sheet(*_title(d), panels, columns=4)
+    return sheet_of(*_title(d), panels, columns=4)
 
 
 def _light_panel(d: Decomposition, gain: float) -> Panel:
@@ -169,7 +155,9 @@ def separation_sheet(
         Panel(gain * frame.scaled(values), frame.coverage, label, remark)
         for values, label, remark in maps
     ]
-    return _sheet(title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3)
+    return sheet_of(
+        title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3
+    )
 
 
 @dataclass(frozen=True)
@@ -250,7 +238,7 @@ def comparison_sheet(
                     "orange: too little removed, blue: too much",
                 )
             )
-    return _sheet(
+    return sheet_of(
         title,
         f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(separations)} separations",
         panels,
@@ -312,7 +300,7 @@ def edit_sheet(
             Panel(gain * frame.scaled(entry.values), frame.coverage, entry.label, entry.remark)
         )
     panels += others
-    return _sheet(title, subtitle, panels, min(columns, len(panels)))
+    return sheet_of(title, subtitle, panels, min(columns, len(panels)))
 
 
 def _error_colors(error: np.ndarray) -> np.ndarray:
@@ -346,52 +334,6 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return color, coverage
 
 
-def _relief(d: Decomposition, frame: Frame, small: Mapping[str, np.ndarray]) -> Panel:
-    """The height map shaded by a light at the upper left, with contour lines."""
-    heights = frame.inside(d.height)
-    low, high = float(heights.min()), float(heights.max())
-    spacing = _round_step((high - low) / 12)
-    normal = unit_normals(small["normal"])
-    light, low_tone, high_tone, key_tone, fill_tone = np.array(
-        [
-            [-0.52, 0.58, 0.63],
-            [0.36, 0.44, 0.52],
-            [0.86, 0.78, 0.66],
-            [1, 0.97, 0.9],
-            [0.75, 0.88, 1],
-        ],
-        np.float32,
-    )
-    facing, fill_light = np.clip((normal @ light + 0.3) / 1.3, 0, 1), 0.6 + 0.4 * normal[..., 1]
-    key = facing * np.sqrt(facing)  # an area light: a soft shadow edge
-    height = small["height"]
-    tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
-    base = (1 - tint) * low_tone + tint * high_tone
-    color = base * (0.95 * key[..., None] * key_tone + 0.16 * fill_light[..., None] * fill_tone)
-    color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
-    return Panel(
-        color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}"
-    )
-
-
-def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
-    """Coverage of each pixel by contour lines, [0, 1]: at integers of `level`, faded where they
-    converge.
-    """
-    slope = np.hypot(*np.gradient(level))
-    distance = np.abs(level - np.rint(level)) / np.maximum(slope, 1e-6)  # pixels to the line
-    fade = np.clip((0.25 - slope) / 0.15, 0, 1) * (coverage > 0.99)
-    return np.clip(1.1 - distance, 0, 1) * fade
-
-
-def _round_step(step: float) -> float:
-    """The smallest of 1, 2, 5 times a power of ten that is at least `step`; 1 for 0."""
-    if step <= 0:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(step))
-    return float(power * next(m for m in (1, 2, 5, 10) if m * power >= step * (1 - 1e-9)))
-
-
 def _title(d: Decomposition) -> tuple[str, str]:
     given, settings = d.provenance.input, d.provenance.settings
     diagnostics = d.provenance.diagnostics
@@ -420,95 +362,3 @@ def _gloss(fit: LobeFit, lobe: LobeDiagnostics | None) -> str:
             "no highlights" if fit.outcome == LobeFitOutcome.NO_SPECULAR else "gloss undetermined"
         )
     return f"roughness {'' if fit.determined else 'at most '}{fit.blender_roughness:.2f}"
-
-
-def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> Image.Image:
-    rows = -(-len(panels) // columns)
-    width = 2 * _EDGE + columns * SIDE + (columns - 1) * _GAP
-    height = _HEAD + rows * (SIDE + _LABEL) + (rows - 1) * _GAP + _EDGE
-    sheet = Image.new("RGB", (width, height), _PAGE)
-    draw = ImageDraw.Draw(sheet)
-    _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
-    _write(draw, (_EDGE, 80), subtitle, 16, _FAINT, width - 2 * _EDGE)
-    card = _rounded()
-    with ThreadPoolExecutor(2) as pool:
-        pictures = list(pool.map(_picture, panels))
-    for index, (panel, picture) in enumerate(zip(panels, pictures, strict=True)):
-        row, column = divmod(index, columns)
-        x, y = _EDGE + column * (SIDE + _GAP), _HEAD + row * (SIDE + _LABEL + _GAP)
-        sheet.paste(picture, (x, y), card)
-        end = _write(draw, (x + 2, y + SIDE + 27), panel.label, 18, _TEXT, SIDE)
-        right = _write_keys(draw, (x + SIDE - 2, y + SIDE + 27), panel.keys)
-        _write(draw, (right, y + SIDE + 27), panel.remark, 14, _FAINT, right - end - 10, right=True)
-    return sheet
-
-
-def _write_keys(
-    draw: ImageDraw.ImageDraw,
-    place: tuple[float, float],
-    keys: Sequence[tuple[str, tuple[int, int, int]]],
-) -> float:
-    """Draw a legend of coloured squares and texts, right-aligned at `place`; return its left."""
-    right, baseline = place
-    font = _font(14)
-    for text, color in reversed(keys):
-        draw.text((right, baseline), text, fill=_FAINT, font=font, anchor="rs")
-        right -= font.getlength(text) + 4
-        draw.rectangle((right - _KEY, baseline - _KEY, right, baseline), fill=color)
-        right -= _KEY + 8
-    return right
-
-
-def _write(
-    draw: ImageDraw.ImageDraw,
-    place: tuple[float, float],
-    text: str,
-    size: int,
-    color: tuple[int, int, int],
-    room: float,
-    *,
-    right: bool = False,
-) -> float:
-    """Draw a line of text at the baseline `place`, cut to `room` pixels; return its end."""
-    font, text = _font(size), readable(text)
-    if font.getlength(text) > room:
-        while text and font.getlength(text + "…") > room:
-            text = text[:-1]
-        text += "…"
-    draw.text(place, text, fill=color, font=font, anchor="rs" if right else "ls")
-    return place[0] + font.getlength(text)
-
-
-@cache
-def _font(size: int) -> ImageFont.FreeTypeFont | ImageFont.ImageFont:
-    return ImageFont.load_default(size)
-
-
-def _picture(panel: Panel) -> Image.Image:
-    """The panel on its card, blended in linear light."""
-    covered = np.flatnonzero(panel.coverage)  # elsewhere only the card is visible
-    alpha = panel.coverage.ravel().take(covered).astype(np.float32)
-    rest, planes = 1 - alpha, []
-    for channel, card in enumerate(_CARD):
-        linear = panel.color[..., channel].ravel().take(covered).astype(np.float32)
-        np.clip(linear, 0, 1, out=linear)
-        linear *= alpha
-        linear += rest * np.float32(srgb_to_linear(card / 255.0))
-        plane = np.full(panel.coverage.shape, card, np.uint8)
-        plane.reshape(-1)[covered] = srgb_codes(linear)
-        planes.append(plane)
-    return Image.fromarray(np.stack(planes, -1))
-
-
-def _rounded() -> Image.Image:
-    """The coverage of the card, with antialiased round corners taken from a small card."""
-    half = 2 * _RADIUS
-    drawn = Image.new("L", (8 * half, 8 * half), 0)
-    box = (0, 0, 8 * half - 1, 8 * half - 1)
-    ImageDraw.Draw(drawn).rounded_rectangle(box, 4 * _RADIUS, fill=255)
-    small = drawn.resize((2 * half, 2 * half), Image.Resampling.LANCZOS)
-    shape = Image.new("L", (SIDE, SIDE), 255)
-    for x, left in ((0, 0), (half, SIDE - half)):
-        for y, top in ((0, 0), (half, SIDE - half)):
-            shape.paste(small.crop((x, y, x + half, y + half)), (left, top))
-    return shape
