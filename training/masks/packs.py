@@ -15,7 +15,6 @@ import lzma
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
 
 import numpy as np
 from PIL import Image
@@ -24,11 +23,12 @@ from scipy import ndimage
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
+from ..archives import open_archive
+
 SUFFIX = ".npz"
 _FORMAT, _QUALITY = 1, 85
 _BORDER = 15  # pixels: about two blocks of JPEG
 _DROPPED = 4  # bits of the mantissa
-_READ_ERRORS = (ValueError, KeyError, OSError, BadZipFile, EOFError, lzma.LZMAError)
 
 
 @dataclass(frozen=True)
@@ -103,16 +103,11 @@ class Ingredients:
 
 
 def _read(path: Path) -> Ingredients:
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            if int(data["format"]) != _FORMAT:
-                raise ValueError("it has another version")
-            return _unpacked({name: data[name] for name in data.files})
-    except _READ_ERRORS as error:
-        raise InputError(
-            f"{path} contains no ingredients: {error}; make them with "
-            "python -m training.masks.ingredients"
-        ) from error
+    remedy = "make it again with python -m training.masks.ingredients"
+    with open_archive(path, "a file of ingredients", remedy) as data:
+        if int(data["format"]) != _FORMAT:
+            raise InputError(f"{path} is a file of ingredients of another version: {remedy}")
+        return _unpacked({name: data[name] for name in data.files})
 
 
 def _unpacked(data: dict[str, np.ndarray]) -> Ingredients:

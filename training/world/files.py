@@ -13,18 +13,19 @@ Limits: views of another format are refused, not converted.
 
 import json
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from zipfile import BadZipFile
 from zlib import crc32
-from zlib import error as UnpackingError
 
 import numpy as np
+from numpy.lib.npyio import NpzFile
 
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
+from ..archives import open_archive
 from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
@@ -33,7 +34,6 @@ SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
 PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
 HELD_OUT_SOURCES = ("scan/", "furniture/Reallusion", "furniture/KatorLegaz")
-_DAMAGES = (ValueError, TypeError, KeyError, OSError, BadZipFile, EOFError, UnpackingError)
 _PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions")
 
 
@@ -146,11 +146,8 @@ def read_patterns(folder: Path) -> Atlas:
         If there are none, or the file is damaged.
     """
     path = folder / PATTERNS
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            atlas = Atlas(data["maps"], data["kinds"], data["tileable"])
-    except _DAMAGES as error:
-        raise InputError(f"{path} cannot be read: {error}; delete it and build again") from error
+    with open_archive(path, "an archive of patterns", "delete it and build again") as data:
+        atlas = Atlas(data["maps"], data["kinds"], data["tileable"])
     if atlas.maps.ndim != 3 or len(atlas.kinds) != len(atlas.maps) or not len(atlas.maps):
         raise InputError(f"{path} holds no patterns: delete it and build again")
     return atlas
@@ -197,21 +194,18 @@ def read_views(path: Path) -> tuple[str, list[View]]:
     InputError
         If the file is no such archive.
     """
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            reference = str(data["reference"])
-            source = reference.partition("/")[0]
-            views = [
-                View(
-                    name=str(name),
-                    source=source,
-                    distance=float(data[f"distance{k}"]),
-                    **{part: data[f"{part}{k}"] for part in _PARTS},
-                )
-                for k, name in enumerate(data["names"])
-            ]
-    except _DAMAGES as error:
-        raise _damaged(path, error) from error
+    with _open_views(path) as data:
+        reference = str(data["reference"])
+        source = reference.partition("/")[0]
+        views = [
+            View(
+                name=str(name),
+                source=source,
+                distance=float(data[f"distance{k}"]),
+                **{part: data[f"{part}{k}"] for part in _PARTS},
+            )
+            for k, name in enumerate(data["names"])
+        ]
     for view in views:
         count = int(view.mask.sum())
         wanted = ((SIDE, SIDE), (count, 3), (count,), (count,), (count, DIRECTIONS // 8))
@@ -247,12 +241,9 @@ def views_in(folder: Path, split: Split) -> Iterator[View]:
 
 def _reference_of(path: Path) -> str:
     """The reference of an archive, without unpacking its views."""
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            return str(data["reference"])
-    except _DAMAGES as error:
-        raise _damaged(path, error) from error
+    with _open_views(path) as data:
+        return str(data["reference"])
 
 
-def _damaged(path: Path, error: Exception) -> InputError:
-    return InputError(f"{path} is not an archive of views: {error}; delete it")
+def _open_views(path: Path) -> AbstractContextManager[NpzFile]:
+    return open_archive(path, "an archive of views", "delete it and build again")

@@ -19,14 +19,13 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from zipfile import BadZipFile
-from zlib import error as ZlibError
 
 import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 
+from ..archives import open_archive
 from .environments import Panorama, read_panoramas
 from .files import Split, read_patterns, views_in
 from .patterns import Atlas
@@ -112,21 +111,12 @@ def read_pack(path: Path) -> PackedWorld:
     InputError
         If the file is no pack of this version.
     """
-    try:
-        with np.load(path, allow_pickle=False) as data:
-            if int(data["format"]) != FORMAT:
-                raise ValueError("it is of another version")
-            return _unpacked({name: data[name] for name in data.files})
-    except (
-        ValueError,
-        KeyError,
-        OSError,
-        BadZipFile,
-        EOFError,
-        ZlibError,
-        lzma.LZMAError,
-    ) as error:
-        raise InputError(f"{path} is no pack of a world: {error}; make it again") from error
+    with open_archive(path, "a pack of a world", "make it again with isc world pack") as data:
+        if int(data["format"]) != FORMAT:
+            raise InputError(
+                f"{path} is a pack of another version: make it again with isc world pack"
+            )
+        return _unpacked({name: data[name] for name in data.files})
 
 
 def all_views(path: Path) -> list[View]:
