@@ -29,19 +29,20 @@ class ResultPart:
     part: FramePart
 
     @classmethod
-    def whole(cls, result: Decomposition) -> "ResultPart":
-        """Return a whole result as its own part.
+    def of(cls, d: Decomposition, part: FramePart | None) -> "ResultPart":
+        """Return a result as a part of its frame.
 
         Parameters
         ----------
-        result : Decomposition
+        d : Decomposition
+        part : FramePart or None
+            The part that its maps are of; None stands for the whole frame.
 
         Returns
         -------
         ResultPart
         """
-        height, width = result.mask.shape
-        return cls(result, FramePart.whole((height, width)))
+        return cls(d, part or FramePart.whole((d.mask.shape[0], d.mask.shape[1])))
 
 
 def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
