@@ -8,8 +8,8 @@ b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
 
 Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1): only
 additions, by the fast transform. Neighbouring patches of a row share the sums of their columns.
-Colour channels are mixed beforehand by an orthonormal matrix with rows grey, red-green, yellow-
-blue, so that brightness, which carries most of the energy, is one channel.
+Colour channels are mixed beforehand by an orthonormal matrix with rows grey, red-green and
+yellow-blue, so that brightness, which carries most of the energy, is one channel.
 
 Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI
 27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. The kept coefficients are those with the most
