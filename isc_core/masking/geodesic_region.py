@@ -24,10 +24,11 @@ import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse.csgraph import dijkstra
 
+from ..imaging.minimum_cut import STEPS, shifted
+
 _STEP = 0.01  # lambda: change of colour that is as far as one pixel
 _FAR = 0.5  # quantile of the distance from which pixels keep their label
 _REACH = 3.0  # the same in plain distance, over that from the point to the mask
-_NEIGHBOURS = ((0, 1), (1, 0), (1, 1), (1, -1))
 
 Pixels = list[tuple[int, int]]
 
@@ -100,13 +101,12 @@ def _graph(codes: np.ndarray) -> sparse.csr_matrix:
     height, width = codes.shape[:2]
     number = np.arange(height * width).reshape(height, width)
     starts, ends, lengths = [], [], []
-    for down, right in _NEIGHBOURS:
-        here = slice(0, height - down), slice(max(-right, 0), width - max(right, 0))
-        there = slice(down, height), slice(max(right, 0), width - max(-right, 0))
+    for step in STEPS:
+        here, there = shifted((height, width), step)
         change = np.sqrt(((codes[here] - codes[there]) ** 2).sum(axis=2))
         starts.append(number[here].ravel())
         ends.append(number[there].ravel())
-        lengths.append((change + _STEP * np.hypot(down, right)).ravel())
+        lengths.append((change + _STEP * np.hypot(*step)).ravel())
     pairs = np.concatenate(starts), np.concatenate(ends)
     return sparse.csr_matrix((np.concatenate(lengths), pairs), (number.size, number.size))
 

@@ -24,6 +24,7 @@ from ..io.atomic import new_file
 from ..scene.decomposition import Decomposition, Separation
 from ..scene.diagnostics import LobeDiagnostics, LobeStatus
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
+from ..shading.sphere import sphere_normals
 from ..shading.spherical_harmonics import real_sh
 from .error_colors import SCALE, error_colors
 from .other_views import relit_panel, turned_panels
@@ -319,19 +320,10 @@ def _share(part: np.ndarray, whole: np.ndarray, frame: Frame) -> float:
 
 def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A white sphere under the light, (N, N, 3), and its coverage, (N, N)."""
-    radius = SIDE * (0.5 - MARGIN) * 0.9
-    axis = (np.arange(SIDE) + 0.5 - SIDE / 2) / radius
-    x, y = np.meshgrid(axis, -axis)
-    distance, color = np.hypot(x, y), np.zeros((SIDE, SIDE, 3), np.float32)
-    coverage = np.clip((1 - distance) * radius + 0.5, 0, 1).astype(np.float32)
-    seen = coverage > 0
-    x, y, distance = x[seen], y[seen], distance[seen]
-    shrink = np.minimum(
-        1, 1 / np.maximum(distance, 1e-9)
-    )  # outside the outline: the normal at the outline, for partly covered pixels
-    normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
-    color[seen] = np.exp(real_sh(normal) @ illumination)
-    return color, coverage
+    normal, coverage = sphere_normals(SIDE, SIDE * (0.5 - MARGIN) * 0.9)
+    seen, color = coverage > 0, np.zeros((SIDE, SIDE, 3), np.float32)
+    color[seen] = np.exp(real_sh(normal[seen]) @ illumination)
+    return color, coverage.astype(np.float32)
 
 
 def _title(d: Decomposition) -> tuple[str, str]:

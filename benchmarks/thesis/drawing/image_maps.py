@@ -10,9 +10,9 @@ light) is fitted to the ground truth before drawing, as in the errors.
 import matplotlib
 import numpy as np
 
-from isc_core.editing.spheres import sphere_normals
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.shading.sphere import sphere_normals
 from isc_core.shading.spherical_harmonics import real_sh
 
 from .style import OKABE_ITO, normal_colours

@@ -24,12 +24,13 @@ from isc_core.editing.clusters import Clusters, find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edited import Edited
 from isc_core.editing.recolour import ColourEdit, recolour
-from isc_core.editing.spheres import render_sphere, sphere_normals
+from isc_core.editing.spheres import render_sphere
 from isc_core.imaging.luminance import luminance
 from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
 from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from isc_core.separation import separate
 from isc_core.shading.lights import DirectionalLight, toward
+from isc_core.shading.sphere import sphere_normals
 from synth.capture.truth import fit_light
 
 from ..drawing.panels import Panel, panel_figure

@@ -19,7 +19,6 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from isc_core.editing.spheres import sphere_normals
 from isc_core.evaluation.metrics import scaled_mse, truth_normal
 from isc_core.shading.brdf.blinn_phong import BlinnPhong
 from isc_core.shading.brdf.dichromatic import Dichromatic
@@ -31,6 +30,7 @@ from isc_core.shading.brdf.oren_nayar import OrenNayar
 from isc_core.shading.brdf.phong import Phong
 from isc_core.shading.lights import VIEW, DirectionalLight, toward
 from isc_core.shading.radiance import directional, radiance
+from isc_core.shading.sphere import sphere_normals
 from isc_core.shading.spherical_harmonics import real_sh
 from synth.capture.truth import fit_light
 

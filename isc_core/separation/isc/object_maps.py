@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from ...imaging.blocks import padded_means_inside
 from ...imaging.channels import largest, smallest
 from ...imaging.smoothing import masked_gaussian
 from ..support.highlight_cues import far_from_borders, noise_level, steps_of
@@ -125,24 +126,10 @@ def block_averages(
     """
     if factor == 1:
         return image, mask, usable
-    padded = [(0, -n % factor) for n in mask.shape]
-    rows, columns = (
-        (n + extra) // factor for n, (_, extra) in zip(mask.shape, padded, strict=True)
-    )
-    shape = rows, factor, columns, factor
-
-    def share(values: np.ndarray) -> np.ndarray:
-        return np.pad(values, padded).reshape(shape).mean(axis=(1, 3), dtype=np.float32)
-
-    covered = share(mask)
-    inside = covered > 0.5
-    whole = (
-        np.stack([share(image[..., c]) for c in range(3)], axis=2)
-        / np.maximum(covered, TINY)[..., None]
-    )
-    if not inside.any():
-        inside = covered > 0
-    return np.where(inside[..., None], whole, 0), inside, inside & (share(mask & ~usable) == 0)
+    planes = [padded_means_inside(image[..., c], mask, factor)[0] for c in range(3)]
+    clipped, covered = padded_means_inside((~usable).astype(np.float32), mask, factor)
+    inside = covered > 0.5 if (covered > 0.5).any() else covered > 0
+    return np.where(inside[..., None], np.stack(planes, axis=2), 0), inside, inside & (clipped == 0)
 
 
 def specular_of(low: np.ndarray, chroma: np.ndarray, share: np.ndarray) -> np.ndarray:

@@ -35,6 +35,7 @@ import numpy as np
 from scipy import ndimage
 
 from ...errors import InputError
+from ...imaging.blocks import padded_means_inside
 from ...imaging.bounding_box import mask_slices
 from ...imaging.smoothing import masked_gaussian
 from ...io.npy import parse_arrays
@@ -237,25 +238,9 @@ def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.nda
     factor = -(-max(mask.shape) // _MAX_SIDE)
     if factor == 1:
         return intensity, mask, 1
-    padded = [(0, -n % factor) for n in mask.shape]
-    rows, columns = (
-        (n + extra) // factor for n, (_, extra) in zip(mask.shape, padded, strict=True)
-    )
-
-    def share(values: np.ndarray) -> np.ndarray:
-        return (
-            np.pad(values, padded)
-            .reshape(rows, factor, columns, factor)
-            .mean(axis=(1, 3), dtype=float)
-        )
-
-    covered = share(mask)
+    means, covered = padded_means_inside(intensity, mask, factor)
     inside = covered > 0.5 if (covered > 0.5).any() else covered > 0
-    return (
-        np.where(inside, share(np.where(mask, intensity, 0)) / np.maximum(covered, 1e-9), 0),
-        inside,
-        factor,
-    )
+    return np.where(inside, means, 0), inside, factor
 
 
 def pooled_evidence(intensity: np.ndarray, mask: np.ndarray, table: FilterTable) -> np.ndarray:

@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from ....editing.spheres import render_sphere, sphere_normals
+from ....editing.spheres import render_sphere
 from ....result_files.panels import Panel
 from ....scene.decomposition import Decomposition
 from ....shading.lights import DirectionalLight
+from ....shading.sphere import sphere_normals
 from ....shading.spherical_harmonics import real_sh
 
 

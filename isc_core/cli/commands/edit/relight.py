@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from ....editing.relight import HIGHLIGHTS, NewLight, Relighting, relight
-from ....editing.spheres import sphere_normals
 from ....errors import InputError
 from ....io.npy import read_array
 from ....photo import read_linear
@@ -14,6 +13,7 @@ from ....result_files.known_inputs import read_light
 from ....scene.decomposition import Decomposition
 from ....scene.part_of_result import ResultPart
 from ....shading.lights import DirectionalLight, toward, turn, turned_light
+from ....shading.sphere import sphere_normals
 from ...interface.options import limits_of
 from ...interface.values import finite
 from .action import ActionResult, EditAction
