@@ -104,18 +104,11 @@ def build(target: Target, output: Path, cache: Path | None, *, offline: bool = F
     libraries = [] if cache is None else libraries_for(target.platform, cache / "kernels")
     path = output / archive_name(target)
     write_archive(path, contents(target, wheels, libraries))
-    checked = validate(path)
-    print(
-        "\n".join(
-            [
-                *listing(path),
-                "  validated by Blender"
-                if checked
-                else "  not validated: the bpy module is not installed",
-            ]
-        ),
-        flush=True,
-    )
+    if validate(path):
+        outcome = "validated by Blender"
+    else:
+        outcome = "not validated: the bpy module is not installed"
+    print(*listing(path), f"  {outcome}", sep="\n", flush=True)
     return path
 
 

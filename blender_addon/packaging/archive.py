@@ -141,14 +141,8 @@ def listing(path: Path) -> list[str]:
     sizes: dict[str, int] = {}
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():
-            top, _, rest = entry.filename.partition("/")
-            part = (
-                f"wheels/{rest}"
-                if top == "wheels"
-                else "isc_core"
-                if top == "isc_core"
-                else "the add-on"
-            )
+            top = entry.filename.partition("/")[0]
+            part = {"wheels": entry.filename, "isc_core": top}.get(top, "the add-on")
             sizes[part] = sizes.get(part, 0) + entry.file_size
     lines = [f"{path.name}: {path.stat().st_size / 1e6:.1f} MB"]
     return lines + [

@@ -3,9 +3,9 @@
 Runs by its path and imports nothing of the source tree, only what the zip contains. It installs the
 zip as Blender's preferences do, decomposes a generated photo twice by driving the poller, cancels a
 third run midway, kills the worker of a fourth, saves, opens, appends, and uninstalls. The last line
-of its output is JSON with measurements; a failed check raises. With RESULT, a result folder with
-arrays, that is imported instead of the two complete runs: seconds instead of a minute. `try_out`
-creates the environment and starts this file; BLENDER_USER_RESOURCES must be set.
+of its output is JSON with measurements; a failed check raises. With RESULT, it imports this result
+folder, which has arrays, instead of the two complete runs: this takes seconds, not a minute.
+`try_out` creates the environment and starts this file; BLENDER_USER_RESOURCES must be set.
 
 Limits: a zip without wheels is tested in an environment that has the packages; the source tree may
 then be importable.

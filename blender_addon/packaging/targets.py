@@ -61,7 +61,7 @@ class Target:
         return _PIP_PLATFORMS[self.platform]
 
     def runs(self, wheel: str) -> bool:
-        """Return whether the wheel of a file name is compatible.
+        """Return whether a wheel is compatible.
 
         Parameters
         ----------
@@ -71,7 +71,7 @@ class Target:
         Returns
         -------
         bool
-            Whether Python, ABI and platform in the name fit the target.
+            Whether Python, ABI and platform in its name fit the target.
         """
         python, abi, platforms = wheel.removesuffix(".whl").split("-")[-3:]
         fits_python = (
@@ -90,13 +90,11 @@ def _version(tag: str) -> tuple[int, int]:
     return int(digits[0]), int(digits[1:])
 
 
-_PLATFORMS = ("linux-x64", "windows-x64", "macos-arm64")
-
 # Blender 4.5 and 5.0 include Python 3.11, later builds of blender.org 3.13. The Blender of a Linux
 # distribution uses the distribution's Python.
 TARGETS = (
-    *(Target(name, (3, 11), "4.5.0", "5.1.0") for name in _PLATFORMS),
-    *(Target(name, (3, 13), "5.1.0") for name in _PLATFORMS),
+    *(Target(name, (3, 11), "4.5.0", "5.1.0") for name in _PIP_PLATFORMS),
+    *(Target(name, (3, 13), "5.1.0") for name in _PIP_PLATFORMS),
     Target("linux-x64", (3, 14), "5.1.0"),
 )
 

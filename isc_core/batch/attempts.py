@@ -108,20 +108,15 @@ def _reject_crashing(path: Path, run: str, timeout: float) -> None:
 
 def _location(lines: list[str]) -> str:
     """The innermost frame of the first thread that ran `process`, as text."""
-    frames = [
-        number for number, line in enumerate(lines) if "in process" in line and "work.py" in line
-    ]
-    if not frames:
+    thread = None
+    for number, line in enumerate(lines):
+        if line.startswith(("Thread", "Current thread")):
+            thread = number
+        if "in process" in line and "work.py" in line:
+            break
+    else:
         return ""
-    first = max(
-        (
-            number
-            for number in range(frames[0])
-            if lines[number].startswith(("Thread", "Current thread"))
-        ),
-        default=None,
-    )
-    if first is None:
+    if thread is None:
         return ""
-    frame = lines[first + 1].strip().removeprefix("File ")
+    frame = lines[thread + 1].strip().removeprefix("File ")
     return f" (in {frame.rpartition(' in ')[2]})"

@@ -22,7 +22,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from multiprocessing import resource_tracker
 from typing import Any
@@ -71,19 +71,12 @@ class WorkerOptions:
 
     def sized(self) -> "WorkerOptions":
         """Return the options with zeros replaced by numbers."""
-        cores = (
-            len(os.sched_getaffinity(0))
-            if hasattr(os, "sched_getaffinity")
-            else os.cpu_count() or 1
-        )
+        if hasattr(os, "sched_getaffinity"):
+            cores = len(os.sched_getaffinity(0))
+        else:
+            cores = os.cpu_count() or 1
         workers = self.workers or max(1, cores // max(self.threads, 1))
-        return WorkerOptions(
-            workers,
-            self.threads or max(1, cores // workers),
-            self.memory,
-            self.scheduler,
-            self.processes,
-        )
+        return replace(self, workers=workers, threads=self.threads or max(1, cores // workers))
 
 
 def require_dask() -> None:
@@ -198,9 +191,9 @@ def _local_cluster(options: WorkerOptions, starts: int = _MAX_STARTS) -> Any:
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Ctrl-C reaches every process of a terminal.
+    """Let processes and threads that are started in this block ignore Ctrl-C.
 
-    Processes and threads started in this block ignore it and leave it to this process.
+    It reaches every process of a terminal; this one handles it.
     """
     # multiprocessing's own process; starting it unblocks signals in this thread
     resource_tracker.ensure_running()
@@ -268,10 +261,8 @@ def run_jobs(
             waiting[key] = job, future
             future.add_done_callback(completed.put)
         for future in _completed(completed):
-            if future.status in (
-                "pending",
-                "lost",
-            ):  # its worker was lost before reporting; another repeats the job
+            # Its worker was lost before it reported; another one repeats the job.
+            if future.status in ("pending", "lost"):
                 future.add_done_callback(completed.put)
                 continue
             job, _ = waiting.pop(future.key)

@@ -13,7 +13,7 @@ before work begins; a missing file is a failure of only that image.
 
 import csv
 import json
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TextIO
@@ -27,6 +27,7 @@ from .names import check_given
 SUFFIXES = (".csv", ".jsonl", ".ndjson")
 _MAX_LINE = 1 << 20  # characters
 _COLUMNS = ("image", "mask", "name", "options")
+_TEXTS = {"image", "mask", "name"}
 _REMEDY = "use a .csv or .jsonl file"
 
 
@@ -62,25 +63,18 @@ class Manifest:
         self._state = state
 
     def _item(self, row: dict[str, Any], line: int) -> BatchItem:
-        texts = [row.get(key) for key in ("image", "mask", "name")]
-        image, mask, name = ("" if text is None else text for text in texts)
+        given = (row.get(key) for key in ("image", "mask", "name"))
+        image, mask, name = ("" if text is None else text for text in given)
         if not (isinstance(image, str) and isinstance(mask, str) and isinstance(name, str)):
             raise InputError(f"{self._at(line)}: image, mask and name must be text")
         if not image:
             raise InputError(f"{self._at(line)} names no image: write its path or URL under image")
         if name:
             check_given(name, self._at(line))
-        options = (
-            self._options(row, line)
-            if len(row) > len(texts) or not row.keys() <= {"image", "mask", "name"}
-            else ()
-        )
+        options = () if row.keys() <= _TEXTS else self._options(row, line)
+        location = self._resolved(image)
         return BatchItem(
-            self._resolved(image),
-            self._resolved(mask) if mask else "",
-            name,
-            options,
-            self._resolved(image),
+            location, self._resolved(mask) if mask else "", name, options, label=location
         )
 
     def _at(self, line: int) -> str:
@@ -192,8 +186,7 @@ def _csv_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]
         raise InputError(f"{location}, line {reader.line_num} is not CSV: {error}") from error
 
 
-def _check_header(header: Iterable[str], location: str) -> None:
-    names = list(header)
+def _check_header(names: list[str], location: str) -> None:
     if "image" not in names:
         raise InputError(
             f"{location}: the first line has no column `image`: start with a header such as "

@@ -69,7 +69,7 @@ def _status_of(job: ImageJob, work: Work) -> tuple[str, str]:
 
 
 def _cancelled_with_run(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
-    """Cancel also when the run has ended, because nothing else stops the workers of a cluster."""
+    """A monitor that also cancels when the run has ended: a cluster's workers go on otherwise."""
     checked, expected = time.monotonic(), True
 
     def cancelled() -> bool:

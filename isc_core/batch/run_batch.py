@@ -82,7 +82,7 @@ def run_batch(
     Returns
     -------
     Counter
-        Number of results by status: of images, or of the objects of those that have each.
+        Number of results by status: one for each image, or for each of its objects.
 
     Raises
     ------
@@ -166,24 +166,11 @@ def _jobs(
         name = names.name(item)
         image, mask = _absolute(item.image), _absolute(item.mask)
         if name is None:
-            journal.add(
-                JournalEntry(
-                    number,
-                    "",
-                    image,
-                    mask,
-                    ImageOutcome(SKIPPED, "repeated in the inputs"),
-                )
-            )
+            outcome = ImageOutcome(SKIPPED, "repeated in the inputs")
+            journal.add(JournalEntry(number, "", image, mask, outcome))
             continue
-        yield ImageJob(
-            number,
-            name,
-            image,
-            mask,
-            recipe.changed(item.options) if item.options else recipe,
-            plan,
-        )
+        changed = recipe.changed(item.options) if item.options else recipe
+        yield ImageJob(number, name, image, mask, changed, plan)
 
 
 def _absolute(location: str) -> str:

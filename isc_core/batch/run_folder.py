@@ -47,12 +47,8 @@ class RunFolder:
 
     def __init__(self, output: Path) -> None:
         self.output = output
-        private = output / ".isc-batch"
-        self.private, self.attempts, self.fetched = (
-            private,
-            private / "attempts",
-            private / "fetched",
-        )
+        self.private = private = output / ".isc-batch"
+        self.attempts, self.fetched = private / "attempts", private / "fetched"
         self.lock, self.owner = private / "lock", private / "owner"
         self.run, self.journal = private / "run", private / "journal.jsonl"
         self.failures = output / "failures.jsonl"

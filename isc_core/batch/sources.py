@@ -57,11 +57,12 @@ class Inputs:
         """
         folder, _, name = location.rpartition("/")
         stem = name.rpartition(".")[0]
-        stems = self._stem_table(folder if self._masks is None else self._masks)
+        place = folder if self._masks is None else self._masks
+        stems = self._stem_table(place)
         candidates = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
         for candidate in candidates:
             if candidate in stems:
-                return f"{folder if self._masks is None else self._masks}/{stems[candidate]}"
+                return f"{place}/{stems[candidate]}"
         if self._masks is not None:
             raise InputError(f"--masks {self._masks} has no mask for {name}: name it {stem}.png")
         return ""
@@ -95,9 +96,9 @@ def _listed_remote(url: str) -> list[str]:
     try:
         if glob.has_magic(path):
             return sorted(
-                system.unstrip_protocol(photos)
-                for photos in system.glob(path)
-                if _is_photo(photos.rpartition("/")[2])
+                system.unstrip_protocol(photo)
+                for photo in system.glob(path)
+                if _is_photo(photo.rpartition("/")[2])
             )
         if system.isdir(path):
             folder = url.rstrip("/")
