@@ -55,6 +55,7 @@ PACKAGES = {
 LEFT_OUT = (
     "benchmarks/batch",
     "benchmarks/blender",
+    "benchmarks/bootstrap.py",
     "benchmarks/decomposition",
     "benchmarks/detail",
     "benchmarks/refinement/closed_loop.py",
