@@ -163,8 +163,7 @@ class FramePart:
     @property
     def share(self) -> float:
         """Its area over that of the frame."""
-        height = self.rows.stop - self.rows.start
-        width = self.columns.stop - self.columns.start
+        height, width = self.size
         return height * width / (self.shape[0] * self.shape[1])
 
     def scaled(self, factor: float, shape: tuple[int, ...]) -> "FramePart":
@@ -188,6 +187,32 @@ class FramePart:
             for along, count in zip((self.rows, self.columns), shape[:2], strict=True)
         )
         return FramePart(rows, columns, (shape[0], shape[1]))
+
+    def within(self, outer: "FramePart") -> "FramePart":
+        """Return what this part and another one of the same frame have in common, as a part of the
+        latter.
+
+        Parameters
+        ----------
+        outer : FramePart
+            Its frame is that of the returned part.
+
+        Returns
+        -------
+        FramePart
+        """
+        rows, columns = (
+            slice(
+                max(own.start, other.start) - other.start, min(own.stop, other.stop) - other.start
+            )
+            for own, other in ((self.rows, outer.rows), (self.columns, outer.columns))
+        )
+        return FramePart(rows, columns, outer.size)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Its rows and columns."""
+        return self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
 
     @property
     def is_whole(self) -> bool:

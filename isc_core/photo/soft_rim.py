@@ -49,8 +49,7 @@ def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | Non
         Dilated by half a window; None without soft regions.
     """
     longest = max(mask[mask_slices(mask)].shape)
-    edge = _EDGE if own else max(_FEATHER, round(_FEATHER_SHARE * longest))
-    window = 2 * edge + 1
+    window = 2 * _edge(longest, own) + 1
     partly = (share > _PARTLY[0]) & (share < _PARTLY[1])
     density = ndimage.uniform_filter(partly.astype(np.float32), window, mode="constant")
     dense = partly & (density >= _DENSE)
@@ -63,3 +62,26 @@ def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | Non
     )
     zone &= (above >= _ABOVE * found)[labels]
     return np.asarray(zone) if zone.any() else None
+
+
+def rim_reach(mask: np.ndarray, own: bool) -> int:
+    """Return how far the soft rim may extend beyond pixels that are partly covered.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+        The object.
+    own : bool
+        As of `soft_rim`.
+
+    Returns
+    -------
+    int
+        Pixels; farther away, coverage of 0 has no effect on the rim.
+    """
+    return 2 * _edge(max(mask[mask_slices(mask)].shape), own) + 2
+
+
+def _edge(longest: int, own: bool) -> int:
+    """w, pixels."""
+    return _EDGE if own else max(_FEATHER, round(_FEATHER_SHARE * longest))

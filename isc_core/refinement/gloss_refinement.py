@@ -137,6 +137,8 @@ def refine_gloss(
     monitor.report("refining the gloss", 0.0)
     part = FramePart.around(d.mask, _MARGIN)
     done = _refinement(cut_result(d, part), options, monitor)
+    if not done.kept:
+        return replace(done, result=replace(d, provenance=done.result.provenance))
     return replace(done, result=placed_result(done.result, part))
 
 

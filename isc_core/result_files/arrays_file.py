@@ -68,7 +68,7 @@ from ..imaging.bounding_box import FramePart, aligned_edge
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
-from ..scene.part_of_result import cut_result
+from ..scene.part_of_result import ResultPart
 from .mesh.build import build_mesh
 from .mesh.object_cover import ObjectCover
 from .mesh.options import MeshOptions
@@ -86,6 +86,7 @@ def write_arrays(
     built: MeshResult | None = None,
     texture: np.ndarray | None = None,
     cover: ObjectCover | None = None,
+    part: FramePart | None = None,
 ) -> None:
     """Write the file; equal results give equal bytes.
 
@@ -98,6 +99,9 @@ def write_arrays(
     texture : (h, w, 3) uint8 ndarray, optional
         Of `exports.full_texture`.
     cover : ObjectCover, optional
+        Of the frame.
+    part : FramePart, optional
+        The part of the frame that the maps of `d` are of; by default all of it.
 
     Raises
     ------
@@ -106,15 +110,16 @@ def write_arrays(
     OSError
         If the file cannot be written.
     """
-    factor = finer_by(texture, d.mask)
-    built = built or mesh_of(d, finer=factor)
-    part = built.place
-    fine = part.scaled(factor, d.mask.shape if texture is None else texture.shape)
-    arrays = arrays_of(cut_result(d, part), built)
+    stored = ResultPart.of(d, part)
+    factor = finer_by(texture, stored.part.shape)
+    built = built or mesh_of(d, finer=factor, part=part)
+    place = built.place
+    fine = place.scaled(factor, place.shape if texture is None else texture.shape)
+    arrays = arrays_of(stored.at(place), built)
     if texture is not None:
         arrays["texture"] = fine.cut(texture)
     if cover is not None:
-        arrays |= _cover(cover, part, fine)
+        arrays |= _cover(cover, place, fine)
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 
@@ -125,6 +130,7 @@ def mesh_of(
     cover: ObjectCover | None = None,
     gloss: SpecularFit | None = None,
     finer: float = 1.0,
+    part: FramePart | None = None,
 ) -> MeshResult:
     """Build the mesh of a result, with maps and textures of the object's part of the frame.
 
@@ -133,11 +139,14 @@ def mesh_of(
     d : Decomposition
     options : MeshOptions, optional
     cover : ObjectCover, optional
-        The mesh follows its outline, unless the object is so thin that smoothing would remove it.
+        Of the frame; the mesh follows its outline, unless the object is so thin that smoothing
+        would remove it.
     gloss : SpecularFit, optional
         From another mesh of this result, if it is known.
     finer : float, optional
-        Size of a texture of the frame over the size of the maps.
+        Size of a texture of the frame over the size of the maps' frame.
+    part : FramePart, optional
+        The part of the frame that the maps of `d` are of; by default all of it.
 
     Returns
     -------
@@ -148,30 +157,32 @@ def mesh_of(
     InputError
         If the mask is too small for a mesh.
     """
-    part = _part_of(d.mask, finer)
-    near, edge = cut_result(d, part), None if cover is None else cover.cut(part)
+    stored = ResultPart.of(d, part)
+    place = _part_of(stored.mask, finer)
+    near, edge = stored.at(place), None if cover is None else cover.cut(place)
     with ThreadPoolExecutor(1) as pool:  # half of the work
         found = None if gloss is not None else pool.submit(bounded_specular, near)
         built = _surface_of(near, options, edge)
         fit = gloss if found is None else found.result()
     assert fit is not None
-    return replace(_coated(near, built, fit), part=part)
+    return replace(_coated(near, built, fit), part=place)
 
 
-def finer_by(texture: np.ndarray | None, mask: np.ndarray) -> float:
-    """Return the size of a texture of the frame over the size of the maps.
+def finer_by(texture: np.ndarray | None, shape: tuple[int, ...]) -> float:
+    """Return the size of a texture of the frame over the size of the maps' frame.
 
     Parameters
     ----------
     texture : (h, w, ...) ndarray or None
-    mask : (H, W) ndarray
+    shape : tuple of int
+        Rows and columns of that frame.
 
     Returns
     -------
     float
         1 without a texture.
     """
-    return 1.0 if texture is None else texture.shape[1] / mask.shape[1]
+    return 1.0 if texture is None else texture.shape[1] / shape[1]
 
 
 def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResult:

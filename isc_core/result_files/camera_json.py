@@ -9,6 +9,7 @@ orthographic. The file is not trusted.
 
 from typing import Any
 
+from ..imaging.bounding_box import FramePart
 from ..io.json_files import numbers
 from ..photo.camera import Camera, CameraSource
 from ..scene.decomposition import Decomposition
@@ -17,12 +18,14 @@ from ..shading.perspective import object_axis
 PERSPECTIVE, ORTHOGRAPHIC = "perspective", "orthographic"
 
 
-def camera_to_json(d: Decomposition) -> dict[str, Any]:
+def camera_to_json(d: Decomposition, part: FramePart | None = None) -> dict[str, Any]:
     """Describe the camera of a result.
 
     Parameters
     ----------
     d : Decomposition
+    part : FramePart, optional
+        The part of the frame that the maps of `d` are of; by default all of it.
 
     Returns
     -------
@@ -35,7 +38,7 @@ def camera_to_json(d: Decomposition) -> dict[str, Any]:
         "type": PERSPECTIVE,
         "source": d.camera.source,
         "focal_length": d.camera.focal_length,
-        "principal_point": d.camera.principal_point,
+        "principal_point": d.camera.moved(*(part.corner if part else (0, 0))).principal_point,
         "axis": object_axis(d.camera, d.mask),
     }
 

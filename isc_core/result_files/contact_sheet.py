@@ -19,6 +19,7 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
+from ..imaging.bounding_box import FramePart
 from ..imaging.srgb import srgb_to_linear
 from ..io.atomic import new_file
 from ..scene.decomposition import Decomposition, Separation
@@ -40,12 +41,14 @@ _SHOWN = ("image", "diffuse", "specular", "reflectance", "shading", "normal", "h
 _FULL_ERROR = 0.1  # of the photo's white: errors above it have the full colour
 
 
-def contact_sheet(decomposition: Decomposition) -> Image.Image:
+def contact_sheet(decomposition: Decomposition, part: FramePart | None = None) -> Image.Image:
     """Draw the sheet of a decomposition: twelve panels, 4 x 3, and a title from its provenance.
 
     Parameters
     ----------
     decomposition : Decomposition
+    part : FramePart, optional
+        The part of a frame that its maps are of; the title names the size of the frame.
 
     Returns
     -------
@@ -82,7 +85,8 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
         panels += [relief_panel(d, frame, small), _light_panel(d, light)]
         last = [relit_panel(d, frame, small), _error_panel(d, frame)]
         panels += [*turned.result(), *last]
-    return sheet_of(*_title(d), panels, columns=4)
+    shape = d.mask.shape if part is None else part.shape
+    return sheet_of(*_title(d, shape), panels, columns=4)
 
 
 def _light_panel(d: Decomposition, gain: float) -> Panel:
@@ -326,11 +330,11 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return color, coverage.astype(np.float32)
 
 
-def _title(d: Decomposition) -> tuple[str, str]:
+def _title(d: Decomposition, shape: tuple[int, ...]) -> tuple[str, str]:
     given, settings = d.provenance.input, d.provenance.settings
     diagnostics = d.provenance.diagnostics
     name = PurePath(str(given.get("name", ""))).name or "Decomposition"
-    parts = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
+    parts = [f"{shape[1]} x {shape[0]} px"]
     parts += [
         str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)
     ]

@@ -22,7 +22,7 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
-from ..imaging.bounding_box import mask_slices
+from ..imaging.bounding_box import FramePart, mask_slices
 from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
@@ -36,7 +36,7 @@ from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
-from ..scene.part_of_result import ResultPart, cut_result, placed_result
+from ..scene.part_of_result import ResultPart, placed_result
 from .arrays_file import ARRAYS, finer_by, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
@@ -95,6 +95,7 @@ def save(
     texture: np.ndarray | None = None,
     png: bool = False,
     cover: np.ndarray | None = None,
+    part: FramePart | None = None,
     monitor: Monitor | None = None,
 ) -> None:
     """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
@@ -112,6 +113,9 @@ def save(
         Whether to write the layers as PNG files, too, see `layer_pngs`.
     cover : (H, W) ndarray, optional
         Coverage of the photo's pixels by the object, to write as `mask.png`.
+    part : FramePart, optional
+        The part of the frame that the maps of `decomposition` are of; by default all of it. The
+        files are those of the frame.
     monitor : Monitor, optional
 
     Raises
@@ -124,8 +128,9 @@ def save(
         If a map has NaN or infinite values.
     """
     monitor = monitor or Monitor()
-    part = stored_part(decomposition.mask)
-    stored = cut_result(decomposition, part)
+    given = ResultPart.of(decomposition, part)
+    place = stored_part(given.mask)
+    stored = given.at(place)
     channels = map_channels(stored)
     # The pool is inside the folder's block, so that its files are finished, or have failed, before
     # the folder is removed.
@@ -133,44 +138,44 @@ def save(
         monitor.report("writing maps", 0.0)
         d = decomposition
         (partial / "maps").mkdir()
-        maps = pool.submit(write_maps, stored, channels, part, partial)
-        preview = pool.submit(_write_preview, d, partial / "preview.png")
+        maps = pool.submit(write_maps, stored, channels, place, partial)
+        preview = pool.submit(_write_preview, given, partial / "preview.png")
         if d.mask[mask_slices(d.mask)].size > _MOST_AT_ONCE:
             maps.result()
             release_memory()
         monitor.report("building the mesh", 0.4)
-        edge = object_cover(d, cover)
-        finer = finer_by(texture, d.mask)
-        built = mesh_of(d, mesh, edge, finer=finer)
+        edge = object_cover(d, cover, part)
+        finer = finer_by(texture, place.shape)
+        built = mesh_of(d, mesh, edge, finer=finer, part=part)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
             # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
-            plain = built if edge is None else mesh_of(d, mesh, None, built.gloss, finer)
-            write_arrays(d, partial / ARRAYS, plain, texture, edge)
+            plain = built if edge is None else mesh_of(d, mesh, None, built.gloss, finer, part)
+            write_arrays(d, partial / ARRAYS, plain, texture, edge, part)
         if png:
-            write_layer_pngs(d, partial)
+            write_layer_pngs(placed_result(d, given.part), partial)
         if d.environment is not None:
             write_environment(d.environment, partial)
         if cover is not None:
             (partial / MASK).write_bytes(encoded_mask(cover))
-        _write_description(d, built, partial / "decomposition.json")
+        _write_description(given, built, partial / "decomposition.json")
         monitor.report("drawing the preview", 0.7)
         maps.result()
         preview.result()
         monitor.report("writing maps", 1.0)
 
 
-def _write_preview(decomposition: Decomposition, path: Path) -> None:
-    _write_sheet(contact_sheet(decomposition), path)
+def _write_preview(given: ResultPart, path: Path) -> None:
+    _write_sheet(contact_sheet(given.result, given.part), path)
 
 
 def _write_sheet(sheet: Image.Image, path: Path) -> None:
     path.write_bytes(encode_png(np.asarray(sheet), _PREVIEW_COMPRESSION))
 
 
-def _write_description(decomposition: Decomposition, built: MeshResult, path: Path) -> None:
-    description = _plain(_description(decomposition, built))
+def _write_description(given: ResultPart, built: MeshResult, path: Path) -> None:
+    description = _plain(_description(given, built))
     text = json.dumps(description, indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8")
 
@@ -326,8 +331,8 @@ def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> No
         )
 
 
-def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
-    p = d.provenance
+def _description(given: ResultPart, built: MeshResult) -> dict[str, Any]:
+    d, p = given.result, given.result.provenance
     convention = (
         "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, "
         "x right, y up, z toward the viewer"
@@ -335,7 +340,7 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "illumination": {"coefficients": d.illumination, "convention": convention},
-        "camera": camera_to_json(d),
+        "camera": camera_to_json(d, given.part),
         "brdf": None if d.brdf is None else d.brdf.to_json(),
         "mesh": {
             **built.describe(),

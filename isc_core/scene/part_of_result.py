@@ -44,6 +44,27 @@ class ResultPart:
         """
         return cls(d, part or FramePart.whole((d.mask.shape[0], d.mask.shape[1])))
 
+    @property
+    def mask(self) -> np.ndarray:
+        """The object's pixels in the frame, (H, W) bool."""
+        return self.part.placed(self.result.mask)
+
+    def at(self, part: FramePart) -> Decomposition:
+        """Return the result in another part of the frame.
+
+        Parameters
+        ----------
+        part : FramePart
+            Contains the object.
+
+        Returns
+        -------
+        Decomposition
+            Maps are views if this part contains the other one.
+        """
+        near = cut_result(self.result, part.within(self.part))
+        return placed_result(near, self.part.within(part))
+
 
 def cut_result(d: Decomposition, part: FramePart) -> Decomposition:
     """Return a part of a result.

@@ -80,7 +80,12 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     from isc_core.refinement import GlossOptions, refine_gloss
     from isc_core.refinement.gloss_note import gloss_line
     from isc_core.result_files.mesh.object_cover import read_cover
-    from isc_core.result_files.result_folder import MASK, load, require_writable_result, save
+    from isc_core.result_files.result_folder import (
+        MASK,
+        load_part,
+        require_writable_result,
+        save,
+    )
 
     if options.light:
         from ..scene.variant import load_mitsuba
@@ -89,7 +94,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if os.path.realpath(options.output) == os.path.realpath(options.result):
         raise InputError("the refined result cannot replace its input: choose another folder")
     require_writable_result(options.output, inputs=(options.photo,))
-    start = load(options.result)
+    stored = load_part(options.result)
+    start = stored.result
     if options.photo is not None:
         _require_same(options.photo, start)
     end = 0.5 if options.light else 0.9
@@ -98,7 +104,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.light:
         from ..refine.refine import RefineOptions, refine
 
-        done = refine(result, RefineOptions(seed=options.seed), monitor.part(end, 0.9))
+        how, fitting = RefineOptions(seed=options.seed), monitor.part(end, 0.9)
+        done = refine(result, how, fitting, stored.part)
         result = done.result
         lines.append(
             f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
@@ -106,7 +113,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
             else f"the light was not refined: {_reason(done.before, done.after)}"
         )
     cover = read_cover(options.result / MASK)
-    save(result, options.output, cover=cover, monitor=monitor.part(0.9, 1.0))
+    writing = monitor.part(0.9, 1.0)
+    save(result, options.output, cover=cover, part=stored.part, monitor=writing)
     return [*lines, *hints(options, f"wrote {options.output}")]
 
 

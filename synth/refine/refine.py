@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.imaging.window import as_map
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
@@ -89,7 +90,10 @@ class Refinement:
 
 
 def refine(
-    d: Decomposition, options: RefineOptions | None = None, monitor: Monitor | None = None
+    d: Decomposition,
+    options: RefineOptions | None = None,
+    monitor: Monitor | None = None,
+    part: FramePart | None = None,
 ) -> Refinement:
     """Refine the light of a result.
 
@@ -98,6 +102,9 @@ def refine(
     d : Decomposition
     options : RefineOptions, optional
     monitor : Monitor, optional
+    part : FramePart, optional
+        The part of the frame that the maps of `d` are of; by default all of it. The result is of
+        the same part.
 
     Returns
     -------
@@ -114,7 +121,7 @@ def refine(
     """
     options, monitor = options or RefineOptions(), monitor or Monitor()
     _check(d)
-    scale, surface = working_scale(d), Surface(d)
+    scale, surface = working_scale(d), Surface(d, part)
     points = surface.points_at(scale)
     transport = light_transport(surface, points, options.rows, monitor.part(0, 0.3))
     fit = fit_environment(d, scale, transport, options, monitor.part(0.3, 0.7))

@@ -1,8 +1,8 @@
 """The visible surface of a result, which blocks light and reflects it.
 
 Equation: the points of the mask's pixels, about 2 wide, in triangles. The texture coordinates of a
-point are its place in the maps, so that a ray finds the pixel that it meets. Points that receive
-light start `_LIFT` pixels above the surface.
+point are its place in the frame of the maps, so that a ray finds the pixel that it meets. Points
+that receive light start `_LIFT` pixels above the surface.
 
 Limits: steps of the height become walls, lit by what their pixels show.
 """
@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.refinement.working_scale import WorkingScale
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.part_of_result import ResultPart
 from isc_core.shading.perspective import lifted_points, object_axis
 
 from ..scene.meshes import Mesh
@@ -51,6 +53,8 @@ class Surface:
     ----------
     d : Decomposition
         Its height defines the surface, its normals the shading, its diffuse layer the radiance.
+    part : FramePart, optional
+        The part of the frame that its maps are of; by default all of it.
 
     Raises
     ------
@@ -58,13 +62,14 @@ class Surface:
         If Mitsuba is missing, or the mask has no block of 2 x 2 pixels for a surface.
     """
 
-    def __init__(self, d: Decomposition) -> None:
+    def __init__(self, d: Decomposition, part: FramePart | None = None) -> None:
         self._d = d
-        shape = np.array(d.mask.shape)
+        frame = ResultPart.of(d, part).part
+        self._corner, self._size = np.array(frame.corner), np.array(frame.shape[::-1])
         self._position = _positions(d)
-        place = np.stack(np.nonzero(d.mask)[::-1], axis=1) + 0.5
+        place = np.stack(np.nonzero(d.mask)[::-1], axis=1) + self._corner + 0.5
         self._normal = d.normal[d.mask].astype(float)
-        mesh = Mesh(self._position, self._normal, place / shape[::-1], _triangles(d.mask))
+        mesh = Mesh(self._position, self._normal, place / self._size, _triangles(d.mask))
         self.tracer = Tracer(mesh)
         wide = max(int(np.ptp(where)) for where in np.nonzero(d.mask)) + 1
         self._lift = _LIFT * float(np.ptp(self._position[:, :2], axis=0).max()) / wide
@@ -109,8 +114,8 @@ class Surface:
             The diffuse layer of the pixel that a ray meets, 0 where it meets none or the back.
         """
         d, hits = self._d, self.tracer.hits(origins, directions)
-        size = np.array(d.mask.shape[::-1])
-        column, row = np.clip((hits.uv * size).astype(int), 0, size - 1).T
+        pixel = (hits.uv * self._size).astype(int) - self._corner
+        column, row = np.clip(pixel, 0, np.array(d.mask.shape[::-1]) - 1).T
         seen = hits.valid & hits.front & d.mask[row, column]
         return np.where(seen[:, None], d.diffuse[row, column], 0)
 

@@ -1,7 +1,7 @@
 """The refinement of a light: transport, gradients, held-out blocks, identities and the command."""
 
 import argparse
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -11,12 +11,15 @@ import pytest
 pytest.importorskip("mitsuba")
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.progress import Monitor
 from isc_core.refinement.held_out import held_out_blocks
 from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.refinement.working_scale import working_scale
-from isc_core.result_files.result_folder import load, save
+from isc_core.result_files import maps_file
+from isc_core.result_files.result_folder import load, load_part, save
 from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.scene.part_of_result import placed_result
 from isc_core.shading.environment_map import environment_from_shading, shading_under
 from isc_core.shading.spherical_harmonics import real_sh
 from isc_core.sirfs.priors.prior_file import shipped_priors
@@ -29,6 +32,7 @@ from synth.refine.refine import RefineOptions, refine
 from synth.refine.surface import Surface
 from synth.refine.transport import light_transport, transport_of
 from synth.scene.variant import load_mitsuba
+from tests.core.refinement.test_gloss import glossy
 
 LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
@@ -220,6 +224,31 @@ def test_the_command_writes_the_same_bytes_again(tmp_path: Path) -> None:
     assert note["variant"] == load_mitsuba().variant()
     kept = [(tmp_path / name / "mask.png").read_bytes() for name in ("start", "first")]
     assert kept[0] == kept[1], "the soft mask goes along"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("light", [False, True])
+def test_the_files_are_those_of_the_whole_frame(tmp_path: Path, light: bool) -> None:
+    """Results of large frames store, and the refinement reads, the object's part."""
+    near = contrasted(dome(96)) if light else glossy(96)
+    start = placed_result(near, FramePart(slice(50, 146), slice(200, 296), (250, 400)))
+    save(start, tmp_path / "whole")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(maps_file, "_LEAST_PIXELS", 100)
+        save(start, tmp_path / "part")
+        output, words = str(tmp_path / "part_out"), ["--light"] * light
+        assert not load_part(tmp_path / "part").part.is_whole
+        lines = command([str(tmp_path / "part"), *words, "-o", output])
+    assert "was refined" in lines[1] if light else "gloss refined" in lines[0]
+    assert command([str(tmp_path / "whole"), *words, "-o", str(tmp_path / "out")])[:1] == lines[:1]
+    found, wanted = load(tmp_path / "part_out"), load(tmp_path / "out")
+    for field in fields(wanted):
+        values = getattr(wanted, field.name)
+        if isinstance(values, np.ndarray):
+            assert np.array_equal(getattr(found, field.name), values), field.name
+    for name in ("decomposition.json", "mesh.glb", "preview.png"):
+        one, other = ((tmp_path / of / name).read_bytes() for of in ("part_out", "out"))
+        assert one == other, name
 
 
 def test_gloss_needs_no_renderer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

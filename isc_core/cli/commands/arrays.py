@@ -10,7 +10,7 @@ from ...progress import Monitor
 from ...result_files.arrays_file import ARRAYS, mesh_of, write_arrays
 from ...result_files.mesh.object_cover import object_cover, read_cover
 from ...result_files.mesh.options import MeshOptions
-from ...result_files.result_folder import MASK, load
+from ...result_files.result_folder import MASK, load_part
 from ..interface.options import add_triangles
 from ..interface.parser import describe, hints
 
@@ -53,12 +53,13 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         Lines to print.
     """
     monitor.report("reading", 0.0)
-    result, path = load(options.result), options.result / ARRAYS
-    cover = object_cover(result, read_cover(options.result / MASK))
+    stored, path = load_part(options.result), options.result / ARRAYS
+    result, part = stored.result, stored.part
+    cover = object_cover(result, read_cover(options.result / MASK), part)
     require_writable_file(path)
     monitor.report("writing arrays", 0.3)
     with new_file(path) as partial:
-        built = mesh_of(result, MeshOptions(triangles=options.triangles))
-        write_arrays(result, partial, built, cover=cover)
+        built = mesh_of(result, MeshOptions(triangles=options.triangles), part=part)
+        write_arrays(result, partial, built, cover=cover, part=part)
         monitor.report("writing arrays", 1.0)
     return hints(options, f"wrote {path}")

@@ -19,10 +19,10 @@ from ...result_files.exports.texture_set import texture_files, write_texture_set
 from ...result_files.exports.usd import require_usd
 from ...result_files.mesh.object_cover import object_cover, read_cover
 from ...result_files.mesh.options import MeshOptions
-from ...result_files.result_folder import MASK, load
+from ...result_files.result_folder import MASK, load_part
 from ...result_files.solids.back import Back
 from ...scene.decomposition import Decomposition
-from ...scene.part_of_result import cut_result
+from ...scene.part_of_result import placed_result
 from ..interface.options import add_limits, add_triangles, limits_of
 from ..interface.parser import describe, hints
 from ..interface.result_photo import photo_of_result
@@ -131,21 +131,22 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         if options.format == "usd":
             require_usd(output)
     monitor.report("reading", 0.0)
-    d = load(options.result)
+    stored = load_part(options.result)
+    d, part = stored.result, stored.part
     name = safe_name(options.name or _name_of(d, options.result))
     if options.textures is not None:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
-    cover = object_cover(d, read_cover(options.result / MASK))
+    cover = object_cover(d, read_cover(options.result / MASK), part)
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
     # Texture sets are for the plane of the photo, whose mesh has its vertices at pixels.
     fine = options.photo is not None and options.texture_size != MAPS_SIZE
-    texture = _fine_texture(d, options) if fine else None
-    factor = finer_by(texture, d.mask)
-    built = mesh_of(d, how, None if options.format is None else cover, finer=factor)
+    texture = _fine_texture(placed_result(d, part), options) if fine else None
+    factor = finer_by(texture, part.shape)
+    edge = None if options.format is None else cover
+    built = mesh_of(d, how, edge, finer=factor, part=part)
     if texture is not None:
-        near = built.place.scaled(factor, texture.shape)
-        built = replace(built, texture=near.cut(texture))
+        built = replace(built, texture=built.place.scaled(factor, texture.shape).cut(texture))
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
         built = replace(built, gloss=replace(built.gloss, **given))
@@ -153,11 +154,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.format is not None:
         files = write_mesh_file(built, output, options.format)
         return hints(options, f"wrote {', '.join(map(str, files))}")
-    writing = monitor.part(0.4, 1.0)
+    writing, near = monitor.part(0.4, 1.0), stored.at(built.place)
     write_texture_set(
-        cut_result(d, built.place),
+        near,
         built,
-        built.place.cut(d.mask.astype(np.float32) if cover is None else cover.share),
+        near.mask.astype(np.float32) if cover is None else built.place.cut(cover.share),
         options.textures,
         output,
         name=name,

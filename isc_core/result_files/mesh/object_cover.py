@@ -23,10 +23,12 @@ from scipy import ndimage
 
 from ...imaging.area_resize import AreaFilter, reduced_count
 from ...imaging.bounding_box import FramePart
+from ...imaging.row_blocks import row_blocks
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
-from ...photo.soft_rim import soft_rim
+from ...photo.soft_rim import rim_reach, soft_rim
 from ...scene.decomposition import Decomposition
+from ...scene.part_of_result import ResultPart
 
 _NEAR = 2  # pixels
 _SOME = 0.02  # of a pixel: less is ignored
@@ -118,7 +120,9 @@ def read_cover(mask_file: Path) -> np.ndarray | None:
     return values.astype(np.float32) / np.iinfo(raster.values.dtype).max
 
 
-def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | None:
+def object_cover(
+    d: Decomposition, given: np.ndarray | None, part: FramePart | None = None
+) -> ObjectCover | None:
     """Return the object's coverage of the maps' pixels.
 
     Parameters
@@ -126,29 +130,53 @@ def object_cover(d: Decomposition, given: np.ndarray | None) -> ObjectCover | No
     d : Decomposition
     given : (h, w) ndarray or None
         Coverage of the photo's pixels, 0 to 1.
+    part : FramePart, optional
+        The part of the frame that the maps of `d` are of; by default all of it.
 
     Returns
     -------
     ObjectCover or None
-        None if only the mask is known.
+        Of the frame; None if only the mask is known.
     """
     if given is None:
         return None
-    codes = np.rint(255 * np.clip(given, 0, 1)).astype(np.uint8)
+    codes = _codes(given)
     if not ((codes > 0) & (codes < 255)).any():
         return None
     scale = min(1.0, float(d.provenance.input.get("scale", 1.0)))
-    rows, columns = (reduced_count(count, scale) for count in codes.shape)
-    if (rows, columns) != d.mask.shape:  # of another photo
+    mask = ResultPart.of(d, part).mask
+    shape = (mask.shape[0], mask.shape[1])
+    if shape != tuple(reduced_count(count, scale) for count in codes.shape):  # of another photo
         return None
-    share = _resized(codes, scale, (rows, columns))
-    near = ndimage.binary_dilation(d.mask, iterations=_NEAR)
-    way = near | ((share > _SOME) & (share < 0.5))
-    share[~ndimage.binary_propagation(d.mask, mask=way)] = 0
     own = d.provenance.input.get("mask_from") == "alpha"
-    soft = soft_rim(share, d.mask, own)
+    if scale < 1:
+        share = _resized(codes, scale, shape)
+        place = FramePart.around(mask | (share > 0), rim_reach(mask, own))
+        share = place.cut(share)
+    else:
+        place = FramePart.around(mask | (codes > 0), rim_reach(mask, own))
+        share = _resized(place.cut(codes), 1.0, place.size)
+    share, soft = _near(share, place.cut(mask), own)
+    whole = None if soft is None else place.placed(soft)
+    return ObjectCover(place.placed(share), whole, codes, scale)
+
+
+def _codes(cover: np.ndarray) -> np.ndarray:
+    """A coverage (h, w) from 0 to 1 as codes."""
+    codes = np.empty(cover.shape, np.uint8)
+    for block in row_blocks(cover.shape):
+        codes[block.rows] = np.rint(255 * np.clip(cover[block.rows], 0, 1))
+    return codes
+
+
+def _near(share: np.ndarray, mask: np.ndarray, own: bool) -> tuple[np.ndarray, np.ndarray | None]:
+    """The coverage of the object alone, and where its rim is soft."""
+    near = ndimage.binary_dilation(mask, iterations=_NEAR)
+    way = near | ((share > _SOME) & (share < 0.5))
+    share[~ndimage.binary_propagation(mask, mask=way)] = 0
+    soft = soft_rim(share, mask, own)
     share[~near if soft is None else ~(near | soft)] = 0
-    return ObjectCover(share, soft, codes, scale)
+    return share, soft
 
 
 def _resized(

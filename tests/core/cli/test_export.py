@@ -13,10 +13,12 @@ from PIL import Image
 from isc_core.cli.main import main
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.photo.camera import Camera
+from isc_core.result_files import maps_file
+from isc_core.result_files.arrays_file import ARRAYS
 from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.object_cover import read_cover
 from isc_core.result_files.mesh.options import MeshOptions
-from isc_core.result_files.result_folder import load, save
+from isc_core.result_files.result_folder import load, load_part, save
 from isc_core.result_files.solids.back import Back
 from isc_core.scene.decomposition import COLOR_MAPS
 from tests.core.ball_scene import ball
@@ -334,3 +336,38 @@ def test_from_a_photo_with_hair_to_a_mesh_that_fades(tmp_path: Path) -> None:
     path = tmp_path / "hair.glb"
     assert exported(tmp_path / "hair", "--format", "glb", "--back", "rounded", "-o", path) == 0
     assert [one.get("alphaMode") for one in material_of(path)[0]] == [None, "BLEND"]
+
+
+@pytest.mark.slow
+def test_files_of_the_object_s_part_are_those_of_the_whole_frame(tmp_path: Path) -> None:
+    """Results of large frames store, and exports read, the object's part."""
+    d = ball((400, 500), 20.0, (60.0, 85.0))
+    cover = np.clip(0.5 + 0.99 * 20 - np.hypot(*(np.indices(d.mask.shape).T - (60, 85)).T), 0, 1)
+    save(d, tmp_path / "whole", cover=cover)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(maps_file, "_LEAST_PIXELS", 100)
+        save(d, tmp_path / "part", cover=cover)
+    for name in ("part", "whole"):
+        assert load_part(tmp_path / name).part.is_whole == (name == "whole")
+        assert exported(tmp_path / name, "--format", "glb", "-o", tmp_path / f"{name}.glb") == 0
+        textures = [
+            "--textures",
+            "generic",
+            "--name",
+            "x",
+            "--roughness",
+            0.5,
+            "-o",
+            tmp_path / f"{name}_textures",
+        ]
+        assert exported(tmp_path / name, *textures) == 0
+        assert main(["arrays", str(tmp_path / name)]) == 0
+    pairs = [(tmp_path / f"{name}.glb") for name in ("part", "whole")]
+    assert pairs[0].read_bytes() == pairs[1].read_bytes()
+    pairs = [(tmp_path / name / ARRAYS) for name in ("part", "whole")]
+    assert pairs[0].read_bytes() == pairs[1].read_bytes()
+    files = sorted(path.name for path in (tmp_path / "whole_textures").iterdir())
+    assert len(files) > 3
+    for file in files:
+        one, other = (tmp_path / f"{name}_textures" / file for name in ("part", "whole"))
+        assert one.read_bytes() == other.read_bytes(), file

@@ -12,6 +12,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
 from isc_core.io.exr import read_windowed, write_channels
 from isc_core.photo.camera import Camera
+from isc_core.result_files.arrays_file import ARRAYS
 from isc_core.result_files.maps_file import (
     EXPECTED_ERROR,
     MAPS,
@@ -23,7 +24,7 @@ from isc_core.result_files.maps_file import (
 from isc_core.result_files.result_folder import load, load_part, save, save_separation
 from isc_core.scene.decomposition import Decomposition, Separation
 from isc_core.scene.expected_error import ExpectedError
-from isc_core.scene.part_of_result import cut_result, placed_result
+from isc_core.scene.part_of_result import ResultPart, cut_result, placed_result
 from tests.core.ball_scene import ball
 
 FRAME = (1500, 1600)
@@ -96,6 +97,43 @@ def test_the_part_alone_can_be_read(tmp_path: Path) -> None:
     assert_equal(found.result, cut_result(d, found.part))
     assert found.result.camera == cut_result(d, found.part).camera
     assert load(tmp_path / "ball").camera == d.camera
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("before_camera", [False, True])
+def test_the_files_of_a_part_are_those_of_its_frame(tmp_path: Path, before_camera: bool) -> None:
+    """Also with a soft rim, whose coverage extends beyond the part."""
+    d = in_a_large_frame()
+    given = {**d.provenance.input, "scale": 1.0, "mask_from": "alpha"}
+    d = replace(d, provenance=replace(d.provenance, input=given))
+    if before_camera:
+        d = replace(d, camera=Camera(900.3, (800.25, 750.0)))
+    row, column = np.indices(FRAME)
+    away = np.hypot(row - 722, column - 1133) - 0.99 * 20
+    cover = np.clip(0.5 - away / np.where(column > 1133, 14, 1), 0, 1)
+    cover[:50, :50] = 0.5  # another thing
+    part = FramePart(slice(690, 750), slice(1090, 1170), FRAME)
+    save(d, tmp_path / "whole", cover=cover, arrays=True, png=True)
+    near = cut_result(d, part)
+    save(near, tmp_path / "part", cover=cover, arrays=True, png=True, part=part)
+    files = [path.relative_to(tmp_path / "whole") for path in (tmp_path / "whole").rglob("*.*")]
+    assert len(files) > 15 and Path(ARRAYS) in files
+    with np.load(tmp_path / "part" / ARRAYS) as arrays:
+        assert arrays["soft"].any()
+    for name in files:
+        part_file, whole_file = (tmp_path / of / name for of in ("part", "whole"))
+        assert part_file.read_bytes() == whole_file.read_bytes(), name
+
+
+@pytest.mark.parametrize("margin", [1, 200])
+def test_a_part_can_be_seen_in_any_other_part(margin: int) -> None:
+    d = in_a_large_frame()
+    stored = ResultPart(cut_result(d, PLACE), PLACE)
+    part = FramePart.around(d.mask, margin)
+    assert part.within(PLACE).is_whole == (margin == 200)
+    assert_equal(stored.at(part), cut_result(d, part))
+    assert_equal(stored.at(FramePart.whole(FRAME)), d)
+    assert np.array_equal(stored.mask, d.mask)
 
 
 def test_files_that_store_the_whole_frame_are_read_too(saved: Path, tmp_path: Path) -> None:
