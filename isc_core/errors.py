@@ -16,7 +16,15 @@ class InputError(ValueError):
 
 
 class Cancelled(Exception):
-    """The user cancelled. The command line exits with 130; no file is left incomplete."""
+    """The user cancelled. The command line exits with 130; no file is left incomplete.
+
+    Attributes
+    ----------
+    hint : str
+        How the user can go on; may be empty.
+    """
+
+    hint: str = ""
 
 
 class Rejected(Exception):

@@ -59,7 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Rejected as rejection:
         reporter.rejected(str(rejection).splitlines(), REJECTED, rejection.lines)
         return REJECTED
-    except (Cancelled, KeyboardInterrupt):
+    except Cancelled as cancellation:
+        reporter.cancelled(cancellation.hint)
+        return CANCELLED
+    except KeyboardInterrupt:
         reporter.cancelled()
         return CANCELLED
     except BrokenPipeError:

@@ -25,6 +25,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -38,6 +39,16 @@ SUFFIX = ".npz"  # of the files in the folder; the Blender add-on limits their s
 _CHECK = "sha256"
 _PACKAGE = Path(__file__).resolve().parents[1]
 Arrays = Mapping[str, np.ndarray]
+
+
+class KeptStages(Protocol):
+    """Where results of stages are kept."""
+
+    def arrays(
+        self, stage: str, inputs: Sequence[np.ndarray], compute: Callable[[], Arrays]
+    ) -> Arrays:
+        """Return the result of a stage, computed unless it is kept, see `StageCache.arrays`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -109,8 +120,6 @@ def _check(key: bytes, arrays: Arrays) -> np.ndarray:
 
 def _read(place: Path, key: bytes) -> Arrays | None:
     """The arrays of a file, if it is intact and belongs to the key."""
-    if not place.is_file():
-        return None
     try:
         arrays = read_arrays(place)
     except InputError:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from ..io.stage_cache import Arrays, KeptStages
 from ..lobe_fitting.specular_level import lamp_shading
 from ..lobe_fitting.starts import light_of_half_vector
 from ..numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
@@ -159,14 +160,67 @@ def bumps_of(work: WorkingScale, step: int = 1) -> HeightBumps:
     return HeightBumps.spaced((height, width), spacings, _SLOPES, step)
 
 
-def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -> Gloss:
+@dataclass(frozen=True)
+class Minimiser:
+    """Minimises F, or takes the minimum from an earlier run.
+
+    Attributes
+    ----------
+    steps : int
+        Maximum number for each start.
+    kept : KeptStages or None
+        Results of earlier runs, to which those of this one are added.
+    inputs : tuple of ndarray
+        All that a minimum depends on, besides the start and which pixels are fitted.
+    """
+
+    steps: int
+    kept: KeptStages | None = None
+    inputs: tuple[np.ndarray, ...] = ()
+
+    def __call__(self, objective: GlossObjective, x: np.ndarray, monitor: Monitor) -> float:
+        """Minimise F in place.
+
+        Parameters
+        ----------
+        objective : GlossObjective
+        x : (M,) ndarray
+            Changed in place.
+        monitor : Monitor
+
+        Returns
+        -------
+        float
+            The loss.
+        """
+
+        def each(step: int, loss: float) -> None:
+            fraction = min(step / self.steps, 1.0)
+            monitor.report("refining the gloss", fraction, f"loss {loss:.1f}")
+
+        def compute() -> Arrays:
+            limits = LbfgsOptions(iterations=self.steps, loss_tolerance=1e-4)
+            found = x.copy()
+            loss = minimise(objective, found, limits, NumpyAlgebra(), each).loss
+            return {"x": found, "loss": np.array(loss)}
+
+        inputs = (*self.inputs, np.array(self.steps), objective.weight, x)
+        found = (
+            compute() if self.kept is None else self.kept.arrays("gloss minimum", inputs, compute)
+        )
+        x[:] = found["x"]
+        return float(found["loss"])
+
+
+def fit_gloss(problem: GlossProblem, lamps: int, minimised: Minimiser, monitor: Monitor) -> Gloss:
     """Fit a gloss to the pixels that are not held out.
 
     Parameters
     ----------
     problem : GlossProblem
-    lamps, steps : int
-        Maximum numbers.
+    lamps : int
+        Maximum number.
+    minimised : Minimiser
     monitor : Monitor
 
     Returns
@@ -183,7 +237,7 @@ def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -
     for k, direction in enumerate([data.direction, *_spots(data.specular, work, _SPOTS)]):
         x = _start(problem, direction)
         part = monitor.part(0.2 * k, 0.2 * (k + 1))
-        starts.append((minimised(objective, x, steps, part), x))
+        starts.append((minimised(objective, x, part), x))
     loss, x = min(starts, key=lambda one: one[0])
     for count in range(2, lamps + 1):
         gloss = problem.unpacked(x)
@@ -198,36 +252,11 @@ def fit_gloss(problem: GlossProblem, lamps: int, steps: int, monitor: Monitor) -
             log_strengths=np.append(gloss.log_strengths, gloss.log_strengths.max() - 1),
         ).packed()
         part = monitor.part(0.6 + 0.2 * (count - 2), 0.6 + 0.2 * (count - 1))
-        lower = minimised(objective, found, steps, part)
+        lower = minimised(objective, found, part)
         if lower > loss - _LAMP_UNKNOWNS:
             break
         loss, x = lower, found
     return problem.unpacked(x)
-
-
-def minimised(objective: GlossObjective, x: np.ndarray, steps: int, monitor: Monitor) -> float:
-    """Minimise F in place.
-
-    Parameters
-    ----------
-    objective : GlossObjective
-    x : (M,) ndarray
-        Changed in place.
-    steps : int
-        Maximum number.
-    monitor : Monitor
-
-    Returns
-    -------
-    float
-        The loss.
-    """
-
-    def each(step: int, loss: float) -> None:
-        monitor.report("refining the gloss", min(step / steps, 1.0), f"loss {loss:.1f}")
-
-    limits = LbfgsOptions(iterations=steps, loss_tolerance=1e-4)
-    return minimise(objective, x, limits, NumpyAlgebra(), each).loss
 
 
 def explained(problem: GlossProblem, gloss: Gloss, start: np.ndarray) -> tuple[float, float]:

@@ -238,6 +238,11 @@ class GlossObjective:
         self._size = 0 if bumps is None else bumps.size
         self._sigma = np.sqrt((_FLOOR * data.peak) ** 2 + (_RELATIVE * data.specular) ** 2)
 
+    @property
+    def weight(self) -> np.ndarray:
+        """Weights (N,) of the pixels."""
+        return self._data.weight
+
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         gloss = Gloss.unpacked(x, self._size)
         normal = normals_from_slopes(*self._slopes(gloss.bumps))[self._data.mask]

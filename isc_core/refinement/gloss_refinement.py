@@ -25,13 +25,15 @@ import numpy as np
 from ..decomposition.lobe import FittedLobe
 from ..errors import InputError
 from ..imaging.bounding_box import FramePart
+from ..io.stage_cache import KeptStages
 from ..numerics.linear import solve_linear
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
 from ..scene.part_of_result import cut_result, placed_result
+from ..scene.result_digest import result_digest
 from ..shading.spherical_harmonics import real_sh
-from .gloss_fit import GlossProblem, bumps_of, explained, fit_gloss, gloss_problem, minimised
+from .gloss_fit import GlossProblem, Minimiser, bumps_of, explained, fit_gloss, gloss_problem
 from .gloss_note import NOTE, GlossOutcome, was_refined
 from .gloss_objective import (
     ROUGHNESS_SPREAD,
@@ -109,7 +111,10 @@ class GlossRefinement:
 
 
 def refine_gloss(
-    d: Decomposition, options: GlossOptions | None = None, monitor: Monitor | None = None
+    d: Decomposition,
+    options: GlossOptions | None = None,
+    monitor: Monitor | None = None,
+    kept: KeptStages | None = None,
 ) -> GlossRefinement:
     """Refine the gloss of a result.
 
@@ -118,6 +123,9 @@ def refine_gloss(
     d : Decomposition
     options : GlossOptions, optional
     monitor : Monitor, optional
+    kept : KeptStages, optional
+        Minima that an earlier run found, to which those of this one are added. They change the time
+        only.
 
     Returns
     -------
@@ -136,20 +144,24 @@ def refine_gloss(
     _check(d)
     monitor.report("refining the gloss", 0.0)
     part = FramePart.around(d.mask, _MARGIN)
-    done = _refinement(cut_result(d, part), options, monitor)
+    done = _refinement(cut_result(d, part), options, monitor, kept)
     if not done.kept:
         return replace(done, result=replace(d, provenance=done.result.provenance))
     return replace(done, result=placed_result(done.result, part))
 
 
-def _refinement(d: Decomposition, options: GlossOptions, monitor: Monitor) -> GlossRefinement:
+def _refinement(
+    d: Decomposition, options: GlossOptions, monitor: Monitor, kept: KeptStages | None
+) -> GlossRefinement:
     """The refinement of the object's part of a result."""
     fit = d.brdf
     if fit is None or fit.alpha is None or not fit.lights or not d.specular[d.mask].any():
         return _with_note(GlossRefinement(d, GlossOutcome.NO_HIGHLIGHT), options)
     work = working_scale(d)
     problem = gloss_problem(d, fit, work, options.seed)
-    gloss = fit_gloss(problem, options.lamps, options.steps, monitor.part(0.0, 0.7))
+    inputs = () if kept is None else (result_digest(d),)
+    minimised = Minimiser(options.steps, kept, inputs)
+    gloss = fit_gloss(problem, options.lamps, minimised, monitor.part(0.0, 0.7))
     start = work.reduced(fit.predicted.mean(axis=2), d.mask)[work.mask]
     before, after = explained(problem, gloss, start)
     done = GlossRefinement(d, GlossOutcome.NOT_BETTER, len(gloss.units), before, after)
@@ -158,7 +170,7 @@ def _refinement(d: Decomposition, options: GlossOptions, monitor: Monitor) -> Gl
     if not _allowed(d, problem, gloss, _Reflectance.of(d, work)):
         return _with_note(replace(done, outcome=GlossOutcome.UNLIKELY_REFLECTANCE), options)
     x = gloss.packed()
-    minimised(GlossObjective(problem.data, problem.bumps), x, options.steps, monitor.part(0.7, 1))
+    minimised(GlossObjective(problem.data, problem.bumps), x, monitor.part(0.7, 1))
     result = _refined(d, fit, problem, problem.unpacked(x))
     return _with_note(replace(done, result=result, outcome=GlossOutcome.REFINED), options)
 

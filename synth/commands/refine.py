@@ -8,8 +8,10 @@ from pathlib import Path
 from isc_core.cli.interface.parser import describe, hints
 from isc_core.cli.interface.values import count
 from isc_core.errors import InputError
+from isc_core.io.stage_cache import KeptStages
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.part_of_result import ResultPart
 
 _EXAMPLES = """  isc refine cup -o cup_refined
   isc refine cup --photo cup.jpg -o cup_refined
@@ -77,8 +79,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Cancelled
         If the user cancels.
     """
-    from isc_core.refinement import GlossOptions, refine_gloss
-    from isc_core.refinement.gloss_note import gloss_line
+    from isc_core.io.checkpoint import Checkpoint
     from isc_core.result_files.mesh.object_cover import read_cover
     from isc_core.result_files.result_folder import (
         MASK,
@@ -95,27 +96,40 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         raise InputError("the refined result cannot replace its input: choose another folder")
     require_writable_result(options.output, inputs=(options.photo,))
     stored = load_part(options.result)
-    start = stored.result
     if options.photo is not None:
-        _require_same(options.photo, start)
-    end = 0.5 if options.light else 0.9
-    gloss = refine_gloss(start, GlossOptions(seed=options.seed), monitor.part(0, end))
-    result, lines = gloss.result, [gloss_line(gloss.result.provenance.settings)]
+        _require_same(options.photo, stored.result)
+    with Checkpoint(options.output) as checkpoint:
+        result, lines = _refined(stored, options, checkpoint, monitor.part(0, 0.9))
+        cover = read_cover(options.result / MASK)
+        writing = monitor.part(0.9, 1.0)
+        save(result, options.output, cover=cover, part=stored.part, monitor=writing)
+        checkpoint.remove()
+    return [*lines, *hints(options, *checkpoint.notes(), f"wrote {options.output}")]
+
+
+def _refined(
+    stored: ResultPart, options: argparse.Namespace, kept: KeptStages, monitor: Monitor
+) -> tuple[Decomposition, list[str]]:
+    """The refined result, and lines about the gloss and the light."""
+    from isc_core.refinement import GlossOptions, refine_gloss
+    from isc_core.refinement.gloss_note import gloss_line
+
+    end = 0.55 if options.light else 1.0
+    how = GlossOptions(seed=options.seed)
+    result = refine_gloss(stored.result, how, monitor.part(0, end), kept).result
+    lines = [gloss_line(result.provenance.settings)]
     if options.light:
         from ..refine.refine import RefineOptions, refine
 
-        how, fitting = RefineOptions(seed=options.seed), monitor.part(end, 0.9)
-        done = refine(result, how, fitting, stored.part)
+        fitting = monitor.part(end, 1.0)
+        done = refine(result, RefineOptions(seed=options.seed), fitting, stored.part, kept)
         result = done.result
         lines.append(
             f"the light was refined: objective {done.before:.3f} -> {done.after:.3f}"
             if done.kept
             else f"the light was not refined: {_reason(done.before, done.after)}"
         )
-    cover = read_cover(options.result / MASK)
-    writing = monitor.part(0.9, 1.0)
-    save(result, options.output, cover=cover, part=stored.part, monitor=writing)
-    return [*lines, *hints(options, f"wrote {options.output}")]
+    return result, lines
 
 
 def _reason(before: float, after: float) -> str:

@@ -9,6 +9,7 @@ Limits: see the package.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
 from isc_core.imaging.window import as_map
+from isc_core.io.stage_cache import Arrays, KeptStages
 from isc_core.numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from isc_core.progress import Monitor
 from isc_core.refinement.held_out import held_out_blocks, pixels_of
@@ -28,6 +30,7 @@ from isc_core.shading.spherical_harmonics import real_sh
 from ..capture.truth import fit_light
 from ..scene.variant import load_mitsuba
 from .held_out import BLOCK, EVERY, explains_better
+from .kept_light import KeptLight
 from .light_field import LightField
 from .light_objective import LightObjective, shading_of
 from .surface import Surface
@@ -94,6 +97,7 @@ def refine(
     options: RefineOptions | None = None,
     monitor: Monitor | None = None,
     part: FramePart | None = None,
+    kept: KeptStages | None = None,
 ) -> Refinement:
     """Refine the light of a result.
 
@@ -105,6 +109,9 @@ def refine(
     part : FramePart, optional
         The part of the frame that the maps of `d` are of; by default all of it. The result is of
         the same part.
+    kept : KeptStages, optional
+        What an earlier run has traced, fitted and rendered, to which the stages of this one are
+        added. They change the time only.
 
     Returns
     -------
@@ -122,20 +129,26 @@ def refine(
     options, monitor = options or RefineOptions(), monitor or Monitor()
     _check(d)
     scale, surface = working_scale(d), Surface(d, part)
-    points = surface.points_at(scale)
-    transport = light_transport(surface, points, options.rows, monitor.part(0, 0.3))
-    fit = fit_environment(d, scale, transport, options, monitor.part(0.3, 0.7))
-    kept = fit.after < fit.before and fit.explains_better
+    points, stages = surface.points_at(scale), KeptLight.of(d, (options, part), kept)
+
+    def traced() -> Arrays:
+        return light_transport(surface, points, options.rows, monitor.part(0, 0.3)).traced()
+
+    transport = Transport.restored(points, options.rows, stages("transport", traced))
+    fit = fit_environment(d, scale, transport, options, monitor.part(0.3, 0.7), stages)
+    improves = fit.after < fit.before and fit.explains_better
     note = {
-        "kept": kept,
+        "kept": improves,
         "before": fit.before,
         "after": fit.after,
         "variant": str(load_mitsuba().variant()),
         **options.__dict__,
     }
     of_pixels = transport if scale.step == 1 else None  # the points of the scale are the pixels
-    result = _refined(d, surface, fit.radiance, of_pixels, monitor.part(0.7, 1.0)) if kept else d
-    return Refinement(_noted(result, note), kept, fit.before, fit.after)
+    result, rendering = d, monitor.part(0.7, 1.0)
+    if improves:
+        result = _refined(d, surface, fit.radiance, of_pixels, rendering, stages)
+    return Refinement(_noted(result, note), improves, fit.before, fit.after)
 
 
 @dataclass(frozen=True)
@@ -166,6 +179,7 @@ def fit_environment(
     transport: Transport,
     options: RefineOptions,
     monitor: Monitor,
+    stages: KeptLight | None = None,
 ) -> EnvironmentFit:
     """Fit an environment to the reflectance terms, better than the start or not.
 
@@ -178,6 +192,8 @@ def fit_environment(
         To the points of that scale.
     options : RefineOptions
     monitor : Monitor
+    stages : KeptLight, optional
+        Of an earlier run.
 
     Returns
     -------
@@ -197,20 +213,27 @@ def fit_environment(
     weight = (mask & ~pixels_of(blocks, BLOCK, mask.shape)).astype(float)
     direct, indirect = gain * transport.shadowed, gain * transport.indirect
     objective = LightObjective(terms, field, direct, indirect, weight, options.strictness)
-    x, old = np.zeros(field.size), gain * scale.shading[mask]
+    old = gain * scale.shading[mask]
 
     def each(step: int, loss: float) -> None:
         monitor.report("fitting the light", min(step / options.steps, 1.0), f"loss {loss:.3f}")
 
-    limits = LbfgsOptions(iterations=options.steps, loss_tolerance=1e-4)
-    after = minimise(objective, x, limits, NumpyAlgebra(), each).loss
-    radiance = field.radiance(x)
+    def minimum() -> Arrays:
+        x, limits = (
+            np.zeros(field.size),
+            LbfgsOptions(iterations=options.steps, loss_tolerance=1e-4),
+        )
+        loss = minimise(objective, x, limits, NumpyAlgebra(), each).loss
+        return {"x": x, "loss": np.array(loss)}
+
+    found = (stages or KeptLight())("fit", minimum)
+    radiance = field.radiance(found["x"])
     shading = shading_of(transport.shadowed, radiance, transport.indirect)
     return EnvironmentFit(
         radiance,
         shading,
         terms.cost(old, weight)[0],
-        after,
+        float(found["loss"]),
         explains_better(terms, blocks, old, gain * shading),
     )
 
@@ -228,21 +251,29 @@ def _refined(
     radiance: np.ndarray,
     transport: Transport | None,
     monitor: Monitor,
+    stages: KeptLight,
 ) -> Decomposition:
     """The result under a new light; `transport`: to its pixels, None if it is to be traced."""
     rows = int(np.sqrt(len(radiance) / 2))
     points, parts = surface.points(), []
-    for first in range(0, len(points), _PIXELS):
-        part = slice(first, first + _PIXELS)
-        monitor.report("rendering the light", first / len(points))
+
+    def rendered(part: slice) -> Arrays:
         found = (
             light_transport(surface, points[part], rows) if transport is None else transport[part]
         )
         open_sky, direct = (
             np.einsum("nj,jc->nc", each, radiance) for each in (found.unshadowed, found.shadowed)
         )
-        parts.append((open_sky, direct, found.indirect))
-    open_sky, direct, indirect = (np.concatenate(each) for each in zip(*parts, strict=True))
+        return {"open_sky": open_sky, "direct": direct, "indirect": found.indirect}
+
+    for first in range(0, len(points), _PIXELS):
+        part = slice(first, first + _PIXELS)
+        monitor.report("rendering the light", first / len(points))
+        parts.append(stages(f"pixels from {first}", partial(rendered, part)))
+    open_sky, direct, indirect = (
+        np.concatenate([found[name] for found in parts])
+        for name in ("open_sky", "direct", "indirect")
+    )
     direct = np.maximum(direct, 1e-3 * direct.mean())
     normal = points.normal
     illumination, _ = fit_light(normal, np.maximum(open_sky, 1e-3 * open_sky.mean()))

@@ -14,6 +14,7 @@ Limits: one ray for each point and pixel of the environment, toward its centre. 
 visible side: nothing behind it casts a shadow, and its back reflects nothing.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,6 +45,31 @@ class Transport:
     unshadowed: np.ndarray
     shadowed: np.ndarray
     indirect: np.ndarray
+
+    def traced(self) -> dict[str, np.ndarray]:
+        """Return what was traced, as arrays: which light is shadowed, one bit each, and I."""
+        return {"hidden": np.packbits(self.shadowed == 0), "indirect": self.indirect}
+
+    @staticmethod
+    def restored(points: SurfacePoints, rows: int, traced: Mapping[str, np.ndarray]) -> "Transport":
+        """Return the transport from what was traced.
+
+        Parameters
+        ----------
+        points : SurfacePoints
+        rows : int
+            Of the environment.
+        traced : mapping
+            Of `traced`.
+
+        Returns
+        -------
+        Transport
+        """
+        unshadowed = _unshadowed(points, rows)
+        hidden = np.unpackbits(traced["hidden"], count=unshadowed.size).reshape(unshadowed.shape)
+        shadowed = np.where(hidden.astype(bool), np.float32(0), unshadowed)
+        return Transport(unshadowed, shadowed, traced["indirect"])
 
     def __getitem__(self, part: slice) -> "Transport":
         return Transport(self.unshadowed[part], self.shadowed[part], self.indirect[part])
@@ -76,10 +102,8 @@ def light_transport(
         If the user cancels.
     """
     monitor = monitor or Monitor()
-    towards = directions(rows).reshape(-1, 3)
-    facing = np.clip(np.einsum("nk,jk->nj", points.normal, towards), 0, None)
-    unshadowed = (facing * solid_angles(rows).reshape(-1) / np.pi).astype(np.float32)
-    shadowed, indirect = unshadowed.copy(), np.zeros((len(facing), 3), np.float32)
+    towards, unshadowed = directions(rows).reshape(-1, 3), _unshadowed(points, rows)
+    shadowed, indirect = unshadowed.copy(), np.zeros((len(points), 3), np.float32)
     for first in range(0, len(towards), _AT_ONCE):
         monitor.report("tracing shadows", first / len(towards))
         part = slice(first, first + _AT_ONCE)
@@ -90,6 +114,13 @@ def light_transport(
         reflected = surface.radiance(points.lifted[point], towards[light])
         np.add.at(indirect, point, unshadowed[point, light, None] * reflected)
     return Transport(unshadowed, shadowed, indirect)
+
+
+def _unshadowed(points: SurfacePoints, rows: int) -> np.ndarray:
+    """max(0, n . w) omega / pi, (N, J) float32."""
+    towards = directions(rows).reshape(-1, 3)
+    facing = np.clip(np.einsum("nk,jk->nj", points.normal, towards), 0, None)
+    return np.asarray((facing * solid_angles(rows).reshape(-1) / np.pi).astype(np.float32))
 
 
 def transport_of(d: Decomposition, rows: int) -> Transport:

@@ -115,8 +115,15 @@ class JsonReporter:
         del done
         self._write("failed", message="; ".join(lines), code=code)
 
-    def cancelled(self) -> None:
-        """Report that the command was cancelled."""
+    def cancelled(self, hint: str = "") -> None:
+        """Report that the command was cancelled.
+
+        Parameters
+        ----------
+        hint : str, optional
+            For users; not reported.
+        """
+        del hint
         self._write("cancelled")
 
     def _step(self, event: ProgressEvent) -> None:

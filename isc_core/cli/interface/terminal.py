@@ -194,9 +194,15 @@ class TerminalReporter:
         for line in lines:
             print(f"isc: {styled('rejected:', Style.ERROR, sys.stderr)} {line}", file=sys.stderr)
 
-    def cancelled(self) -> None:
-        """Print that the command was cancelled."""
-        print("isc: cancelled", file=sys.stderr)
+    def cancelled(self, hint: str = "") -> None:
+        """Print that the command was cancelled.
+
+        Parameters
+        ----------
+        hint : str, optional
+            How the user can go on.
+        """
+        print(f"isc: cancelled; {hint}" if hint else "isc: cancelled", file=sys.stderr)
 
 
 class ProgressBar:
