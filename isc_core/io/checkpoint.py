@@ -53,7 +53,21 @@ class Checkpoint:
     def arrays(
         self, stage: str, inputs: Sequence[np.ndarray], compute: Callable[[], Arrays]
     ) -> Arrays:
-        """Return the result of a stage, computed unless it is kept, see `StageCache.arrays`."""
+        """Return the result of a stage, computed unless it is kept.
+
+        Parameters
+        ----------
+        stage : str
+            Name of the stage.
+        inputs : sequence of ndarray
+            All that the result depends on, besides the program.
+        compute : callable
+            The stage, see `StageCache.arrays`.
+
+        Returns
+        -------
+        mapping of str to ndarray
+        """
         computed = False
 
         def made() -> Arrays:

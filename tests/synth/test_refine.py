@@ -1,6 +1,5 @@
 """The refinement of a light: transport, gradients, held-out blocks, identities and the command."""
 
-import argparse
 from dataclasses import fields, replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -12,7 +11,6 @@ pytest.importorskip("mitsuba")
 
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
-from isc_core.progress import Monitor
 from isc_core.refinement.held_out import held_out_blocks
 from isc_core.refinement.reflectance_terms import ReflectanceTerms
 from isc_core.refinement.working_scale import working_scale
@@ -24,7 +22,6 @@ from isc_core.shading.environment_map import environment_from_shading, shading_u
 from isc_core.shading.spherical_harmonics import real_sh
 from isc_core.sirfs.priors.prior_file import shipped_priors
 from isc_core.sirfs.settings import isc_weights
-from synth.commands import refine as command_module
 from synth.refine.held_out import BLOCK, explains_better
 from synth.refine.light_field import LightField
 from synth.refine.light_objective import LightObjective
@@ -33,6 +30,7 @@ from synth.refine.surface import Surface
 from synth.refine.transport import light_transport, transport_of
 from synth.scene.variant import load_mitsuba
 from tests.core.refinement.test_gloss import glossy
+from tests.synth.refine_command import command
 
 LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
@@ -154,14 +152,6 @@ def test_the_shading_that_the_image_is_made_of_explains_it_better() -> None:
     assert not explains_better(terms, blocks, true, flat)
     assert not explains_better(terms, blocks, true, true)
     assert not explains_better(terms, blocks[:2], flat, true)
-
-
-def command(words: list[str]) -> list[str]:
-    """Run `isc refine`, whether or not its entry point is installed."""
-    parser = argparse.ArgumentParser()
-    command_module.declare(parser)
-    options = parser.parse_args(words, argparse.Namespace(quiet=False))
-    return command_module.run(options, Monitor())
 
 
 def contrasted(d: Decomposition) -> Decomposition:
