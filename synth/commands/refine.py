@@ -32,7 +32,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "Fit lamps, roughness, strength and a bounded change of the shape to the separated "
         "highlights, so that rendered highlights appear where the photo shows them. The image and "
         "its layers do not change; gloss, shape, light and reflectance change only if the fit "
-        "explains held-out pixels better.",
+        "explains held-out pixels better. After an interruption, the same command continues.",
         examples=_EXAMPLES,
     )
     parser.add_argument(

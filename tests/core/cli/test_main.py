@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -774,3 +775,13 @@ def test_kernels_count_as_compiled_once_they_were_used(result: Path) -> None:
         pytest.skip("the kernels were compiled ahead of time")
     assert load(result / "result").provenance.diagnostics.converged in (True, False)
     assert kernels_compiled()
+
+
+def test_a_cancelled_command_says_how_to_go_on(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cancellation = Cancelled()
+    cancellation.hint = "the same command continues this run"
+    monkeypatch.setattr("isc_core.cli.main._run", Mock(side_effect=cancellation))
+    assert main(["refine"]) == 130
+    assert capsys.readouterr().err == "isc: cancelled; the same command continues this run\n"
