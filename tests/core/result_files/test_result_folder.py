@@ -14,6 +14,7 @@ import pytest
 from PIL import Image
 
 from isc_core.errors import Cancelled, InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.exr import write_channels
 from isc_core.lobe_fitting import GivenLight, fit_lobe
@@ -316,7 +317,7 @@ def test_a_preview_that_cannot_be_written_is_one_clear_line_and_leaves_nothing(
 ) -> None:
     """It is drawn on a thread of its own."""
 
-    def full(d: Decomposition) -> Image.Image:
+    def full(d: Decomposition, part: FramePart) -> Image.Image:
         raise OSError(errno.ENOSPC, "no space")
 
     monkeypatch.setattr(result_folder, "contact_sheet", full)
@@ -331,10 +332,10 @@ def test_a_cancelled_save_waits_for_its_preview(
     """The folder is removed only when nothing is written into it any more."""
     cancelled, drawn = threading.Event(), threading.Event()
 
-    def slow(d: Decomposition) -> Image.Image:
+    def slow(d: Decomposition, part: FramePart) -> Image.Image:
         assert cancelled.wait(10)
         drawn.set()
-        return contact_sheet(d)
+        return contact_sheet(d, part)
 
     def report(event: ProgressEvent) -> None:
         if event.stage == "building the mesh":
