@@ -226,11 +226,14 @@ def load_part(folder: Path | str) -> ResultPart:
     description = _read_json(folder / "decomposition.json")
     stored = StoredMaps.read(folder / MAPS)
     maps = stored.layers(LAYERS)
+    mask = maps["mask"] > 0.5
+    if not mask.any():
+        raise InputError(f"{folder} has an empty mask: it is damaged; decompose the photo again")
     x, y = stored.part.corner
     camera = _camera(description, folder)
     result = Decomposition(
         **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
-        mask=maps["mask"] > 0.5,
+        mask=mask,
         illumination=_coefficients(description, folder),
         provenance=_provenance(description, folder),
         brdf=_brdf(description, stored, folder),

@@ -197,3 +197,12 @@ def test_a_separation_of_a_large_frame_stores_the_object_too(tmp_path: Path) -> 
 def windows_of(mask: np.ndarray) -> list[int]:
     part = stored_part(mask)
     return [part.columns.start, part.rows.start, part.columns.stop - 1, part.rows.stop - 1]
+
+
+def test_a_result_without_an_object_is_damaged(saved: Path, tmp_path: Path) -> None:
+    (tmp_path / "decomposition.json").write_bytes((saved / "decomposition.json").read_bytes())
+    stored = StoredMaps.read(saved / MAPS)
+    empty = {**stored.channels, "mask.A": 0 * stored.channels["mask.A"]}
+    write_channels(tmp_path / MAPS, empty, stored.part.corner, FRAME)
+    with pytest.raises(InputError, match="has an empty mask: it is damaged"):
+        load(tmp_path)

@@ -100,10 +100,6 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     monitor.report("reading", 0.0)
     stored = load_part(options.result)
     d = stored.result
-    if not d.mask.any():
-        raise InputError(
-            f"{options.result} has an empty mask: it is damaged; decompose the photo again"
-        )
     _check_result(d, options.result)
     monitor.report("editing", 0.2)
     done = options.act(stored, options)
