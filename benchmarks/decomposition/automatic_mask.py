@@ -1,13 +1,15 @@
 """How good are masks that are found automatically? Measured on composites of held-out objects.
 
   python -m benchmarks.decomposition.automatic_mask WORLD --panoramas DIR [--photos DIR]
-  [--weights NPZ] [--count N] [--difficult N] [--sheet JPG] [--json FILE]
+  [--tabletops DIR] [--weights NPZ] [--count N] [--difficult N] [--sheet JPG] [--json FILE]
 
 WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
 one object show bodies that no fit has seen, the other half the masked photos of real objects in
 --photos; both stand before crops of panoramas that no fit has seen. As many photos again show
 nothing, or several objects. Refusals are wrong where one object is shown, and more so where its
 mask would have been right, with an overlap of .5; acceptances where none or several are shown.
+--tabletops adds rendered pictures of held-out objects that stand on tables and cast shadows, made
+by `python -m training.masks.tabletop_pictures --held-out`.
 --difficult adds photos of one object of each difficult kind, and defocused ones of none. Intervals
 are those of resampled photos.
 
@@ -34,7 +36,12 @@ from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
 from training.masks.difficulty import Difficulty
-from training.masks.held_out import HeldOut, held_out_composites, held_out_ingredients
+from training.masks.held_out import (
+    HeldOut,
+    held_out_composites,
+    held_out_ingredients,
+    held_out_tabletops,
+)
 from training.masks.packs import Ingredients
 
 _TILE = 140  # pixels of the sheet's pictures
@@ -49,6 +56,7 @@ _KINDS = {
     "with bands": Difficulty(banded=1),
 }
 _NOTHING = "nothing, defocused"
+_TABLETOPS = "on tables"
 
 
 @dataclass(frozen=True)
@@ -105,8 +113,8 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     Parameters
     ----------
     groups : dict of str to list of MaskScore
-        "bodies", "photos" and the difficult kinds show one object each, the others none or
-        several.
+        "bodies", "photos", the difficult kinds and "on tables" show one object each, the others
+        none or several.
 
     Returns
     -------
@@ -118,7 +126,7 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     rows, figures = list[tuple[str, list[MaskScore]]](), dict[str, object]()
     rows += [(name, groups[name]) for name in single]
     rows.append(("all of one object", [one for name in single for one in groups[name]]))
-    rows += [(name, groups[name]) for name in _KINDS if name in groups]
+    rows += [(name, groups[name]) for name in (*_KINDS, _TABLETOPS) if name in groups]
     lines = [
         "| shown | photos | IoU, median | 10th percentile | of those accepted "
         "| refused | refused of right ones |",
@@ -138,7 +146,7 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
             "confidence": [round(one.found.confidence, 4) for one in found],
         }
     lines += ["", "| shown | photos | accepted | of these, no whole piles |", "|---|---|---|---|"]
-    others = [name for name in groups if name not in (*single, *_KINDS)]
+    others = [name for name in groups if name not in (*single, *_KINDS, _TABLETOPS)]
     whole = [(name, groups[name]) for name in others]
     simple = [one for name in others if name != _NOTHING for one in groups[name]]
     whole.append(("no single object, in focus", simple))
@@ -240,6 +248,7 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--photos", type=Path, metavar="DIR", help="masked photos of real objects")
+    add("--tabletops", type=Path, metavar="DIR", help="rendered pictures of objects on tables")
     add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
     add("--count", type=int, default=200, help="photos of one object (default: %(default)s)")
     add("--difficult", type=int, default=0, help="of each difficult kind (default: none)")
@@ -254,6 +263,8 @@ def main() -> None:
             objects["photos"] = held_out_ingredients(
                 given.world, given.panoramas, "B", given.photos
             )
+        folder = given.tabletops
+        tabletops = [] if folder is None else list(held_out_tabletops(folder, _SEED))
     except InputError as error:
         parser.error(str(error))
     groups = {
@@ -270,6 +281,8 @@ def main() -> None:
         groups[name] = [score_mask(photo, network) for photo in photos]
     if given.difficult:
         groups |= score_difficult(bodies, given.difficult, network)
+    if tabletops:
+        groups[_TABLETOPS] = [score_mask(photo, network) for photo in tabletops]
     text, figures = report(groups)
     print(text)
     if given.json:

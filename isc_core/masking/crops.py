@@ -18,7 +18,7 @@ from ..networks.mask_network import POINT_RADIUS, SIDE, MaskNetwork, predict_mas
 from ..photo.grabcut import Box
 from .hints import Hints
 
-_MARGIN = 0.25  # around a box, of its longer side
+MARGIN = 0.25  # around a box, of its longer side
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ def with_margin(box: Box, shape: tuple[int, ...]) -> Crop:
         Clipped to the photo.
     """
     x, y, width, height = box
-    margin = int(np.ceil(_MARGIN * max(width, height)))
+    margin = int(np.ceil(MARGIN * max(width, height)))
     left, top = max(x - margin, 0), max(y - margin, 0)
     right, bottom = min(x + width + margin, shape[1]), min(y + height + margin, shape[0])
     return Crop(left, top, right - left, bottom - top)

@@ -172,7 +172,7 @@ class CompositeDraws:
             objects,
             draw_backgrounds(rng, self.size, self.backgrounds),
             draw_hints(rng, self.size, self.hinted, MAX_OBJECTS),
-            _draw_cameras(rng, self.size),
+            draw_cameras(rng, self.size),
             object_variation,
             of_backgrounds,
         )
@@ -184,7 +184,19 @@ class CompositeDraws:
         return drawn
 
 
-def _draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
+def draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
+    """Draw white balances and cameras.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+    number : int
+
+    Returns
+    -------
+    Cameras
+        On the CPU.
+    """
     drawn = [vars(draw_camera(rng)) for _ in range(number)]
     arrays = {name: np.array([one[name] for one in drawn], float) for name in drawn[0]}
     arrays["exposure"] *= log_uniforms(rng, 0.8, 1.3, number)

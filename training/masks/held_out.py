@@ -15,16 +15,19 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from torch.nn.functional import pad
 
 from isc_core.networks.mask_network import Count
 from isc_core.photo import read_photo
 
 from ..networks.scene_batches import read_world
+from ..world.camera import BLOCK
 from ..world.files import Split
-from .composites import CompositeDraws, Composites
+from .composites import CompositeDraws, Composites, as_photographed, draw_cameras
 from .difficulty import SIMPLE, Difficulty
 from .ingredients import cut_out, lit_cutouts, panoramas_in
 from .packs import Ingredients
+from .tabletop_pictures import read_pictures
 
 SIDE = 320  # pixels of a composite's longer side
 _CUTOUT_SIDE = 256  # pixels
@@ -141,6 +144,38 @@ def held_out_composites(
             light = batch.photo[k].permute(1, 2, 0).numpy()[place]
             yield HeldOut(light, batch.mask[k, 0].numpy()[place], count)
             made += 1
+
+
+def held_out_tabletops(folder: Path, seed: int) -> Iterator[HeldOut]:
+    """Photograph rendered pictures of objects on tables.
+
+    Parameters
+    ----------
+    folder : Path
+        Of `tabletop_pictures`, with held-out objects and panoramas.
+    seed : int
+        Of the cameras.
+
+    Yields
+    ------
+    HeldOut
+
+    Raises
+    ------
+    InputError
+        If there is no picture, or a file is damaged.
+    """
+    rng = np.random.default_rng([seed, 12])
+    torch.manual_seed(seed)
+    for picture in read_pictures(folder):
+        rows, columns = picture.cover.shape
+        light = torch.from_numpy(picture.light).permute(2, 0, 1)[None]
+        frame = torch.ones_like(light[:, :1])
+        # whole blocks of JPEG
+        light, frame = (pad(one, (0, -columns % BLOCK, 0, -rows % BLOCK)) for one in (light, frame))
+        photo = as_photographed(light, frame, draw_cameras(rng, 1), light)
+        whole = photo[0, :, :rows, :columns].permute(1, 2, 0).numpy()
+        yield HeldOut(whole, picture.cover / np.float32(255), Count.ONE)
 
 
 def composites_of_targets(

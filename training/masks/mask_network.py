@@ -1,13 +1,15 @@
 """Fit the network of `isc_core.networks.mask_network`.
 
-  python -m training.masks.mask_network FOLDER ... [--weights NPZ] [--minutes N] -o MASK.npz
+  python -m training.masks.mask_network FOLDER ... [--tabletops FOLDER] [--weights NPZ]
+  [--minutes N] -o MASK.npz
 
 FOLDER contains the ingredients that `python -m training.masks.ingredients` writes; the cut-outs of
 all folders are used. Photos are composed during training (`training.masks.composites`), and none is
-used twice. `--weights` starts from an archive that an earlier run wrote, `--resume` continues an
-interrupted one; without either, the encoder starts with the weights of the shipped scene network.
-`--side 64` makes photos smaller, which halves the computation. The loss on held-out objects and
-panoramas is measured every thousand steps.
+used twice. With `--tabletops`, half of the photos are rendered pictures of objects on tables, made
+by `python -m training.masks.tabletop_pictures`. `--weights` starts from an archive that an earlier
+run wrote, `--resume` continues an interrupted one; without either, the encoder starts with the
+weights of the shipped scene network. `--side 64` makes photos smaller, which halves the
+computation. The loss on held-out objects and panoramas is measured every thousand steps.
 
 Equation: see `training.masks.mask_module`.
 
@@ -32,6 +34,8 @@ from .difficulty import DIFFICULT
 from .ingredients import SETS
 from .mask_module import MaskNetworkModule
 from .packs import SUFFIX, Ingredients
+from .tabletop_batches import TabletopBatches, WithTabletops
+from .tabletop_pictures import read_pictures
 
 _SHARES = (0.19, 0.53, 0.28)  # of scenes without an object, with one, with several
 SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)
@@ -44,6 +48,7 @@ def main() -> None:
     )
     add = parser.add_argument
     add("folders", type=Path, nargs="+", metavar="FOLDER", help="ingredients of composites")
+    add("--tabletops", type=Path, metavar="FOLDER", help="rendered pictures, half of the photos")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
     add("--side", type=int, default=SIDE, metavar="PX", help="of photos (default: %(default)s)")
     add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
@@ -60,15 +65,20 @@ def main() -> None:
         )
         weights = None if arguments.weights is None else read_arrays(arguments.weights)
         network.begin(weights)
+        pictures = [] if arguments.tabletops is None else list(read_pictures(arguments.tabletops))
     except InputError as error:
         parser.error(str(error))
-    draw = CompositeDraws(
-        options.batch, arguments.hinted, _SHARES, varied=True, difficulty=DIFFICULT
-    )
-    compose = Composites(training, draw, arguments.side, options.device)
+    side, size = arguments.side, options.batch // 2 if pictures else options.batch
+    draw = CompositeDraws(size, arguments.hinted, _SHARES, varied=True, difficulty=DIFFICULT)
+    compose = Composites(training, draw, side, options.device)
     measured = Composites(held_out, CompositeDraws(options.batch), arguments.side, options.device)
     schedule = replace(SCHEDULE, rate=arguments.rate)
-    fit(network, draw, schedule, options, measured, compose.composed)
+    if pictures:
+        rendered = TabletopBatches(pictures, options.batch - size, arguments.hinted, side)
+        both = WithTabletops(draw, compose, rendered)
+        fit(network, both.draw, schedule, options, measured, both.composed)
+    else:
+        fit(network, draw, schedule, options, measured, compose.composed)
 
 
 if __name__ == "__main__":
