@@ -1,6 +1,7 @@
 """Calibrate the confidence of a mask network on held-out composites.
 
-  python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ -o MASK.npz
+  python -m training.masks.mask_calibration WORLD --panoramas DIR --weights NPZ
+  [--tabletops FOLDER] -o MASK.npz
 
 Equation: ridge logistic regression of "the mask is correct" on the features of
 `isc_core.masking.confidence`. A mask of one object is correct if its overlap (IoU) is at least .5.
@@ -11,7 +12,7 @@ three photos of one object are difficult. The program prints a table of threshol
 Citation: J. Platt, "Probabilistic outputs for support vector machines and comparisons to
 regularized likelihood methods", 1999.
 
-Limits: three photos of one object for two of none or several.
+Limits: three composites of one object for two of none or several.
 """
 
 import argparse
@@ -29,7 +30,12 @@ from isc_core.networks.mask_network import Count, MaskNetwork
 from isc_core.numerics.logistic import logistic_weights
 
 from .difficulty import SIMPLE, Difficulty
-from .held_out import HeldOut, held_out_composites, held_out_ingredients
+from .held_out import (
+    HeldOut,
+    held_out_composites,
+    held_out_ingredients,
+    held_out_tabletops,
+)
 
 _RIDGE = 0.1
 _MIN_OVERLAP = {Count.ONE: 0.5, Count.SEVERAL: 0.7}  # of a correct mask
@@ -86,7 +92,8 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--weights", type=Path, required=True, metavar="NPZ", help="weights to calibrate")
-    add("--count", type=int, default=480, help="photos (default: %(default)s)")
+    add("--tabletops", type=Path, metavar="FOLDER", help="rendered pictures, added to the photos")
+    add("--count", type=int, default=480, help="composites (default: %(default)s)")
     add("--seed", type=int, default=0, help="of the photos (default: %(default)s)")
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
     given = parser.parse_args()
@@ -94,6 +101,8 @@ def main() -> None:
         arrays = read_arrays(given.weights)
         ingredients = held_out_ingredients(given.world, given.panoramas, "A", seed=given.seed)
         network = MaskNetwork.read(given.weights)
+        folder = given.tabletops
+        tabletops = [] if folder is None else list(held_out_tabletops(folder, given.seed))
     except InputError as error:
         parser.error(str(error))
     photos = [
@@ -107,6 +116,7 @@ def main() -> None:
             difficulty,
         )
     ]
+    photos += tabletops
     features, correct, single = observed(photos, network)
     weights = logistic_weights(features, correct, _RIDGE)
     print("weights", np.round(weights, 3), "correct", correct.mean())

@@ -17,7 +17,6 @@ Limits: 32 paths a pixel leave noise; light above twice white is stored as twice
 """
 
 import argparse
-import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,9 +27,9 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
-from isc_core.io.npy import read_arrays
 from synth.scene.variant import load_mitsuba
 
+from ..archives import open_archive
 from ..world.bodies.sources import BodyFolders, body_names
 from ..world.files import Split, read_patterns, split_of
 from .ingredients import panoramas_in
@@ -45,7 +44,6 @@ _MIDDLE, _UPPER = 0.2, 0.7  # of white: median of the object, a bright quantile 
 _UPPER_QUANTILE = 0.85
 _LEAST, _MOST = 0.015, 0.75  # share of the picture that the object covers
 _SAME = 1e-3  # of the depth
-_READ_ERRORS = (ValueError, KeyError, OSError, zipfile.BadZipFile, EOFError)
 
 
 @dataclass(frozen=True)
@@ -172,12 +170,12 @@ def read_pictures(folder: Path) -> Iterator[TabletopPicture]:
             f"{folder} has no pictures: make them by python -m training.masks.tabletop_pictures"
         )
     for path in paths:
-        try:
-            arrays = read_arrays(path)
-            for k in range(int(arrays["number"])):
-                yield TabletopPicture(arrays[f"codes_{k}"], arrays[f"cover_{k}"])
-        except _READ_ERRORS as error:
-            raise InputError(f"{path} is damaged ({error}): delete it and render again") from error
+        with open_archive(path, "a file of pictures", "delete it and render again") as arrays:
+            found = [
+                TabletopPicture(arrays[f"codes_{k}"], arrays[f"cover_{k}"])
+                for k in range(int(arrays["number"]))
+            ]
+        yield from found
 
 
 def render_folder(scenes: TabletopScenes, folder: Path, count: int, seed: int, size: int) -> int:
