@@ -288,9 +288,11 @@ def main() -> None:
     if given.json:
         given.json.write_text(json.dumps(figures), encoding="utf-8")
     if given.sheet:
-        # the first ones of each kind, whatever was found
-        shown = _SHOWN // len(objects)
-        drawn = [one for name in objects for one in groups[name][:shown]]
+        # the first ones of each kind, whatever was found, but one of each scene on a table
+        kinds = [groups[name] for name in objects]
+        if tabletops:
+            kinds.append(groups[_TABLETOPS][:: max(len(tabletops) // _SHOWN, 1)])
+        drawn = [one for found in kinds for one in found[: _SHOWN // len(kinds)]]
         sheet(drawn).save(given.sheet, quality=45)
 
 

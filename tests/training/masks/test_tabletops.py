@@ -86,6 +86,7 @@ def test_what_is_covered_is_what_the_camera_sees_of_the_object(tmp_path: Path) -
         assert 0.015 < (cover > 0.5).mean() < 0.75
 
 
+@pytest.mark.slow
 def test_an_object_behind_is_no_part_of_the_mask(tmp_path: Path) -> None:
     drawn = scenes(tmp_path, cameras=3).draw(np.random.default_rng(6))
     mi = load_mitsuba()
@@ -104,6 +105,7 @@ def test_an_object_behind_is_no_part_of_the_mask(tmp_path: Path) -> None:
         np.testing.assert_array_equal(one, other)
 
 
+@pytest.mark.slow
 def test_an_interrupted_folder_is_completed(tmp_path: Path) -> None:
     made = scenes(tmp_path / "meshes", cameras=2)
     (tmp_path / "meshes").mkdir()
