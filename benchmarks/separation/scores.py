@@ -145,11 +145,15 @@ def source_code(method: str) -> str:
     Returns
     -------
     str
-        Eight digits that change with the method's file and with any shared file.
+        Eight digits that change with the method's file or package and with any shared file.
     """
     folder = Path(separation.__file__).parent
     others = set(separation.METHODS) - {method, *_BUILT_ON.get(method, ())}
-    files = [path for path in sorted(folder.rglob("*.py")) if path.stem not in others]
+    files = [
+        path
+        for path in sorted(folder.rglob("*.py"))
+        if others.isdisjoint(path.relative_to(folder).with_suffix("").parts)
+    ]
     files += sorted((folder.parent / "inpainting").glob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:8]
 
