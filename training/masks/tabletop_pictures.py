@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from isc_core.cli.interface.values import count
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from synth.scene.variant import load_mitsuba
@@ -37,6 +38,7 @@ from .tabletop_scenes import OBJECT, TabletopScene, TabletopScenes
 
 SIDE, PATHS = 192, 32  # of a picture, pixels; of a pixel
 _RATIO = 0.75  # of the sides
+_LEAST_SIDE = 32
 _COVER_RAYS = 8  # of a pixel
 _BOUNCES = 4  # path length
 _BRIGHTEST = 2.0  # light of the code 255
@@ -178,14 +180,14 @@ def read_pictures(folder: Path) -> Iterator[TabletopPicture]:
         yield from found
 
 
-def render_folder(scenes: TabletopScenes, folder: Path, count: int, seed: int, size: int) -> int:
+def render_folder(scenes: TabletopScenes, folder: Path, number: int, seed: int, size: int) -> int:
     """Render scenes into a folder that may hold some of them already.
 
     Parameters
     ----------
     scenes : TabletopScenes
     folder : Path
-    count : int
+    number : int
         Of scenes.
     seed : int
         Scene k depends on the seed, k, and the objects of scenes before it in the same run.
@@ -198,7 +200,7 @@ def render_folder(scenes: TabletopScenes, folder: Path, count: int, seed: int, s
         Number of pictures rendered.
     """
     made = 0
-    for k in range(count):
+    for k in range(number):
         path = folder / f"{k:05d}.npz"
         if path.exists():
             continue
@@ -216,24 +218,27 @@ def main() -> None:
     add = parser.add_argument
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
-    add("--count", type=int, default=1000, help="scenes (default: %(default)s)")
+    add("--count", type=count, default=1000, help="scenes (default: %(default)s)")
     add("--held-out", action="store_true", help="objects and panoramas that no network learns from")
-    add("--built", type=int, default=4000, help="objects built (default: %(default)s)")
+    add("--built", type=count, default=4000, help="objects built (default: %(default)s)")
     add("--furniture", type=Path, metavar="DIR", help="folder of Sweet Home 3D catalogues (.sh3f)")
-    add("--size", type=int, default=SIDE, help="longer side, pixels (default: %(default)s)")
-    add("--seed", type=int, default=0, help="default: %(default)s")
+    add("--size", type=count, default=SIDE, help="longer side, pixels (default: %(default)s)")
+    add("--seed", type=count, default=0, help="default: %(default)s")
     add("-o", "--output", type=Path, required=True, metavar="FOLDER", help="where to write")
     given = parser.parse_args()
+    if given.size < _LEAST_SIDE:
+        parser.error(f"--size {given.size}: pictures have {_LEAST_SIDE} pixels or more")
     wanted = Split.UNSEEN_BODY if given.held_out else Split.TRAIN
     try:
         listed = body_names(BodyFolders(given.furniture, None, None), given.seed, given.built, 0)
         references = [one for one in listed if split_of(one.name) == wanted]
-        panoramas = panoramas_in(given.panoramas, 0, held_out=given.held_out)
+        if not references:
+            raise InputError("no object is left: raise --built, or name a folder by --furniture")
+        panoramas = list(panoramas_in(given.panoramas, 0, held_out=given.held_out))
+        atlas = read_patterns(given.world)
         given.output.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory() as folder:
-            scenes = TabletopScenes(
-                references, list(panoramas), read_patterns(given.world), Path(folder)
-            )
+            scenes = TabletopScenes(references, panoramas, atlas, Path(folder))
             made = render_folder(scenes, given.output, given.count, given.seed, given.size)
     except InputError as error:
         parser.error(str(error))
