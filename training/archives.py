@@ -41,8 +41,6 @@ def open_archive(path: Path, content: str, remedy: str) -> Iterator[NpzFile]:
             yield data
     except InputError:
         raise
-    except FileNotFoundError as error:
-        raise InputError(f"{path} does not exist: give {content}") from error
     except OSError as error:
         reason = error.strerror or "it is damaged"
         raise InputError(f"{path} cannot be read ({reason}): {remedy}") from error

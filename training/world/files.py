@@ -146,7 +146,7 @@ def read_patterns(folder: Path) -> Atlas:
         If there are none, or the file is damaged.
     """
     path = folder / PATTERNS
-    with open_archive(path, "the patterns that isc world build makes", "delete it and build again") as data:
+    with open_archive(path, "an archive of patterns", "delete it and build again") as data:
         atlas = Atlas(data["maps"], data["kinds"], data["tileable"])
     if atlas.maps.ndim != 3 or len(atlas.kinds) != len(atlas.maps) or not len(atlas.maps):
         raise InputError(f"{path} holds no patterns: delete it and build again")
