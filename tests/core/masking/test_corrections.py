@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from isc_core.masking.corrections import corrected
+from isc_core.masking.crops import Crop, CropPrediction, predict_crop
 from isc_core.masking.hints import Hints
 from isc_core.masking.search import find_mask
-from isc_core.networks.mask_network import MaskNetwork
+from isc_core.networks.mask_network import SIDE, MaskNetwork
 from isc_core.photo.found_mask import FoundMask
 from tests.core.masking.ball_photos import ONE, TWO, balls, overlap
 
@@ -72,32 +73,31 @@ def test_the_confidence_falls_with_the_points_that_cannot_be_met() -> None:
     assert after.confidence < mask.confidence
 
 
-class CountedNetwork(MaskNetwork):
-    """The shipped network; counts how often it runs."""
-
-    calls = 0
-
-    def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        type(self).calls += 1
-        return super().__call__(channels)
-
-
-def test_a_point_in_the_middle_of_a_found_object_keeps_its_mask() -> None:
+def test_a_point_in_the_middle_of_a_found_object_keeps_its_mask(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """And the network is not run again; it is for a point that contradicts the mask."""
-    network = CountedNetwork(**vars(MaskNetwork.shipped()))
+    crops = list[Crop]()
+
+    def counted(
+        light: np.ndarray, crop: Crop, hints: Hints, network: MaskNetwork, side: int = SIDE
+    ) -> CropPrediction:
+        crops.append(crop)
+        return predict_crop(light, crop, hints, network, side)
+
+    monkeypatch.setattr("isc_core.masking.search.predict_crop", counted)
     light, _ = balls(ONE)
-
-    def counted(hints: Hints) -> tuple[FoundMask, int]:
-        CountedNetwork.calls = 0
-        return find_mask(light, hints, network), CountedNetwork.calls
-
-    before, once = counted(Hints())
-    assert once > 0
+    before = find_mask(light)
+    once = list(crops)
+    assert len(once) == 3
     for hints in (Hints(points=((100, 75),)), Hints(((100, 75),), ((5, 5),))):
-        after, calls = counted(hints)
+        crops.clear()
+        after = find_mask(light, hints)
         assert (after.cover == before.cover).all() and after.confidence == before.confidence
-        assert calls == once
-    assert counted(Hints(points=((5, 5),)))[1] > once
+        assert crops == once
+    crops.clear()
+    find_mask(light, Hints(points=((5, 5),)))
+    assert len(crops) == 2 * len(once)
 
 
 def test_a_point_on_the_background_removes_the_other_object() -> None:
