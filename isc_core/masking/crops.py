@@ -123,11 +123,7 @@ def predict_crop(
     -------
     CropPrediction
     """
-    factor = side / max(crop.width, crop.height)
-    # an even number of pixels is symmetric about the centre: a mirrored photo gives mirrored input
-    width, height = (
-        min(max(2 * round(n * factor / 2), 2), side) for n in (crop.width, crop.height)
-    )
+    width, height = size_in_frame((crop.width, crop.height), side)
     left, top = (side - width) // 2, (side - height) // 2
     place = slice(top, top + height), slice(left, left + width)
     small, frame = np.zeros((side, side, 3), np.float32), np.zeros((side, side), bool)
@@ -137,6 +133,26 @@ def predict_crop(
     found = predict_mask(small, frame, maps, network)
     cover = resampled(found.cover[place], (crop.height, crop.width))
     return CropPrediction(cover.clip(0, 1), found.counts)
+
+
+def size_in_frame(size: tuple[int, int], side: int) -> tuple[int, int]:
+    """Return the size of a crop in the frame.
+
+    Parameters
+    ----------
+    size : tuple of int
+        Of the crop, pixels; in any order.
+    side : int
+        Of the frame, pixels.
+
+    Returns
+    -------
+    tuple of int
+        Even numbers, which are symmetric about the centre: a mirrored photo gives mirrored input.
+    """
+    factor = side / max(size)
+    first, second = (min(max(2 * round(n * factor / 2), 2), side) for n in size)
+    return first, second
 
 
 def _hint_maps(

@@ -402,16 +402,43 @@ def ground_truth(
     count : (B,) tensor of int
         `Count`.
     """
-    covers, objects, given = scene.covers * scene.frame, drawn.objects, drawn.hints.given
+    covers, objects = scene.covers * scene.frame, drawn.objects
     alone = torch.zeros(covers.shape[:2], dtype=torch.bool, device=covers.device)
     alone[objects.photo, objects.layer] = objects.target
-    single = drawn.scenes.count == int(Count.ONE)
-    marked = hinted(covers, alone, single, drawn.hints)
-    some = torch.where(given[:, None], marked, alone)
+    return hinted_truth(covers, alone, scene.frame, drawn.scenes.count, drawn.hints)
+
+
+def hinted_truth(
+    covers: torch.Tensor,
+    target: torch.Tensor,
+    frame: torch.Tensor,
+    count: torch.Tensor,
+    hints: HintDraws,
+) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Choose what hints select, and the target where there are none.
+
+    Parameters
+    ----------
+    covers : (B, T, H, W) tensor
+        Visible part of each object.
+    target : (B, T) bool tensor
+        Targets without hints.
+    frame : (B, 1, H, W) tensor
+        1 inside the photo.
+    count : (B,) tensor of int
+        `Count` without hints.
+    hints : HintDraws
+
+    Returns
+    -------
+    mask, hints, count : tensors
+        As `ground_truth` returns them.
+    """
+    marked = hinted(covers, target, count == int(Count.ONE), hints)
+    some = torch.where(hints.given[:, None], marked, target)
     mask = (covers * some[..., None, None]).sum(1, keepdim=True).clamp(max=1)
-    hints = hint_maps(mask[:, 0] > 0.5, scene.frame[:, 0] > 0, drawn.hints)
-    count = torch.where(given, marked.any(1) * int(Count.ONE), drawn.scenes.count)
-    return mask, hints, count
+    maps = hint_maps(mask[:, 0] > 0.5, frame[:, 0] > 0, hints)
+    return mask, maps, torch.where(hints.given, marked.any(1) * int(Count.ONE), count)
 
 
 def as_photographed(

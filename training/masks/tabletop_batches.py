@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch.nn import functional
 
-from isc_core.masking.crops import MARGIN
+from isc_core.masking.crops import MARGIN, size_in_frame
 from isc_core.networks.mask_network import SIDE, Count
 
 from .composites import (
@@ -25,8 +25,9 @@ from .composites import (
     Composites,
     as_photographed,
     draw_cameras,
+    hinted_truth,
 )
-from .hints import draw_hints, hint_maps, hinted
+from .hints import draw_hints
 from .scenes import MAX_OBJECTS
 from .tabletop_pictures import TabletopPicture
 
@@ -77,12 +78,13 @@ class TabletopBatches:
         light, cover, frame = layers[:, :3], layers[:, 3:4], layers[:, 4:]
         hints = draw_hints(rng, number, self._hint_share, MAX_OBJECTS)
         cameras = draw_cameras(rng, number)
-        one = torch.ones(number, 1, dtype=torch.bool)
-        marked = torch.where(hints.given[:, None], hinted(cover, one, one[:, 0], hints), one)
-        mask = cover * marked[..., None, None]
-        maps = hint_maps(mask[:, 0] > 0.5, frame[:, 0] > 0, hints)
+        target, count = (
+            torch.ones(number, 1, dtype=torch.bool),
+            torch.full((number,), int(Count.ONE)),
+        )
+        mask, maps, count = hinted_truth(cover, target, frame, count, hints)
         photo = as_photographed(light, frame, cameras, light)
-        return Composite(photo, frame, maps, mask, marked.any(1) * int(Count.ONE))
+        return Composite(photo, frame, maps, mask, count)
 
 
 class WithTabletops:
@@ -141,8 +143,7 @@ def _placed(picture: TabletopPicture, side: int, rng: np.random.Generator) -> to
     if rng.random() < _EXCHANGED:
         layers = layers[..., [*rng.permutation(3), 3]]
     tensor = torch.from_numpy(np.ascontiguousarray(layers)).permute(2, 0, 1)[None]
-    factor = side / max(tensor.shape[2:])
-    size = [min(max(2 * round(n * factor / 2), 2), side) for n in tensor.shape[2:]]
+    size = size_in_frame((tensor.shape[2], tensor.shape[3]), side)
     small = functional.interpolate(tensor, size, mode="bilinear", antialias=True)[0]
     top, left = ((side - n) // 2 for n in size)
     framed = torch.zeros(5, side, side)
