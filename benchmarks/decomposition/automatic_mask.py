@@ -9,7 +9,7 @@ one object show bodies that no fit has seen, the other half the masked photos of
 nothing, or several objects. Refusals are wrong where one object is shown, and more so where its
 mask would have been right, with an overlap of .5; acceptances where none or several are shown.
 --tabletops adds rendered pictures of held-out objects that stand on tables and cast shadows, made
-by `python -m training.masks.tabletop_pictures --held-out`.
+by `python -m training.tabletops --held-out`; some show none or several.
 --difficult adds photos of one object of each difficult kind, and defocused ones of none. Intervals
 are those of resampled photos.
 
@@ -56,7 +56,11 @@ _KINDS = {
     "with bands": Difficulty(banded=1),
 }
 _NOTHING = "nothing, defocused"
-_TABLETOPS = "on tables"
+_TABLETOPS = {
+    Count.ONE: "on tables",
+    Count.NONE: "nothing on tables",
+    Count.SEVERAL: "several on tables",
+}
 
 
 @dataclass(frozen=True)
@@ -126,7 +130,7 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     rows, figures = list[tuple[str, list[MaskScore]]](), dict[str, object]()
     rows += [(name, groups[name]) for name in single]
     rows.append(("all of one object", [one for name in single for one in groups[name]]))
-    rows += [(name, groups[name]) for name in (*_KINDS, _TABLETOPS) if name in groups]
+    rows += [(name, groups[name]) for name in (*_KINDS, _TABLETOPS[Count.ONE]) if name in groups]
     lines = [
         "| shown | photos | IoU, median | 10th percentile | of those accepted "
         "| refused | refused of right ones |",
@@ -146,9 +150,11 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
             "confidence": [round(one.found.confidence, 4) for one in found],
         }
     lines += ["", "| shown | photos | accepted | of these, no whole piles |", "|---|---|---|---|"]
-    others = [name for name in groups if name not in (*single, *_KINDS, _TABLETOPS)]
+    shown = (*single, *_KINDS, _TABLETOPS[Count.ONE])
+    others = [name for name in groups if name not in shown]
     whole = [(name, groups[name]) for name in others]
-    simple = [one for name in others if name != _NOTHING for one in groups[name]]
+    apart = (_NOTHING, *_TABLETOPS.values())
+    simple = [one for name in others if name not in apart for one in groups[name]]
     whole.append(("no single object, in focus", simple))
     for name, found in whole:
         shares = [_share([getattr(one, key) for one in found]) for key in ("accepted", "harmful")]
@@ -281,8 +287,8 @@ def main() -> None:
         groups[name] = [score_mask(photo, network) for photo in photos]
     if given.difficult:
         groups |= score_difficult(bodies, given.difficult, network)
-    if tabletops:
-        groups[_TABLETOPS] = [score_mask(photo, network) for photo in tabletops]
+    for photo in tabletops:
+        groups.setdefault(_TABLETOPS[photo.count], []).append(score_mask(photo, network))
     text, figures = report(groups)
     print(text)
     if given.json:
@@ -290,8 +296,8 @@ def main() -> None:
     if given.sheet:
         # the first ones of each kind, whatever was found, but one of each scene on a table
         kinds = [groups[name] for name in objects]
-        if tabletops:
-            kinds.append(groups[_TABLETOPS][:: max(len(tabletops) // _SHOWN, 1)])
+        if on_tables := groups.get(_TABLETOPS[Count.ONE]):
+            kinds.append(on_tables[:: max(len(on_tables) // _SHOWN, 1)])
         drawn = [one for found in kinds for one in found[: _SHOWN // len(kinds)]]
         sheet(drawn).save(given.sheet, quality=45)
 

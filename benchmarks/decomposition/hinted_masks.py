@@ -32,8 +32,8 @@ from isc_core.masking.hints import Hints, Point
 from isc_core.masking.search import find_mask
 from isc_core.networks.mask_network import MaskNetwork
 from training.masks.held_out import composites_of_targets, masked_cutout
-from training.masks.ingredients import panoramas_in
 from training.masks.packs import Ingredients
+from training.world.backgrounds import panoramas_in
 
 KINDS = ("box", "points", "points and not")
 _SEED = 5

@@ -21,13 +21,14 @@ from isc_core.networks.mask_network import Count
 from isc_core.photo import read_photo
 
 from ..networks.scene_batches import read_world
+from ..tabletops.pictures import read_pictures
+from ..world.backgrounds import panoramas_in
 from ..world.camera import BLOCK
 from ..world.files import Split
 from .composites import CompositeDraws, Composites, as_photographed, draw_cameras
 from .difficulty import SIMPLE, Difficulty
-from .ingredients import cut_out, lit_cutouts, panoramas_in
+from .ingredients import cut_out, lit_cutouts
 from .packs import Ingredients
-from .tabletop_pictures import read_pictures
 
 SIDE = 320  # pixels of a composite's longer side
 _CUTOUT_SIDE = 256  # pixels
@@ -152,7 +153,7 @@ def held_out_tabletops(folder: Path, seed: int) -> Iterator[HeldOut]:
     Parameters
     ----------
     folder : Path
-        Of `tabletop_pictures`, with held-out objects and panoramas.
+        Of `training.tabletops`, with held-out objects and panoramas.
     seed : int
         Of the cameras.
 
@@ -168,14 +169,14 @@ def held_out_tabletops(folder: Path, seed: int) -> Iterator[HeldOut]:
     rng = np.random.default_rng([seed, 12])
     torch.manual_seed(seed)
     for picture in read_pictures(folder):
-        rows, columns = picture.cover.shape
+        rows, columns = picture.codes.shape[:2]
         light = torch.from_numpy(picture.light).permute(2, 0, 1)[None]
         frame = torch.ones_like(light[:, :1])
         # whole blocks of JPEG
         light, frame = (pad(one, (0, -columns % BLOCK, 0, -rows % BLOCK)) for one in (light, frame))
         photo = as_photographed(light, frame, draw_cameras(rng, 1), light)
         whole = photo[0, :, :rows, :columns].permute(1, 2, 0).numpy()
-        yield HeldOut(whole, picture.cover / np.float32(255), Count.ONE)
+        yield HeldOut(whole, picture.cover, picture.count)
 
 
 def composites_of_targets(

@@ -22,11 +22,10 @@ import torch
 from torch.nn import functional
 
 from isc_core.errors import InputError
-from isc_core.photo import read_linear
 
 from ..networks.scene_batches import World, read_world
+from ..world.backgrounds import panoramas_in
 from ..world.camera import encoded_srgb
-from ..world.environments import read_panoramas
 from ..world.files import Split
 from ..world.lit_pictures import make_pictures
 from ..world.pictures import stacked
@@ -40,9 +39,6 @@ _BATCH = 8  # views rendered together
 _WHITE = 0.99  # quantile of an object's light that becomes white
 _MIN_COVER = 0.02  # of an image: smaller objects are left out
 SETS = ("learned", "judged")  # names of the files for training, and of the held-out set
-ROWS = 256  # of panoramas
-_MAX_LIGHT = 6e4  # half floats end at 65504
-_FILES = (".exr", ".hdr")
 _PATTERNS = 600
 
 
@@ -115,39 +111,6 @@ def cut_out(light: torch.Tensor, cover: torch.Tensor, side: int = SIDE) -> Itera
         colours = torch.where(placed[3:] > 1e-3, placed[:3] / seen, torch.zeros(()))
         coded = torch.cat([encoded_srgb(colours.clamp(0, 1)), placed[3:]])
         yield (255 * coded).round().clamp(0, 255).byte().numpy()
-
-
-def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
-    """Read panoramas at one size, with the split of `read_panoramas`.
-
-    Parameters
-    ----------
-    folder : Path
-    seed : int
-        Determines which are held out.
-    held_out : bool
-        Whether to read the held-out ones, or the others.
-
-    Returns
-    -------
-    (N, ROWS, 2 ROWS, 3) float16 ndarray
-        Linear.
-
-    Raises
-    ------
-    InputError
-        If there is none, or one cannot be used.
-    """
-    wanted = {one.name for one in read_panoramas(folder, seed) if one.held_out == held_out}
-    size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
-    for path in sorted(folder.iterdir()):
-        if path.suffix.lower() in _FILES and path.stem in wanted:
-            light = torch.from_numpy(read_linear(path, "linear")).permute(2, 0, 1)[None].float()
-            light = functional.interpolate(light, size, mode="bilinear", antialias=True)[0]
-            found.append(light.clamp(max=_MAX_LIGHT).permute(1, 2, 0).numpy().astype(np.float16))
-    if not found:
-        raise InputError(f"{folder} has too few panoramas to hold one out: six are enough")
-    return np.stack(found)
 
 
 def main() -> None:

@@ -6,7 +6,7 @@
 FOLDER contains the ingredients that `python -m training.masks.ingredients` writes; the cut-outs of
 all folders are used. Photos are composed during training (`training.masks.composites`), and none is
 used twice. With `--tabletops`, half of the photos are rendered pictures of objects on tables, made
-by `python -m training.masks.tabletop_pictures`. `--weights` starts from an archive that an earlier
+by `python -m training.tabletops`. `--weights` starts from an archive that an earlier
 run wrote, `--resume` continues an interrupted one; without either, the encoder starts with the
 weights of the shipped scene network. `--side 64` makes photos smaller, which halves the
 computation. The loss on held-out objects and panoramas is measured every thousand steps.
@@ -29,13 +29,13 @@ from isc_core.io.npy import read_arrays
 from isc_core.networks.mask_network import SIDE
 
 from ..loop import Schedule, add_run_arguments, fit, run_options
+from ..tabletops.pictures import read_pictures
 from .composites import CompositeDraws, Composites
 from .difficulty import DIFFICULT
 from .ingredients import SETS
 from .mask_module import MaskNetworkModule
 from .packs import SUFFIX, Ingredients
 from .tabletop_batches import TabletopBatches, WithTabletops
-from .tabletop_pictures import read_pictures
 
 _SHARES = (0.19, 0.53, 0.28)  # of scenes without an object, with one, with several
 SCHEDULE = Schedule(rate=2e-3, weight_decay=1e-2, warm_up=200, average_limit=0.998)

@@ -17,14 +17,19 @@ from synth.scene.variant import load_mitsuba
 from training.masks.composites import CompositeDraws, Composites
 from training.masks.held_out import held_out_tabletops
 from training.masks.tabletop_batches import TabletopBatches, WithTabletops
-from training.masks.tabletop_pictures import (
+from training.tabletops.__main__ import render_folder
+from training.tabletops.pictures import (
     TabletopPicture,
     read_pictures,
-    render_folder,
     rendered,
     write_pictures,
 )
-from training.masks.tabletop_scenes import OBJECT, TabletopScene, TabletopScenes
+from training.tabletops.scenes import (
+    OBJECT,
+    ONE_OBJECT,
+    TabletopScene,
+    TabletopScenes,
+)
 from training.world.bodies.body import Source
 from training.world.bodies.sources import BodyReference
 from training.world.patterns import make_atlas
@@ -34,26 +39,33 @@ from .white_shapes import ingredients
 pytestmark = pytest.mark.usefixtures("one_torch_thread")
 
 SHAPES = ("superquadric", "lathe")
+NO_OBJECT, SEVERAL_OBJECTS = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
-def scenes(folder: Path, names: tuple[str, ...] = SHAPES, cameras: int = 2) -> TabletopScenes:
+def scenes(
+    folder: Path,
+    names: tuple[str, ...] = SHAPES,
+    cameras: int = 2,
+    shares: tuple[float, float, float] = ONE_OBJECT,
+) -> TabletopScenes:
     references = [
         BodyReference(f"family/{name}/{k:04d}", Source.FAMILY, "", part=name, number=k)
         for name in names
         for k in range(3)
     ]
     sky = np.random.default_rng(0).uniform(0.2, 2, (8, 16, 3))
-    return TabletopScenes(references, [sky], make_atlas(0, 6, 32), folder, cameras)
+    return TabletopScenes(references, [sky], make_atlas(0, 6, 32), folder, cameras, shares)
 
 
-def picture(seed: int = 0, shape: tuple[int, int] = (60, 80)) -> TabletopPicture:
-    """A grey square on noise."""
+def picture(seed: int = 0, shape: tuple[int, int] = (60, 80), objects: int = 1) -> TabletopPicture:
+    """Grey squares, one below the other, on noise."""
     rng = np.random.default_rng(seed)
     codes = rng.integers(40, 90, (*shape, 3)).astype(np.uint8)
-    cover = np.zeros(shape, np.uint8)
-    cover[20:40, 30:55] = 255
-    codes[cover > 0] = 200
-    return TabletopPicture(codes, cover)
+    covers = np.zeros((*shape, objects), np.uint8)
+    for k in range(objects):
+        covers[20 + 22 * k : 40 + 22 * k, 30:55, k] = 255
+    codes[covers.any(2)] = 200
+    return TabletopPicture(codes, covers)
 
 
 def test_objects_stand_on_the_plane(tmp_path: Path) -> None:
@@ -78,7 +90,7 @@ def test_what_is_covered_is_what_the_camera_sees_of_the_object(tmp_path: Path) -
     found = rendered(TabletopScene(scene, drawn.sensors, drawn.landscape), 64, 64, 0)
     assert found
     for one in found:
-        light, cover = one.light.mean(axis=2) / one.light.max(), one.cover / 255
+        light, cover = one.light.mean(axis=2) / one.light.max(), one.cover
         # eight random rays a pixel against sixty-four: a deviation of .19 at the rim
         inner = (cover == 0) | (cover == 1)
         assert np.abs(light - cover)[inner].mean() < 0.01
@@ -119,12 +131,13 @@ def test_an_interrupted_folder_is_completed(tmp_path: Path) -> None:
 
 
 def test_pictures_are_read_as_written(tmp_path: Path) -> None:
-    wanted = [picture(0), picture(1, (80, 60))]
+    wanted = [picture(0), picture(1, (80, 60)), picture(objects=2), picture(objects=0)]
     write_pictures(tmp_path / "00000.npz", wanted)
     write_pictures(tmp_path / "00001.npz", [])
     for one, other in zip(read_pictures(tmp_path), wanted, strict=True):
         np.testing.assert_array_equal(one.codes, other.codes)
-        np.testing.assert_array_equal(one.cover, other.cover)
+        np.testing.assert_array_equal(one.covers, other.covers)
+        assert one.count == other.count
 
 
 def test_damaged_and_missing_pictures_are_reported(tmp_path: Path) -> None:
@@ -161,7 +174,7 @@ def test_batches_show_the_object_under_its_mask() -> None:
 
 
 def test_hints_lie_on_the_object_or_leave_no_mask() -> None:
-    batch = TabletopBatches([picture()], 32, 1.0)(np.random.default_rng(1))
+    batch = TabletopBatches([picture()], 96, 1.0)(np.random.default_rng(1))
     shown = batch.mask.flatten(1).sum(1) > 0
     assert torch.equal(shown, batch.count == int(Count.ONE)) and not shown.all()
     for hints, mask in zip(batch.hints[shown], batch.mask[shown], strict=True):
@@ -180,8 +193,71 @@ def test_both_kinds_of_photos_are_joined() -> None:
 
 
 def test_held_out_photos_have_the_size_of_the_pictures(tmp_path: Path) -> None:
-    write_pictures(tmp_path / "00000.npz", [picture(0), picture(1, (80, 60))])
+    write_pictures(tmp_path / "00000.npz", [picture(0), picture(1, (80, 60)), picture(objects=0)])
     first, again = (list(held_out_tabletops(tmp_path, 3)) for _ in range(2))
-    assert [one.light.shape for one in first] == [(60, 80, 3), (80, 60, 3)]
+    assert [one.light.shape for one in first] == [(60, 80, 3), (80, 60, 3), (60, 80, 3)]
     assert first[0].count == Count.ONE and first[0].cover.max() == 1
+    assert first[2].count == Count.NONE and not first[2].cover.any()
     np.testing.assert_array_equal(first[1].light, again[1].light)
+
+
+@pytest.mark.slow
+def test_several_objects_stand_apart_and_are_covered_each(tmp_path: Path) -> None:
+    made = scenes(tmp_path, cameras=3, shares=SEVERAL_OBJECTS)
+    for seed in range(6):
+        scene = made.draw(np.random.default_rng(seed))
+        assert scene.count == Count.SEVERAL and 2 <= len(scene.objects) <= 4
+        boxes = [load_mitsuba().load_dict(scene.mitsuba[name]).bbox() for name in scene.objects]
+        for k, one in enumerate(boxes):
+            for other in boxes[:k]:
+                overlap = np.minimum(one.max, other.max) - np.maximum(one.min, other.min)
+                # boxes of neighbours in a diagonal may overlap at their corners
+                assert min(overlap[0], overlap[2]) < 0.3
+    for one in rendered(scene, 64, 4, 0):
+        assert one.count == Count.SEVERAL and one.covers.shape[2] == len(scene.objects)
+        # no ray meets two objects first
+        assert one.covers.sum(axis=2, dtype=int).max() <= 255 + len(scene.objects)
+        assert all(cover.any() for cover in np.moveaxis(one.covers, 2, 0))
+
+
+@pytest.mark.slow
+def test_cameras_beside_the_object_do_not_see_it(tmp_path: Path) -> None:
+    made = scenes(tmp_path, cameras=4, shares=NO_OBJECT)
+    found = 0
+    for seed in range(4):
+        scene = made.draw(np.random.default_rng(seed))
+        pictures = rendered(scene, 48, 4, 0)
+        found += len(pictures)
+        assert all(one.count == Count.NONE and not one.cover.any() for one in pictures)
+    assert found >= 8
+
+
+def touches_frame(mask: torch.Tensor, frame: torch.Tensor) -> bool:
+    inside = mask[frame.any(1)][:, frame.any(0)]
+    return bool(inside[[0, -1]].any() or inside[:, [0, -1]].any())
+
+
+def test_batches_show_none_and_several_and_cut_objects() -> None:
+    shape = (90, 80)
+    drawn = TabletopBatches([picture(0, shape, n) for n in range(3)], 96, 0.0)
+    batch = drawn(np.random.default_rng(2))
+    assert {int(n) for n in batch.count} == {int(kind) for kind in Count}
+    empty = batch.count == int(Count.NONE)
+    assert not batch.mask[empty].any() and batch.mask[~empty].flatten(1).any(1).all()
+    one = batch.count == int(Count.ONE)
+    cut = [
+        touches_frame(mask[0] > 0.5, frame[0] > 0)
+        for mask, frame in zip(batch.mask[one], batch.frame[one], strict=True)
+    ]
+    assert 0 < sum(cut) < len(cut) / 2
+
+
+def test_hints_select_one_of_several_objects() -> None:
+    batch = TabletopBatches([picture(0, (90, 80), 2)], 48, 1.0)(np.random.default_rng(3))
+    shown = batch.mask.flatten(1).sum(1) > 0
+    assert torch.equal(shown, batch.count == int(Count.ONE)) and shown.any() and not shown.all()
+    for mask in batch.mask[shown]:
+        assert mask.max() > 0.9
+    areas = batch.mask[shown].sum((1, 2, 3)) / batch.frame[shown].sum((1, 2, 3))
+    both = 2 * 20 * 25 / (90 * 80)
+    assert areas.min() < 0.6 * both

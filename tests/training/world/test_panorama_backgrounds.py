@@ -9,7 +9,7 @@ pytest.importorskip("torch")
 
 from isc_core.errors import InputError
 from isc_core.io.exr import write_channels
-from training.masks.ingredients import ROWS, panoramas_in
+from training.world.backgrounds import ROWS, panoramas_in
 from training.world.environments import read_panoramas
 
 
