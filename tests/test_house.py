@@ -233,6 +233,19 @@ def test_the_core_imports_fast() -> None:
     assert done.stdout.split() == []
 
 
+def test_the_commands_import_no_graphs_and_no_optimisers() -> None:
+    """SciPy's take a tenth of the start, and most photos need neither."""
+    code = (
+        "import sys, isc_core.cli.commands.decompose; "
+        "print(*sys.modules.keys() & {'scipy.sparse.csgraph', 'scipy.optimize'}); "
+        "print('isc_core.masking.geodesic_region' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines() == ["", "True"]
+
+
 def test_relative_imports_stay_inside_their_package() -> None:
     """The extension ships the core under another name: an import that climbs out of it would end
     somewhere else.

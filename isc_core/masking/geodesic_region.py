@@ -22,7 +22,6 @@ region at most is assumed to be wrong.
 
 import numpy as np
 from scipy import ndimage, sparse
-from scipy.sparse.csgraph import dijkstra
 
 from ..imaging.minimum_cut import STEPS, shifted
 
@@ -113,5 +112,8 @@ def _graph(codes: np.ndarray) -> sparse.csr_matrix:
 
 def _distance(graph: sparse.csr_matrix, shape: tuple[int, ...], seeds: np.ndarray) -> np.ndarray:
     """Geodesic distance (H, W) to the nearest seed."""
+    # Imported only for points: every command imports this module.
+    from scipy.sparse.csgraph import dijkstra
+
     found = dijkstra(graph, directed=False, indices=np.unique(seeds), min_only=True)
     return np.asarray(found).reshape(shape)
