@@ -18,13 +18,8 @@ class InputError(ValueError):
 class Cancelled(Exception):
     """The user cancelled. The command line exits with 130; no file is left incomplete.
 
-    Attributes
-    ----------
-    hint : str
-        How the user can go on; may be empty.
+    It also prints the notes of the exception (`add_note`): how the user can go on.
     """
-
-    hint: str = ""
 
 
 class Rejected(Exception):

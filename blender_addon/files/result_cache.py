@@ -8,9 +8,9 @@ The worker writes a result under its final name complete or not at all. One that
 removed and recomputed. If the folder exceeds its limit, the least recently used results are
 removed.
 
-The worker stores results of stages that do not depend on model and separator in the same folder, in
-files of its own (`isc_core.io.stage_cache`). They count toward the limit, and are removed like
-results.
+The worker stores results of stages that do not depend on model and separator, and the fits of the
+refinement, in the same folder, in files of its own (`isc_core.io.stage_cache`). They count toward
+the limit, and are removed like results.
 
 Citation: FIPS 180-4, Secure Hash Standard, 2015.
 

@@ -59,11 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Rejected as rejection:
         reporter.rejected(str(rejection).splitlines(), REJECTED, rejection.lines)
         return REJECTED
-    except Cancelled as cancellation:
-        reporter.cancelled(cancellation.hint)
-        return CANCELLED
-    except KeyboardInterrupt:
-        reporter.cancelled()
+    except (Cancelled, KeyboardInterrupt) as cancellation:
+        reporter.cancelled("; ".join(getattr(cancellation, "__notes__", ())))
         return CANCELLED
     except BrokenPipeError:
         discard_output()

@@ -9,9 +9,9 @@ folder is removed once the output is complete.
 
 Citation: none; the keys are those of `stage_cache`.
 
-Limits: the stage at which a run was interrupted begins anew. If the command is not repeated, the
-folder stays until it is removed by hand. Where it cannot be written, or its name is too long,
-nothing is kept.
+Limits: the stage at which a run was interrupted begins anew. The folder stays until a run with the
+same output is complete, or it is removed by hand. Where it cannot be written, or its name is too
+long, nothing is kept.
 """
 
 import contextlib
@@ -23,6 +23,7 @@ import numpy as np
 
 from ..errors import Cancelled
 from .atomic import remove_unfinished_in
+from .printable_names import readable
 from .stage_cache import SUFFIX, Arrays, StageCache
 
 _STAGE = re.compile(r"[0-9a-f]{64}" + re.escape(SUFFIX))
@@ -31,8 +32,7 @@ _STAGE = re.compile(r"[0-9a-f]{64}" + re.escape(SUFFIX))
 class Checkpoint:
     """The kept stages of a run, as a `KeptStages`.
 
-    A context: a cancellation in it says that the same command continues the run, if anything is
-    kept.
+    A context: if anything is kept, a cancellation in it has a note that names the folder.
 
     Attributes
     ----------
@@ -110,8 +110,11 @@ class Checkpoint:
         return self
 
     def __exit__(self, kind: object, value: BaseException | None, trace: object) -> None:
-        if isinstance(value, Cancelled) and self._stages():
-            value.hint = "the same command continues this run"
+        if isinstance(value, Cancelled | KeyboardInterrupt) and self._stages():
+            value.add_note(
+                f"finished stages are kept in {readable(str(self.folder))}: repeat the command to "
+                "continue, or remove that folder"
+            )
 
 
 def _beside(output: Path) -> Path:

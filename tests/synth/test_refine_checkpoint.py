@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 from unittest.mock import Mock
@@ -15,11 +16,11 @@ from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition
 from synth.refine.transport import light_transport
+from tests.core.command_line import ROOT, isc_command, run_isc
 from tests.core.refinement.test_gloss import glossy
 from tests.synth.refine_command import command
 
 _REPORTS = 100  # of a run until it is interrupted; no stage has as many
-ROOT = Path(__file__).resolve().parents[2]
 CONTINUED = "continued an interrupted run"
 
 
@@ -37,7 +38,8 @@ def interrupt(words: list[str], reports: int = _REPORTS, stage: str = "") -> Non
     """Run the command until it is cancelled."""
     with pytest.raises(Cancelled) as cancellation:
         command(words, cancelled_after(reports, stage))
-    assert cancellation.value.hint == "the same command continues this run"
+    (note,) = cancellation.value.__notes__
+    assert "repeat the command to continue" in note
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -137,6 +139,53 @@ def test_a_killed_run_is_continued(results: Path, tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
+def require_continued(words: list[str], results: Path, output: Path) -> None:
+    """Check that nothing but stages was left beside the output, and that the run continues."""
+    assert [path.name for path in output.parent.iterdir()] == [".out.checkpoint"]
+    stages = list(checkpoint(output).iterdir())
+    assert stages and all(path.suffix == ".npz" for path in stages)
+    lines = command(words)
+    assert CONTINUED in lines and not any("note" in line for line in lines)
+    assert contents(output) == contents(results / "gloss")
+    assert [path.name for path in output.parent.iterdir()] == ["out"]
+
+
+@pytest.mark.slow
+def test_a_run_that_a_batch_system_ends_is_continued(results: Path, tmp_path: Path) -> None:
+    output = tmp_path / "out"
+    words = [str(results / "start"), "-o", str(output)]
+    with subprocess.Popen(
+        isc_command("refine", *words), cwd=ROOT, stderr=subprocess.PIPE, text=True
+    ) as process:
+        while process.poll() is None and not list(checkpoint(output).glob("*.npz")):
+            time.sleep(0.01)
+        process.terminate()
+        error = process.communicate(timeout=60)[1]
+    assert process.returncode == 143 and "Traceback" not in error, error
+    require_continued(words, results, output)
+
+
+@pytest.mark.slow
+def test_sigterm_while_the_output_is_written_leaves_the_stages(
+    results: Path, tmp_path: Path
+) -> None:
+    output = tmp_path / "out"
+    words = [str(results / "start"), "-o", str(output)]
+    before = (
+        "import os, signal\n"
+        "from isc_core.progress import Monitor\n"
+        "report = Monitor.report\n"
+        "def ending(self, stage, *rest):\n"
+        "    report(self, stage, *rest)\n"
+        "    if stage == 'building the mesh':\n"
+        "        os.kill(os.getpid(), signal.SIGTERM)\n"
+        "Monitor.report = ending"
+    )
+    ended = run_isc("refine", *words, before=before)
+    assert ended.returncode == 143 and "Traceback" not in ended.stderr, ended.stderr
+    require_continued(words, results, output)
+
+
 @pytest.mark.slow
 def test_a_stage_that_is_cut_short_is_computed_again(results: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
@@ -170,7 +219,7 @@ def test_where_nothing_can_be_kept_the_run_ends_the_same(results: Path, tmp_path
     checkpoint(output).write_bytes(b"mine")
     with pytest.raises(Cancelled) as cancellation:
         command([str(results / "start"), "-o", str(output)], cancelled_after(_REPORTS))
-    assert not cancellation.value.hint
+    assert not hasattr(cancellation.value, "__notes__")
     command([str(results / "start"), "-o", str(output)])
     assert contents(output) == contents(results / "gloss")
     assert checkpoint(output).read_bytes() == b"mine"

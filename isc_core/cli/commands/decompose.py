@@ -11,7 +11,8 @@ from ...decomposition.models import load
 from ...decomposition.pipeline import KnownInputs, Settings, decompose
 from ...errors import InputError
 from ...imaging.bounding_box import mask_box
-from ...io.stage_cache import StageCache
+from ...io.checkpoint import Checkpoint
+from ...io.stage_cache import KeptStages, StageCache
 from ...masking.finder import MaskSearch, read_each_object
 from ...photo import Photo, read_photo
 from ...progress import Monitor
@@ -91,7 +92,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--refine",
         action="store_true",
         help="fit lamps and gloss to the highlights, as isc refine does; kept only if the fit "
-        "explains the photo better",
+        "explains the photo better; after an interruption, the same command continues the fit",
     )
     main.add_argument(
         "--png", action="store_true", help="also write the layers as 8-bit PNG, beside maps/*.exr"
@@ -123,8 +124,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
         "--cache",
         type=Path,
         metavar="DIR",
-        help="keep in DIR what does not depend on model and separator, 1 to 2 MB per photo: the "
-        "next run on the photo takes less time, and gives the same result",
+        help="keep in DIR what does not depend on model and separator, and the fits of --refine, 1 "
+        "to 2 MB per photo: the next run on the photo takes less time, and gives the same result",
     )
 
 
@@ -241,41 +242,30 @@ def _decompose_photo(
     photo = with_marks(photo, options)
     known = _known_inputs(options, photo)
     require_room(output, _pixels(photo, settings), arrays=options.arrays)
-    result = decompose(
-        photo,
-        settings,
-        known=known,
-        prior_set=prior_set,
-        name="standard input" if path == STDIN else path.name,
-        memory=options.memory,
-        kept=None if options.cache is None else StageCache(options.cache),
-        monitor=monitor.part(0.0, 0.7 if options.refine else 0.8),
-    )
-    refined = list[str]()
-    if options.refine:
-        result, line = _refined(result, settings.seed, monitor.part(0.7, 0.8))
-        refined = [line]
-    writing, texture = monitor.part(0.8, 1.0), None
-    if options.texture_size is not None and options.texture_size != MAPS_SIZE:
-        from ...result_files.exports.full_texture import full_texture
-
-        writing.report("refining the texture", 0.0)
-        texture = full_texture(photo, result, options.texture_size)
-    save(
-        result,
-        output,
-        mesh=MeshOptions(triangles=options.triangles),
-        arrays=options.arrays,
-        texture=texture,
-        png=options.png,
-        cover=photo.cover,
-        monitor=writing,
-    )
+    cache, refined = None if options.cache is None else StageCache(options.cache), list[str]()
+    with Checkpoint(output) as checkpoint:
+        result = decompose(
+            photo,
+            settings,
+            known=known,
+            prior_set=prior_set,
+            name="standard input" if path == STDIN else path.name,
+            memory=options.memory,
+            kept=cache,
+            monitor=monitor.part(0.0, 0.7 if options.refine else 0.8),
+        )
+        if options.refine:
+            refining = monitor.part(0.7, 0.8)
+            result, line = _refined(result, settings.seed, cache or checkpoint, refining)
+            refined = [line]
+        _write(result, photo, output, options, monitor.part(0.8, 1.0))
+        checkpoint.remove()
     preview = output / "preview.png"
     return hints(
         options,
         *reading_note_lines(photo.original.notes),
         *refined,
+        *checkpoint.notes(),
         *note_lines(result.provenance.diagnostics),
         *(f"note: {note}" for note in mark_notes(photo, result)),
         *_detail_notes(settings, max(mask_box(result.mask)[2:]), max(photo.box[2:])),
@@ -285,13 +275,36 @@ def _decompose_photo(
     )
 
 
-def _refined(result: Decomposition, seed: int, monitor: Monitor) -> tuple[Decomposition, str]:
+def _refined(
+    result: Decomposition, seed: int, kept: KeptStages, monitor: Monitor
+) -> tuple[Decomposition, str]:
     """The result, with refined gloss if that explains the photo better, and a line about it."""
     from ...refinement import GlossOptions, refine_gloss
     from ...refinement.gloss_note import gloss_line
 
-    done = refine_gloss(result, GlossOptions(seed=seed), monitor)
+    done = refine_gloss(result, GlossOptions(seed=seed), monitor, kept)
     return done.result, gloss_line(done.result.provenance.settings)
+
+
+def _write(
+    result: Decomposition, photo: Photo, output: Path, options: argparse.Namespace, monitor: Monitor
+) -> None:
+    texture = None
+    if options.texture_size is not None and options.texture_size != MAPS_SIZE:
+        from ...result_files.exports.full_texture import full_texture
+
+        monitor.report("refining the texture", 0.0)
+        texture = full_texture(photo, result, options.texture_size)
+    save(
+        result,
+        output,
+        mesh=MeshOptions(triangles=options.triangles),
+        arrays=options.arrays,
+        texture=texture,
+        png=options.png,
+        cover=photo.cover,
+        monitor=monitor,
+    )
 
 
 def _decompose_each(

@@ -777,11 +777,13 @@ def test_kernels_count_as_compiled_once_they_were_used(result: Path) -> None:
     assert kernels_compiled()
 
 
+@pytest.mark.parametrize("cancellation", [Cancelled(), KeyboardInterrupt()])
 def test_a_cancelled_command_says_how_to_go_on(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    cancellation: BaseException,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    cancellation = Cancelled()
-    cancellation.hint = "the same command continues this run"
+    cancellation.add_note("repeat the command to continue")
     monkeypatch.setattr("isc_core.cli.main._run", Mock(side_effect=cancellation))
     assert main(["refine"]) == 130
-    assert capsys.readouterr().err == "isc: cancelled; the same command continues this run\n"
+    assert capsys.readouterr().err == "isc: cancelled; repeat the command to continue\n"

@@ -72,18 +72,20 @@ def test_a_place_that_cannot_be_written_changes_nothing(tmp_path: Path, name: st
         (tmp_path / ".cup.checkpoint").touch()
     checkpoint = Checkpoint(tmp_path / name)
     assert computed(checkpoint, 1) and computed(checkpoint, 1) and checkpoint.notes() == []
-    assert not hint_of_cancelled(checkpoint)
+    assert not notes_of_stopped(checkpoint, Cancelled())
     checkpoint.remove()
 
 
-def test_a_cancelled_run_says_that_it_can_be_continued(tmp_path: Path) -> None:
-    checkpoint = Checkpoint(tmp_path / "cup")
-    assert not hint_of_cancelled(checkpoint), "nothing is kept yet"
+@pytest.mark.parametrize("stop", [Cancelled(), KeyboardInterrupt()])
+def test_a_stopped_run_says_what_is_kept(tmp_path: Path, stop: BaseException) -> None:
+    checkpoint = Checkpoint(tmp_path / "cup\n")
+    assert not notes_of_stopped(checkpoint, stop), "nothing is kept yet"
     computed(checkpoint, 1)
-    assert hint_of_cancelled(checkpoint) == "the same command continues this run"
+    (note,) = notes_of_stopped(checkpoint, stop)
+    assert f"{tmp_path}/.cup\\n.checkpoint: repeat the command" in note
 
 
-def hint_of_cancelled(checkpoint: Checkpoint) -> str:
-    with pytest.raises(Cancelled) as cancellation, checkpoint:
-        raise Cancelled
-    return cancellation.value.hint
+def notes_of_stopped(checkpoint: Checkpoint, stop: BaseException) -> list[str]:
+    with pytest.raises(type(stop)) as stopped, checkpoint:
+        raise stop
+    return getattr(stopped.value, "__notes__", [])
