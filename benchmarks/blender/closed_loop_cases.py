@@ -24,6 +24,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.arrays_file import ARRAYS, write_arrays
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.scene.part_of_result import ResultPart
 from synth.capture.recipe import FamilyMember, PictureSettings, Recipe, photograph
 from synth.capture.sensor import write_photo
 from synth.capture.truth import GroundTruth, exposed, render_truth
@@ -288,7 +289,7 @@ def _save_truth(truth: GroundTruth, folder: Path) -> None:
         *layers, truth.normal, height, truth.mask, certain, truth.illumination, Provenance()
     )
     save(d, folder)
-    write_arrays(d, folder / ARRAYS)
+    write_arrays(ResultPart.of(d), folder / ARRAYS)
 
 
 def _new_truths(

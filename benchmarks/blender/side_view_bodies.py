@@ -22,6 +22,7 @@ from isc_core.decomposition.settings import Settings
 from isc_core.result_files.arrays_file import write_arrays
 from isc_core.result_files.result_folder import save
 from isc_core.result_files.turned_view import turned_view
+from isc_core.scene.part_of_result import ResultPart
 from synth.albedos import make_albedo
 from synth.shapes import make_shape
 
@@ -134,7 +135,7 @@ def decompose_body(body: Body, folder: Path) -> Path:
             view.values.astype(np.float32), view.coverage > 0.5, settings=settings
         )
         save(found, output)
-        write_arrays(found, output / "arrays.npz")
+        write_arrays(ResultPart.of(found), output / "arrays.npz")
     return output
 
 

@@ -81,27 +81,23 @@ _INTEGERS = {"faces", "vertex_pixel", "photo_size", "frame"}
 
 
 def write_arrays(
-    d: Decomposition,
+    stored: ResultPart,
     path: Path,
     built: MeshResult | None = None,
     texture: np.ndarray | None = None,
     cover: ObjectCover | None = None,
-    part: FramePart | None = None,
 ) -> None:
     """Write the file; equal results give equal bytes.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     path : Path
     built : MeshResult, optional
-        The mesh of `d`; built here by default.
+        Its mesh; built here by default.
     texture : (h, w, 3) uint8 ndarray, optional
         Of `exports.full_texture`.
     cover : ObjectCover, optional
-        Of the frame.
-    part : FramePart, optional
-        The part of the frame that the maps of `d` are of; by default all of it.
 
     Raises
     ------
@@ -110,43 +106,36 @@ def write_arrays(
     OSError
         If the file cannot be written.
     """
-    stored = ResultPart.of(d, part)
-    factor = finer_by(texture, stored.part.shape)
-    built = built or mesh_of(d, finer=factor, part=part)
-    place = built.place
-    fine = place.scaled(factor, place.shape if texture is None else texture.shape)
-    arrays = arrays_of(stored.at(place), built)
-    if texture is not None:
-        arrays["texture"] = fine.cut(texture)
+    built = built or mesh_of(stored, finer=finer_by(texture, stored.part.shape))
+    built = built if texture is None else built.with_texture(texture)
+    arrays = arrays_of(stored.at(built.place), built)
+    if built.texture is not None:
+        arrays["texture"] = built.texture
     if cover is not None:
-        arrays |= _cover(cover, place, fine)
+        arrays |= _cover(cover, built)
     with path.open("wb") as file:  # NumPy would add a suffix to a file name
         np.savez(file, **arrays)
 
 
 def mesh_of(
-    d: Decomposition,
+    stored: ResultPart,
     options: MeshOptions | None = None,
     cover: ObjectCover | None = None,
     gloss: SpecularFit | None = None,
     finer: float = 1.0,
-    part: FramePart | None = None,
 ) -> MeshResult:
     """Build the mesh of a result, with maps and textures of the object's part of the frame.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     options : MeshOptions, optional
     cover : ObjectCover, optional
-        Of the frame; the mesh follows its outline, unless the object is so thin that smoothing
-        would remove it.
+        The mesh follows its outline, unless the object is so thin that smoothing would remove it.
     gloss : SpecularFit, optional
         From another mesh of this result, if it is known.
     finer : float, optional
         Size of a texture of the frame over the size of the maps' frame.
-    part : FramePart, optional
-        The part of the frame that the maps of `d` are of; by default all of it.
 
     Returns
     -------
@@ -157,15 +146,14 @@ def mesh_of(
     InputError
         If the mask is too small for a mesh.
     """
-    stored = ResultPart.of(d, part)
     place = _part_of(stored.mask, finer)
-    near, edge = stored.at(place), None if cover is None else cover.cut(place)
+    near = stored.at(place)
     with ThreadPoolExecutor(1) as pool:  # half of the work
         found = None if gloss is not None else pool.submit(bounded_specular, near)
-        built = _surface_of(near, options, edge)
+        built = _surface_of(near, place, options, cover)
         fit = gloss if found is None else found.result()
     assert fit is not None
-    return replace(_coated(near, built, fit), part=place)
+    return _coated(near, built, fit)
 
 
 def finer_by(texture: np.ndarray | None, shape: tuple[int, ...]) -> float:
@@ -208,15 +196,15 @@ def _coated(d: Decomposition, built: MeshResult, gloss: SpecularFit) -> MeshResu
 
 
 def _surface_of(
-    d: Decomposition, options: MeshOptions | None, cover: ObjectCover | None
+    d: Decomposition, part: FramePart, options: MeshOptions | None, cover: ObjectCover | None
 ) -> MeshResult:
     maps = d.height, d.normal, d.mask, d.reflectance
     try:
-        return build_mesh(*maps, options, camera=d.camera, cover=cover)
+        return build_mesh(*maps, options, camera=d.camera, cover=cover, part=part)
     except InputError:
         if cover is None:
             raise
-        return build_mesh(*maps, options, camera=d.camera)
+        return build_mesh(*maps, options, camera=d.camera, part=part)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
@@ -263,12 +251,12 @@ def _part_of(mask: np.ndarray, factor: float) -> FramePart:
     return FramePart(rows, columns, part.shape)
 
 
-def _cover(cover: ObjectCover, part: FramePart, fine: FramePart) -> dict[str, np.ndarray]:
-    """The coverage in a part of the maps, and the opacity in that part of the texture."""
-    share, alpha = part.cut(cover.share), cover.alpha(fine.shape)
-    if cover.soft is None or alpha is None:
-        return {"cover": share}
-    return {"cover": share, "soft": part.cut(cover.soft), "alpha": fine.cut(alpha)}
+def _cover(cover: ObjectCover, built: MeshResult) -> dict[str, np.ndarray]:
+    """The coverage in the mesh's part of the maps, and the opacity in that of the texture."""
+    rim, alpha = cover.rim(built.place), cover.alpha(built.texture_part or built.place)
+    if rim.soft is None or alpha is None:
+        return {"cover": rim.cover}
+    return {"cover": rim.cover, "soft": rim.soft, "alpha": alpha}
 
 
 def _typed(name: str, values: np.ndarray) -> np.ndarray:

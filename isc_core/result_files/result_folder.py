@@ -144,15 +144,15 @@ def save(
             maps.result()
             release_memory()
         monitor.report("building the mesh", 0.4)
-        edge = object_cover(d, cover, part)
+        edge = object_cover(given, cover)
         finer = finer_by(texture, place.shape)
-        built = mesh_of(d, mesh, edge, finer=finer, part=part)
+        built = mesh_of(given, mesh, edge, finer=finer)
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)
             # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
-            plain = built if edge is None else mesh_of(d, mesh, None, built.gloss, finer, part)
-            write_arrays(d, partial / ARRAYS, plain, texture, edge, part)
+            plain = built if edge is None else mesh_of(given, mesh, None, built.gloss, finer)
+            write_arrays(given, partial / ARRAYS, plain, texture, edge)
         if png:
             write_layer_pngs(placed_result(d, given.part), partial)
         if d.environment is not None:

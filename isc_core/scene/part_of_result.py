@@ -29,14 +29,14 @@ class ResultPart:
     part: FramePart
 
     @classmethod
-    def of(cls, d: Decomposition, part: FramePart | None) -> "ResultPart":
+    def of(cls, d: Decomposition, part: FramePart | None = None) -> "ResultPart":
         """Return a result as a part of its frame.
 
         Parameters
         ----------
         d : Decomposition
-        part : FramePart or None
-            The part that its maps are of; None stands for the whole frame.
+        part : FramePart, optional
+            The part that its maps are of; by default the whole frame.
 
         Returns
         -------

@@ -12,6 +12,7 @@ from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.scene.decomposition import Decomposition, Provenance
 from isc_core.scene.diagnostics import Diagnostics
+from isc_core.scene.part_of_result import ResultPart
 from isc_core.shading.spherical_harmonics import real_sh
 
 
@@ -80,7 +81,9 @@ def write_result(
     d = decomposition or bump()
     folder.mkdir(parents=True, exist_ok=True)
     write_arrays(
-        d, folder / "arrays.npz", build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh)
+        ResultPart.of(d),
+        folder / "arrays.npz",
+        build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh),
     )
     p = d.provenance
     text = {

@@ -12,7 +12,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
 from isc_core.result_files.arrays_file import write_arrays
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.part_of_result import placed_result
+from isc_core.scene.part_of_result import ResultPart, placed_result
 from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels, render
 from tests.core.perspective_scene import bump_before_camera
@@ -67,7 +67,7 @@ def build(result: ResultArrays, **options: Any) -> Any:
 
 def arrays_of_part(folder: Path, d: Decomposition) -> ResultArrays:
     write_result(folder, d)
-    write_arrays(d, folder / "arrays.npz")
+    write_arrays(ResultPart.of(d), folder / "arrays.npz")
     return read_result(folder)
 
 

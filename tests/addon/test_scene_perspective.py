@@ -12,6 +12,7 @@ from isc_core.errors import InputError
 from isc_core.photo.camera import Camera
 from isc_core.result_files.arrays_file import mesh_of, write_arrays
 from isc_core.result_files.result_folder import save
+from isc_core.scene.part_of_result import ResultPart
 from tests.addon.scene_render import render
 from tests.core.perspective_scene import CAMERA, bump_before_camera
 
@@ -105,7 +106,11 @@ def test_the_other_type_of_camera_replaces_the_first(
 def test_half_a_camera_is_refused(tmp_path: Path) -> None:
     d = bump_before_camera()
     save(d, tmp_path / "bump")
-    write_arrays(d, tmp_path / "bump" / "arrays.npz", replace(mesh_of(d), camera=CAMERA))
+    write_arrays(
+        ResultPart.of(d),
+        tmp_path / "bump" / "arrays.npz",
+        replace(mesh_of(ResultPart.of(d)), camera=CAMERA),
+    )
     arrays = dict(np.load(tmp_path / "bump" / "arrays.npz"))
     del arrays["eye"]
     np.savez(tmp_path / "bump" / "arrays.npz", **arrays)

@@ -12,6 +12,7 @@ from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.result_files.arrays_file import write_arrays
 from isc_core.result_files.mesh.object_cover import object_cover
+from isc_core.scene.part_of_result import ResultPart
 from tests.addon.scene_fixture import bump, write_result
 
 CENTRE, RADIUS = (27.0, 38.0), 0.4 * 64 * 0.9**0.5  # of the bump
@@ -28,8 +29,8 @@ def folder_of(path: Path, width: float) -> Path:
     """A result folder with the soft cover."""
     folder, d = write_result(path), bump()
     given = {**d.provenance.input, "mask_from": "alpha"}
-    d = replace(d, provenance=replace(d.provenance, input=given))
-    write_arrays(d, folder / "arrays.npz", cover=object_cover(d, cover(width)))
+    stored = ResultPart.of(replace(d, provenance=replace(d.provenance, input=given)))
+    write_arrays(stored, folder / "arrays.npz", cover=object_cover(stored, cover(width)))
     return folder
 
 

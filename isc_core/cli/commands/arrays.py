@@ -54,12 +54,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     monitor.report("reading", 0.0)
     stored, path = load_part(options.result), options.result / ARRAYS
-    result, part = stored.result, stored.part
-    cover = object_cover(result, read_cover(options.result / MASK), part)
+    cover = object_cover(stored, read_cover(options.result / MASK))
     require_writable_file(path)
     monitor.report("writing arrays", 0.3)
     with new_file(path) as partial:
-        built = mesh_of(result, MeshOptions(triangles=options.triangles), part=part)
-        write_arrays(result, partial, built, cover=cover, part=part)
+        built = mesh_of(stored, MeshOptions(triangles=options.triangles))
+        write_arrays(stored, partial, built, cover=cover)
         monitor.report("writing arrays", 1.0)
     return hints(options, f"wrote {path}")

@@ -137,16 +137,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.textures is not None:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
-    cover = object_cover(d, read_cover(options.result / MASK), part)
+    cover = object_cover(stored, read_cover(options.result / MASK))
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
     # Texture sets are for the plane of the photo, whose mesh has its vertices at pixels.
     fine = options.photo is not None and options.texture_size != MAPS_SIZE
     texture = _fine_texture(placed_result(d, part), options) if fine else None
-    factor = finer_by(texture, part.shape)
     edge = None if options.format is None else cover
-    built = mesh_of(d, how, edge, finer=factor, part=part)
-    if texture is not None:
-        built = replace(built, texture=built.place.scaled(factor, texture.shape).cut(texture))
+    built = mesh_of(stored, how, edge, finer=finer_by(texture, part.shape))
+    built = built if texture is None else built.with_texture(texture)
     if options.roughness is not None:
         given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
         built = replace(built, gloss=replace(built.gloss, **given))

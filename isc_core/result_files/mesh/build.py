@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import InputError
-from ...imaging.bounding_box import mask_slices
+from ...imaging.bounding_box import FramePart, mask_slices
 from ...imaging.channels import total
 from ...imaging.row_blocks import row_blocks
 from ...photo.camera import Camera
@@ -63,6 +63,7 @@ def build_mesh(
     options: MeshOptions | None = None,
     camera: Camera | None = None,
     cover: ObjectCover | None = None,
+    part: FramePart | None = None,
 ) -> MeshResult:
     """Build the mesh of the pixels inside the mask.
 
@@ -81,6 +82,8 @@ def build_mesh(
     cover : ObjectCover, optional
         The mesh follows its outline; by default it ends in the steps of the mask's pixels, or, with
         a back, halfway between them.
+    part : FramePart, optional
+        The part of the frame of `cover` that the maps are of; by default all of it.
 
     Returns
     -------
@@ -97,7 +100,8 @@ def build_mesh(
     if options.back is Back.OPEN and cover is None:
         shape = _open_sheet(limited, normal, mask, options, camera)
     else:
-        rim = Rim(mask) if cover is None else Rim(cover.share, cover.soft)
+        place = part or FramePart.whole((mask.shape[0], mask.shape[1]))
+        rim = Rim(mask) if cover is None else cover.rim(place)
         shape = _outlined(limited, normal, mask, rim, options, camera)
     pixels = shape.places
     middle = (pixels.min(0) + pixels.max(0)) / 2
@@ -126,6 +130,7 @@ def build_mesh(
         camera=camera,
         eye=None if camera is None else -middle * size,
         cover=cover,
+        part=part,
     )
 
 

@@ -7,7 +7,8 @@ was found in the photo, of a soft mask and of an alpha channel is known with sub
 Equation: the coverage of a pixel of the maps is the mean over its area. Beyond two pixels from the
 object it is 0, because the photo may show other objects, unless the rim is soft (`photo.soft_rim`)
 and the pixel is connected to the object by partly covered pixels. There the coverage is the opacity
-of the surface.
+of the surface. `ObjectCover.alpha` is the opacity of all textures: in a part of the frame, it is
+that of the frame.
 
 Citation: coverage as opacity: T. Porter and T. Duff, "Compositing digital images", SIGGRAPH 1984,
 doi:10.1145/800031.808606.
@@ -27,8 +28,8 @@ from ...imaging.row_blocks import row_blocks
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
 from ...photo.soft_rim import rim_reach, soft_rim
-from ...scene.decomposition import Decomposition
 from ...scene.part_of_result import ResultPart
+from ..solids.rim import Rim
 
 _NEAR = 2  # pixels
 _SOME = 0.02  # of a pixel: less is ignored
@@ -48,37 +49,34 @@ class ObjectCover:
         The coverage of the photo's pixels, in codes.
     scale : float
         Map pixels per pixel of `fine`.
-    corner : tuple of int
-        (x, y) of the upper left pixel in the maps that `fine` covers.
     """
 
     share: np.ndarray
     soft: np.ndarray | None = None
     fine: np.ndarray | None = None
     scale: float = 1.0
-    corner: tuple[int, int] = (0, 0)
 
-    def cut(self, part: FramePart) -> "ObjectCover":
-        """Return the coverage of a part of the frame.
+    def rim(self, part: FramePart) -> Rim:
+        """Return the rim of the object.
 
         Parameters
         ----------
         part : FramePart
+            Of the maps.
 
         Returns
         -------
-        ObjectCover
+        Rim
         """
-        soft = None if self.soft is None else part.cut(self.soft)
-        return ObjectCover(part.cut(self.share), soft, self.fine, self.scale, part.corner)
+        return Rim(part.cut(self.share), None if self.soft is None else part.cut(self.soft))
 
-    def alpha(self, shape: tuple[int, int] | None = None) -> np.ndarray | None:
+    def alpha(self, part: FramePart) -> np.ndarray | None:
         """Return the opacity of the surface, which is 1 except at soft rims.
 
         Parameters
         ----------
-        shape : tuple of int, optional
-            Rows and columns of a texture over the same frame; by default those of `share`.
+        part : FramePart
+            Of the maps, or of a texture over their frame.
 
         Returns
         -------
@@ -87,11 +85,10 @@ class ObjectCover:
         """
         if self.soft is None or self.fine is None:
             return None
-        height, width = shape or self.share.shape
-        factor = max(1.0, width / self.share.shape[1])
-        x, y = (round(factor * start) for start in self.corner)
-        cover = _resized(self.fine, self.scale * factor, (height, width), (x, y))
-        weight = enlarged(self.soft.astype(np.float32), (height, width), factor)
+        factor = max(1.0, part.shape[1] / self.share.shape[1])
+        cover = _resized(self.fine, self.scale * factor, part)
+        start = (part.rows.start, part.columns.start)
+        weight = enlarged(self.soft.astype(np.float32), part.size, factor, start)
         return np.rint(255 * (1 - weight * (1 - cover))).astype(np.uint8)
 
 
@@ -120,18 +117,14 @@ def read_cover(mask_file: Path) -> np.ndarray | None:
     return values.astype(np.float32) / np.iinfo(raster.values.dtype).max
 
 
-def object_cover(
-    d: Decomposition, given: np.ndarray | None, part: FramePart | None = None
-) -> ObjectCover | None:
+def object_cover(stored: ResultPart, given: np.ndarray | None) -> ObjectCover | None:
     """Return the object's coverage of the maps' pixels.
 
     Parameters
     ----------
-    d : Decomposition
+    stored : ResultPart
     given : (h, w) ndarray or None
         Coverage of the photo's pixels, 0 to 1.
-    part : FramePart, optional
-        The part of the frame that the maps of `d` are of; by default all of it.
 
     Returns
     -------
@@ -143,19 +136,18 @@ def object_cover(
     codes = _codes(given)
     if not ((codes > 0) & (codes < 255)).any():
         return None
-    scale = min(1.0, float(d.provenance.input.get("scale", 1.0)))
-    mask = ResultPart.of(d, part).mask
-    shape = (mask.shape[0], mask.shape[1])
-    if shape != tuple(reduced_count(count, scale) for count in codes.shape):  # of another photo
-        return None
-    own = d.provenance.input.get("mask_from") == "alpha"
+    source, mask = stored.result.provenance.input, stored.mask
+    scale = min(1.0, float(source.get("scale", 1.0)))
+    if mask.shape != tuple(reduced_count(count, scale) for count in codes.shape):
+        return None  # it is of another photo
+    own = source.get("mask_from") == "alpha"
     if scale < 1:
-        share = _resized(codes, scale, shape)
+        share = _resized(codes, scale, FramePart.whole(stored.part.shape))
         place = FramePart.around(mask | (share > 0), rim_reach(mask, own))
         share = place.cut(share)
     else:
         place = FramePart.around(mask | (codes > 0), rim_reach(mask, own))
-        share = _resized(place.cut(codes), 1.0, place.size)
+        share = _resized(codes, 1.0, place)
     share, soft = _near(share, place.cut(mask), own)
     whole = None if soft is None else place.placed(soft)
     return ObjectCover(place.placed(share), whole, codes, scale)
@@ -179,18 +171,15 @@ def _near(share: np.ndarray, mask: np.ndarray, own: bool) -> tuple[np.ndarray, n
     return share, soft
 
 
-def _resized(
-    codes: np.ndarray, scale: float, shape: tuple[int, int], corner: tuple[int, int] = (0, 0)
-) -> np.ndarray:
-    """The coverage (H, W) float32 at a scale, unchanged from 1, from a corner (x, y) on; 0 beyond
-    the photo.
-    """
-    cover = codes.astype(np.float32) / 255
+def _resized(codes: np.ndarray, scale: float, part: FramePart) -> np.ndarray:
+    """The coverage (h, w) float32 of a part at a scale, unchanged from 1; 0 beyond the photo."""
     if scale < 1:
-        area = AreaFilter.of(cover.shape, scale)
-        cover = np.clip(area(cover) / np.maximum(area.full, 1e-6), 0, 1)
-    cover = cover[corner[1] :, corner[0] :]
-    found = np.zeros(shape, np.float32)
-    rows, columns = (min(a, b) for a, b in zip(shape, cover.shape, strict=True))
-    found[:rows, :columns] = cover[:rows, :columns]
+        area = AreaFilter.of(codes.shape, scale)
+        cover = area(codes.astype(np.float32) / 255) / np.maximum(area.full, 1e-6)
+        cover = part.cut(np.clip(cover, 0, 1))
+    else:
+        cover = part.cut(codes).astype(np.float32) / 255
+    found = np.zeros(part.size, np.float32)
+    rows, columns = cover.shape
+    found[:rows, :columns] = cover
     return found

@@ -11,7 +11,7 @@ Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import log, pi, sqrt
 from typing import Any
 
@@ -22,7 +22,6 @@ from ...lobe_fitting.specular_layer import CoatedSurface
 from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
 from ..solids.back import Back
-from ..solids.rim import Rim
 from .glb import ExtraPrimitive, TexturedMesh, encode_glb
 from .object_cover import ObjectCover
 from .options import MeshOptions
@@ -61,9 +60,11 @@ class MeshResult:
     eye : (3,) ndarray or None
         The camera's position in metres.
     texture : (h, w, 3) uint8 ndarray or None
-        Base colour of higher resolution in sRGB codes, over the same frame.
+        Base colour of higher resolution in sRGB codes, see `with_texture`.
+    texture_part : FramePart or None
+        The part of the texture's frame that it covers; None without a texture.
     cover : ObjectCover or None
-        Coverage that the outline follows; None for the steps of the pixels.
+        Coverage that the outline follows, of the frame; None for the steps of the pixels.
     coated : CoatedSurface or None
         Determines the base colour under the gloss; None keeps the base colour unchanged.
     part : FramePart or None
@@ -84,6 +85,7 @@ class MeshResult:
     camera: Camera | None = None
     eye: np.ndarray | None = None
     texture: np.ndarray | None = None
+    texture_part: FramePart | None = None
     cover: ObjectCover | None = None
     coated: CoatedSurface | None = None
     part: FramePart | None = None
@@ -94,6 +96,22 @@ class MeshResult:
         rows, columns = self.detail.shape[:2]
         return FramePart.whole((rows, columns)) if self.part is None else self.part
 
+    def with_texture(self, texture: np.ndarray) -> "MeshResult":
+        """Return the mesh with a base colour of higher resolution.
+
+        Parameters
+        ----------
+        texture : (h, w, 3) uint8 ndarray
+            sRGB codes of the result's frame, of `exports.full_texture`.
+
+        Returns
+        -------
+        MeshResult
+            Its texture is a view.
+        """
+        part = self.place.scaled(texture.shape[1] / self.place.shape[1], texture.shape)
+        return replace(self, texture=part.cut(texture), texture_part=part)
+
     @property
     def needs_normal_map(self) -> bool:
         """Whether the normal map adds detail to the normals of the vertices."""
@@ -103,8 +121,7 @@ class MeshResult:
     @property
     def alpha(self) -> np.ndarray | None:
         """The opacity at the size of the base colour, (h, w) uint8; None for an opaque object."""
-        width, height = self.base_color_size
-        return None if self.cover is None else self.cover.alpha((height, width))
+        return None if self.cover is None else self.cover.alpha(self.texture_part or self.place)
 
     @property
     def soft_faces(self) -> np.ndarray | None:
@@ -112,7 +129,7 @@ class MeshResult:
         if self.cover is None or self.cover.soft is None:
             return None
         row, column = self.vertex_pixel.T
-        thin = Rim(self.cover.share, self.cover.soft).sheet[row, column]
+        thin = self.cover.rim(self.place).sheet[row, column]
         faces = thin[self.mesh.faces].any(1)
         return faces if faces.any() and not faces.all() else None
 

@@ -52,7 +52,7 @@ def half_size(full: Decomposition) -> Decomposition:
 
 def composited(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
     """The photo after an edit, and where it changed."""
-    done = composite(ResultPart.of(d, None), edit, photo)
+    done = composite(ResultPart.of(d), edit, photo)
     image, changed = photo.image.copy(), done.place.placed(done.changed)
     done.place.cut(image)[...] = done.image
     return image, changed
@@ -126,7 +126,7 @@ def test_the_object_s_part_of_a_result_gives_the_bytes_of_the_whole(scale: float
     assert part.share < 0.3
     light = DirectionalLight(toward(-0.5, 0.4, 0.7), np.ones(3))
     for edit in (partial(add_highlight, light=light), partial(recolour, change=ColourEdit(90))):
-        whole = composite(ResultPart.of(maps, None), edit(maps), photo)
+        whole = composite(ResultPart.of(maps), edit(maps), photo)
         found = composite(ResultPart(near, part), edit(near), photo)
         assert found.changed.any() and found.place == whole.place
         np.testing.assert_array_equal(found.image, whole.image)
@@ -140,7 +140,7 @@ def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
     shifted = replace(photo, mask=np.roll(photo.mask, 15, axis=1))
     for wrong in (smaller, shifted):
         with pytest.raises(InputError, match="give the same"):
-            composite(ResultPart.of(half, None), edit, wrong)
+            composite(ResultPart.of(half), edit, wrong)
     part = FramePart(slice(5, 90), slice(15, 105), half.mask.shape)
     near = cut_result(half, part)
     for wrong in (smaller, shifted):
@@ -174,7 +174,7 @@ def recoloured_png(half: Decomposition, photo: Photo, folder: Path) -> np.ndarra
     """The edited file of `photo.png` in a folder."""
     original = Original(photo, read_raster(folder / "photo.png"))
     edit = recolour(half, ColourEdit(hue=120))
-    stored = ResultPart.of(half, None)
+    stored = ResultPart.of(half)
     save_edit(stored, edit, folder / "out", Record("recolour"), Sheet("t"), original=original)
     return cv2.imread(str(folder / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
 
@@ -238,7 +238,7 @@ def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: P
         shading=half.shading * 3,
     )
     save_edit(
-        ResultPart.of(half, None),
+        ResultPart.of(half),
         edit_layers(half, DIFFUSE_ONLY),
         tmp_path / "out",
         Record("dichromatic"),
@@ -258,7 +258,7 @@ def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: P
 def test_without_a_photo_the_maps_picture_is_written_with_the_mask_as_alpha(tmp_path: Path) -> None:
     scene = ball()
     edit = edit_layers(scene, DIFFUSE_ONLY)
-    save_edit(ResultPart.of(scene, None), edit, tmp_path / "out", Record("dichromatic"), Sheet("t"))
+    save_edit(ResultPart.of(scene), edit, tmp_path / "out", Record("dichromatic"), Sheet("t"))
     written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(written[..., 3], 255 * scene.mask.astype(np.uint8))
     channels = read_channels(tmp_path / "out" / "edited.exr")

@@ -14,6 +14,7 @@ import trimesh
 
 from isc_core.cli.main import main
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.lobe_fitting.specular_level import SpecularFit, fitted_specular
 from isc_core.result_files.arrays_file import ARRAYS, arrays_of, mesh_of, write_arrays
@@ -25,6 +26,7 @@ from isc_core.result_files.mesh.texture_codes import color_codes
 from isc_core.result_files.result_folder import load, require_room, save
 from isc_core.result_files.solids.back import Back
 from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
+from isc_core.scene.part_of_result import ResultPart
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.environment_map import shading_under
 from isc_core.shading.radiance import directional, radiance
@@ -186,7 +188,7 @@ def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
 def test_files_have_the_base_color_under_their_gloss_and_arrays_the_plain_one() -> None:
     """Under the recovered light what is below the layer is darker by what that mirrors."""
     d = glossy()
-    built = mesh_of(d)
+    built = mesh_of(ResultPart.of(d))
     layer = built.coated.layer(built.specular, built.roughness) if built.coated else None
     assert layer is not None and built.describe()["base_color"].endswith("under the gloss")
     plain, under = color_codes(built.base_color), built.base_color_codes
@@ -251,7 +253,7 @@ def test_a_mesh_does_not_depend_on_the_frame_around_it(triangles: int, back: Bac
     """Only the part around the object is processed; all is in the frame of the maps."""
     d = ball((512, 700), 40.0, (330.0, 420.0))
     options = MeshOptions(triangles=triangles, back=back)
-    found = mesh_of(d, options)
+    found = mesh_of(ResultPart.of(d), options)
     whole = build_mesh(d.height, d.normal, d.mask, d.reflectance, options)
     # The sides and the back are a guess, by means over blocks that begin elsewhere.
     tolerance = 1e-9 if back is Back.OPEN else 0.5
@@ -279,7 +281,7 @@ def _sets(faces: np.ndarray) -> set[tuple[int, ...]]:
 def test_the_texture_under_the_gloss_does_not_depend_on_the_frame() -> None:
     near, far = ball((128, 128), 40.0, (60.0, 60.0)), ball((512, 700), 40.0, (316.0, 444.0))
     gloss = SpecularFit(0.3, 0.8)
-    small, large = (mesh_of(d, gloss=gloss) for d in (near, far))
+    small, large = (mesh_of(ResultPart.of(d), gloss=gloss) for d in (near, far))
     assert small.has_layer
     codes = large.base_color_codes
     part = large.place
@@ -298,8 +300,8 @@ def test_arrays_and_texture_of_a_part_agree(tmp_path: Path, factor: float) -> No
     cover = ObjectCover(share, soft, np.rint(255 * share).astype(np.uint8))
     shape = (round(512 * factor), round(700 * factor))
     texture = np.random.default_rng(0).integers(0, 256, (*shape, 3), np.uint8)
-    built = mesh_of(d, finer=shape[1] / 700)
-    write_arrays(d, tmp_path / ARRAYS, built, texture if factor > 1 else None, cover)
+    built = mesh_of(ResultPart.of(d), finer=shape[1] / 700)
+    write_arrays(ResultPart.of(d), tmp_path / ARRAYS, built, texture if factor > 1 else None, cover)
     arrays = read(tmp_path / ARRAYS)
     x, y, width, height = arrays["frame"]
     assert (width, height) == (700, 512)
@@ -317,9 +319,12 @@ def test_arrays_and_texture_of_a_part_agree(tmp_path: Path, factor: float) -> No
         assert np.abs(np.array(size[:2]) - np.array([rows, columns]) * factor).max() < 0.06
         expected = texture[top : top + size[0], left : left + size[1]]
         np.testing.assert_array_equal(arrays["texture"], expected)
-    alpha = cover.alpha(shape)
+    alpha = cover.alpha(FramePart.whole(shape))
     assert alpha is not None
     size = arrays["alpha"].shape
     np.testing.assert_array_equal(
         arrays["alpha"], alpha[top : top + size[0], left : left + size[1]]
     )
+    outlined = mesh_of(ResultPart.of(d), cover=cover, finer=factor)
+    outlined = outlined.with_texture(texture) if factor > 1 else outlined
+    np.testing.assert_array_equal(outlined.alpha, arrays["alpha"])

@@ -5,17 +5,18 @@ from pathlib import Path
 
 import numpy as np
 
+from isc_core.imaging.bounding_box import FramePart
 from isc_core.photo.grabcut import encoded_mask
 from isc_core.result_files.mesh.object_cover import object_cover, read_cover
-from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.part_of_result import ResultPart
 from tests.core.ball_scene import ball
 
 
-def halved(source: str) -> Decomposition:
+def halved(source: str) -> ResultPart:
     """A ball in maps of half the photo's size."""
     d = ball((96, 120), 40.0, (44.0, 66.0))
     given = {**d.provenance.input, "scale": 0.5, "mask_from": source}
-    return replace(d, provenance=replace(d.provenance, input=given))
+    return ResultPart.of(replace(d, provenance=replace(d.provenance, input=given)))
 
 
 def ramp(width: float) -> np.ndarray:
@@ -37,7 +38,7 @@ def test_the_cover_is_the_mean_over_a_pixel_near_the_object(tmp_path: Path) -> N
     assert found.share[:8, :8].max() == 0
     soft = (found.share > 0.02) & (found.share < 0.98)
     assert soft.sum() > 200
-    assert found.alpha() is None, "an outline is opaque"
+    assert found.alpha(FramePart.whole((96, 120))) is None, "an outline is opaque"
 
 
 def test_a_hard_mask_or_that_of_another_photo_has_no_coverage(tmp_path: Path) -> None:
@@ -51,7 +52,7 @@ def test_the_opacity_of_a_soft_rim_is_the_cover() -> None:
     d, cover = halved("file"), ramp(30)
     found = object_cover(d, cover)
     assert found is not None
-    alpha, fine = found.alpha(), found.alpha((192, 240))
+    alpha, fine = (found.alpha(FramePart.whole(shape)) for shape in ((96, 120), (192, 240)))
     assert alpha is not None and fine is not None
     mean = cover.reshape(96, 2, 120, 2).mean((1, 3))
     partly = (mean > 0.1) & (mean < 0.9)
@@ -65,7 +66,7 @@ def test_where_the_rim_is_hard_it_stays_opaque() -> None:
     cover = np.where(np.arange(240) > 132, ramp(30), ramp(2))
     found = object_cover(halved("alpha"), cover)
     assert found is not None
-    alpha = found.alpha()
+    alpha = found.alpha(FramePart.whole((96, 120)))
     assert alpha is not None
     left = alpha[:, :56]
     assert (left == 255).all() and (alpha[:, 76:] < 128).any()

@@ -13,6 +13,7 @@ from isc_core.result_files.arrays_file import arrays_of, mesh_of
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
 from isc_core.result_files.result_folder import load, save
+from isc_core.scene.part_of_result import ResultPart
 from isc_core.shading.perspective import lifted_points, object_axis, view_directions
 from tests.core.perspective_scene import CAMERA, bump_before_camera
 
@@ -84,7 +85,7 @@ def test_a_damaged_record_is_refused(tmp_path: Path, record: Any) -> None:
 @pytest.mark.parametrize("faces", [525_000, 400])
 def test_vertices_lie_on_the_rays_of_their_pixels(faces: int) -> None:
     d = bump_before_camera()
-    built = mesh_of(d, MeshOptions(triangles=faces))
+    built = mesh_of(ResultPart.of(d), MeshOptions(triangles=faces))
     assert len(built.mesh.faces) <= faces
     np.testing.assert_allclose(seen_at(built, CAMERA), built.vertex_pixel, atol=1e-9)
 
@@ -92,7 +93,7 @@ def test_vertices_lie_on_the_rays_of_their_pixels(faces: int) -> None:
 def test_the_mesh_is_the_height_before_the_camera() -> None:
     """Without a limited rim, the mesh is the lifted height but for size and place."""
     d = bump_before_camera()
-    built = mesh_of(d, MeshOptions(rim=0))
+    built = mesh_of(ResultPart.of(d), MeshOptions(rim=0))
     row, column = built.vertex_pixel.T
     points = lifted_points(d.height.astype(float), CAMERA, object_axis(CAMERA, d.mask))
     assert built.eye is not None
@@ -111,7 +112,7 @@ def test_the_mesh_is_the_height_before_the_camera() -> None:
 
 def test_faces_and_normals_face_the_camera() -> None:
     d = bump_before_camera()
-    built = mesh_of(d)
+    built = mesh_of(ResultPart.of(d))
     assert built.eye is not None
     corners = built.mesh.vertices[built.mesh.faces]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -126,7 +127,7 @@ def test_faces_and_normals_face_the_camera() -> None:
 def test_the_normal_map_restores_the_recovered_normals() -> None:
     """Tangent frames are those of renderers: the direction in which u grows on the surface."""
     d = bump_before_camera()
-    built = mesh_of(d, MeshOptions(triangles=400))
+    built = mesh_of(ResultPart.of(d), MeshOptions(triangles=400))
     assert len(built.mesh.faces) <= 400
     row, column = built.vertex_pixel.T
     base = built.mesh.vertex_normals
@@ -144,7 +145,7 @@ def test_the_normal_map_restores_the_recovered_normals() -> None:
 def test_arrays_hold_the_camera_only_where_there_is_one() -> None:
     names = {"focal_length", "principal_point", "eye"}
     d, flat = bump_before_camera(), bump_before_camera(None)
-    arrays = arrays_of(d, mesh_of(d))
+    arrays = arrays_of(d, mesh_of(ResultPart.of(d)))
     assert names <= set(arrays)
     assert arrays["focal_length"] == np.float32(62)
-    assert names.isdisjoint(arrays_of(flat, mesh_of(flat)))
+    assert names.isdisjoint(arrays_of(flat, mesh_of(ResultPart.of(flat))))

@@ -21,7 +21,7 @@ from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.part_of_result import cut_result
+from isc_core.scene.part_of_result import ResultPart, cut_result
 from isc_core.shading.ambient_occlusion import ambient_occlusion
 from tests.core.ball_scene import ball
 
@@ -226,7 +226,7 @@ def test_a_full_disk_leaves_the_earlier_set(
 
 def test_textures_of_a_small_object_cover_its_part_of_the_frame(tmp_path: Path) -> None:
     d = ball((512, 700), 40.0, (330.0, 420.0))
-    built = mesh_of(d, gloss=SpecularFit(0.3, 0.5, FITTED, FITTED))
+    built = mesh_of(ResultPart.of(d), gloss=SpecularFit(0.3, 0.5, FITTED, FITTED))
     near = cut_result(d, built.place)
     write_texture_set(near, built, near.mask.astype(np.float32), "generic", tmp_path, name="ball")
     description = json.loads((tmp_path / "ball_textures.json").read_text())
