@@ -3,14 +3,15 @@
 Problem: shading alone is ambiguous; a network predicts the mean and the deviation of each normal
 from the whole photo, and this term draws the shape toward them.
 
-Equation: with the normal's part in the image plane t = (N1, N2), the predicted mean m and the
-deviation s of each component,
+Equation: with the normal's part in the image plane t = (N1, N2), the part m of the predicted mean
+direction and the deviation s of each component,
   cost = w/n_v * sum over valid pixels of |t - m|^2 / (2 s^2).
-The term of the `silhouette` is kept.
+The mean of probable unit normals is shorter than 1, so its own part in the image plane is that of a
+flatter normal; it is therefore divided by its length. The term of the `silhouette` is kept.
 
 The solver can start from the integrated normals: m is averaged over blocks of pixels, since the
 network's resolution is below the solver's, and the slopes of the blocks are integrated by least
-squares. Where normals are uncertain, m is short and the shape is flat.
+squares. Where normals of a block differ, its mean is short and the shape is flat.
 
 Citation: the quadratic term of a Gaussian likelihood; integration: B. K. P. Horn, M. J. Brooks,
 "The variational approach to shape from shading", CVGIP 33, 1986,
@@ -25,12 +26,14 @@ from scipy import ndimage
 
 from ..baselines.poisson import integrate
 from ..imaging.blocks import padded_means_inside
+from ..imaging.channels import length
 from ..imaging.framing import continued_height
 from ..scene.normal_estimate import NormalEstimate
 from .silhouette import ExpectedNormals
 
 _MAX_IN_PLANE = 0.95  # largest in-plane part of a block's normal
 _TOLERANCE = 1e-3  # of the integration: the solver refines its result
+_SHORTEST = 0.1  # mean of normals in all directions: it has none
 
 
 def normals_from_prediction(
@@ -48,7 +51,7 @@ def normals_from_prediction(
     Returns
     -------
     ExpectedNormals or None
-        None without a prediction.
+        Of the mean's direction; None without a prediction.
     """
     if predicted is None:
         return None
@@ -58,6 +61,7 @@ def normals_from_prediction(
         )
     )
     normal = predicted.normal[nearest].astype(float)
+    normal /= np.maximum(length(normal), _SHORTEST)[..., None]
     deviation = predicted.deviation[nearest].astype(float)
     maps = (-normal[..., 1], normal[..., 0], 1 / deviation**2)
     return ExpectedNormals(*(np.where(mask, values, 0) for values in maps))

@@ -44,15 +44,25 @@ def test_the_normals_of_a_ball_add_up_to_the_ball(block: int) -> None:
     assert np.ptp((height - true)[inner]) < 0.1 * np.ptp(true[inner])
 
 
-def test_uncertain_normals_add_up_to_a_flatter_shape() -> None:
+def test_uncertainty_does_not_flatten_the_shape() -> None:
+    """The mean of uncertain normals is short; its direction counts, and its deviation."""
     normal, mask = ball()
     sure, unsure = (
-        normals_from_prediction(NormalEstimate(k * normal, np.where(mask, 0.2, 0)), mask)
-        for k in (1.0, 0.5)
+        normals_from_prediction(NormalEstimate(k * normal, np.where(mask, s, 0)), mask)
+        for k, s in ((1.0, 0.2), (0.5, 0.4))
     )
     assert sure is not None and unsure is not None
-    heights = [predicted_height(field, mask, 2) for field in (sure, unsure)]
-    assert 0.2 < np.ptp(heights[1]) / np.ptp(heights[0]) < 0.6
+    np.testing.assert_allclose(unsure.down, sure.down, atol=1e-12)
+    np.testing.assert_allclose(unsure.right, sure.right, atol=1e-12)
+    np.testing.assert_allclose(unsure.precision, sure.precision / 4)
+
+
+def test_normals_without_a_direction_are_flat() -> None:
+    mask = np.ones((4, 4), bool)
+    seen = NormalEstimate(np.zeros((4, 4, 3)), np.full((4, 4), 0.6))
+    field = normals_from_prediction(seen, mask)
+    assert field is not None
+    assert not field.down.any() and not field.right.any()
 
 
 def test_a_block_of_one_pixel_has_no_shape() -> None:
