@@ -8,7 +8,7 @@ Citation: J. T. Kajiya 1986, doi:10.1145/15922.15902.
 Limits: light above twice white is stored as twice white.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,8 @@ from ..archives import open_archive
 from .scenes import TabletopScene
 
 SIDE = 192  # of a picture, pixels
+RANDOM: Mapping[str, Any] = {"type": "independent"}  # rays of a pixel
+CENTRES: Mapping[str, Any] = {"type": "stratified", "sample_count": 1, "jitter": False}
 _RATIO = 0.75  # of the sides
 _COVER_RAYS = 8  # of a pixel
 _BOUNCES = 4  # path length
@@ -33,7 +35,7 @@ _UPPER_QUANTILE = 0.85
 _LEAST, _MOST = 0.015, 0.75  # share of the picture that the objects cover
 _LEAST_OF_EACH = 0.006  # the same, of each of several
 _UNSEEN = 5e-4  # the same, of an object outside the picture
-_SAME = 1e-3  # of the depth
+SAME = 1e-3  # difference of equal depths, of the depth
 
 
 @dataclass(frozen=True)
@@ -85,35 +87,109 @@ def rendered(scene: TabletopScene, side: int, paths: int, seed: int) -> list[Tab
         Without those in which objects are too small, or fill nearly all, or do not stay outside.
     """
     mi = load_mitsuba()
-    whole = mi.load_dict({**scene.mitsuba, "integrator": {"type": "path", "max_depth": _BOUNCES}})
+    whole = mi.load_dict(scene.mitsuba)
     alone = [mi.load_dict({"type": "scene", one: scene.mitsuba[one]}) for one in scene.objects]
-    size = (side, round(_RATIO * side))
-    width, height = size if scene.landscape else size[::-1]
-    film = {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb"}
     found = []
-    for k, sensor in enumerate(scene.sensors):
-        camera = mi.load_dict(
-            {
-                **sensor,
-                "film": {**film, "rfilter": {"type": "box"}},
-                "sampler": {"type": "independent"},
-            }
-        )
+    for k in range(len(scene.sensors)):
+        camera = film_camera(scene, k, side)
         covers = _covers(whole, alone, camera, seed)
-        if not _usable((covers > 0.5).mean(axis=(0, 1)), scene.count):
+        if not shows_objects((covers > 0.5).mean(axis=(0, 1)), scene.count):
             continue
-        light = np.array(mi.render(whole, sensor=camera, spp=paths, seed=seed + k))
+        light = path_traced(whole, camera, paths, seed + k)
         if np.isfinite(light).all():
             found.append(_picture(light, covers if scene.count != Count.NONE else covers[..., :0]))
     return found
 
 
-def _usable(shares: np.ndarray, count: Count) -> bool:
-    """Whether a picture shows the objects, of which the shares of its pixels are given."""
+def film_camera(
+    scene: TabletopScene, number: int, side: int, sampler: Mapping[str, Any] = RANDOM
+) -> Any:
+    """Load one of a scene's cameras.
+
+    Parameters
+    ----------
+    scene : TabletopScene
+    number : int
+        Of the camera.
+    side : int
+        Longer side of its pictures, pixels.
+    sampler : mapping, optional
+        For `mitsuba.load_dict`.
+
+    Returns
+    -------
+    mitsuba.Sensor
+    """
+    size = (side, round(_RATIO * side))
+    width, height = size if scene.landscape else size[::-1]
+    film = {"type": "hdrfilm", "width": width, "height": height, "pixel_format": "rgb"}
+    return load_mitsuba().load_dict(
+        {
+            **scene.sensors[number],
+            "film": {**film, "rfilter": {"type": "box"}},
+            "sampler": dict(sampler),
+        }
+    )
+
+
+def path_traced(scene: Any, camera: Any, paths: int, seed: int) -> np.ndarray:
+    """Render the light of a scene.
+
+    Parameters
+    ----------
+    scene : mitsuba.Scene
+    camera : mitsuba.Sensor
+    paths : int
+        Of each pixel.
+    seed : int
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Linear.
+    """
+    mi = load_mitsuba()
+    integrator = mi.load_dict({"type": "path", "max_depth": _BOUNCES})
+    return np.array(mi.render(scene, sensor=camera, integrator=integrator, spp=paths, seed=seed))
+
+
+def shows_objects(shares: np.ndarray, count: Count) -> bool:
+    """Return whether a picture shows its objects neither too small nor too large.
+
+    Parameters
+    ----------
+    shares : (N,) ndarray
+        Of its pixels that show each object.
+    count : Count
+        Of objects that it should show.
+
+    Returns
+    -------
+    bool
+    """
     if count == Count.NONE:
         return bool(shares.sum() < _UNSEEN)
     some = count == Count.ONE or bool((shares > _LEAST_OF_EACH).all())
     return some and bool(_LEAST < shares.sum() < _MOST)
+
+
+def exposure(light: np.ndarray, shown: np.ndarray) -> float:
+    """Return the factor that exposes a picture.
+
+    Parameters
+    ----------
+    light : (H, W, 3) ndarray
+        Linear.
+    shown : (H, W) ndarray of bool
+        The objects.
+
+    Returns
+    -------
+    float
+    """
+    upper = float(np.quantile(light.mean(axis=2), _UPPER_QUANTILE)) / _UPPER
+    middle = float(np.median(light[shown].mean(axis=1))) / _MIDDLE if shown.any() else 0.0
+    return 1 / max(middle, upper, 1e-6)
 
 
 def _covers(whole: Any, alone: list[Any], camera: Any, seed: int) -> np.ndarray:
@@ -128,17 +204,14 @@ def _covers(whole: Any, alone: list[Any], camera: Any, seed: int) -> np.ndarray:
             ]
             for scene in (whole, *alone)
         )
-        seen = [(one > 0) & (np.abs(one - of_scene) < _SAME * one) for one in of_objects]
+        seen = [(one > 0) & (np.abs(one - of_scene) < SAME * one) for one in of_objects]
         total = total + np.stack(seen, axis=-1).astype(float)
     return np.asarray(total / _COVER_RAYS)
 
 
 def _picture(light: np.ndarray, covers: np.ndarray) -> TabletopPicture:
-    upper = float(np.quantile(light.mean(axis=2), _UPPER_QUANTILE)) / _UPPER
-    shown, middle = covers.sum(axis=2) > 0.5, 0.0
-    if shown.any():
-        middle = float(np.median(light[shown].mean(axis=1))) / _MIDDLE
-    shares = np.clip(light / max(middle, upper, 1e-6) / _BRIGHTEST, 0, 1)
+    factor = exposure(light, covers.sum(axis=2) > 0.5)
+    shares = np.clip(light * factor / _BRIGHTEST, 0, 1)
     return TabletopPicture(
         np.rint(255 * np.sqrt(shares)).astype(np.uint8), np.rint(255 * covers).astype(np.uint8)
     )

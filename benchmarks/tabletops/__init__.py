@@ -1,0 +1,1 @@
+"""Measurements of `isc decompose` on rendered photos of objects on tables."""
