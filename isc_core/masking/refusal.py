@@ -16,7 +16,7 @@ from ..photo.masks import MIN_MASK_PIXELS
 from .components import shows_several
 from .hints import Hints
 
-MIN_CONFIDENCE = 0.3  # of a mask that is used without hints
+MIN_CONFIDENCE = 0.4  # of a mask that is used without hints
 REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
 
 
