@@ -16,8 +16,8 @@ to that of no specular layer; of matt objects, the share of the light that was t
 
 import argparse
 import json
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import repeat
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -34,9 +34,7 @@ from isc_core.shading.perspective import object_axis, rotation_between
 from isc_core.sirfs.priors.prior_file import shipped_priors
 from isc_core.sirfs.silhouette import silhouette_normals
 from training.tabletops.scenes import ONE_OBJECT, TabletopScenes
-from training.world.backgrounds import panoramas_in
-from training.world.bodies.sources import BodyFolders, body_names
-from training.world.files import Split, read_patterns, split_of
+from training.tabletops.sources import TabletopSources
 
 from .rendering import TabletopPhoto, photos_of
 
@@ -120,39 +118,6 @@ def _mean(values: list[float]) -> str:
     return f"{np.mean(values):.3g} ({low:.3g} to {high:.3g})"
 
 
-def held_out_scenes(
-    world: Path, panoramas: Path, built: int, folder: Path
-) -> Iterator[TabletopScenes]:
-    """Prepare scenes of objects and panoramas that no network learns from.
-
-    Parameters
-    ----------
-    world, panoramas : Path
-        As in the command line.
-    built : int
-        Number of objects, of which the held-out ones are used.
-    folder : Path
-        For the files of meshes.
-
-    Yields
-    ------
-    TabletopScenes
-        The same again and again, without the objects of earlier scenes.
-
-    Raises
-    ------
-    InputError
-        If there are no such objects or panoramas.
-    """
-    listed = body_names(BodyFolders(None, None, None), 0, built, 0)
-    references = [one for one in listed if split_of(one.name) == Split.UNSEEN_BODY]
-    if not references:
-        raise InputError("no object is left: raise --built")
-    light, atlas = list(panoramas_in(panoramas, 0, held_out=True)), read_patterns(world)
-    while True:
-        yield TabletopScenes(references, light, atlas, folder, 1, ONE_OBJECT)
-
-
 def main() -> None:
     """Run the command line."""
     parser = argparse.ArgumentParser(
@@ -171,7 +136,8 @@ def main() -> None:
     rows = []
     try:
         with TemporaryDirectory() as folder:
-            scenes = held_out_scenes(given.world, given.panoramas, given.built, Path(folder))
+            sources = TabletopSources.read(given.world, given.panoramas, given.built, held_out=True)
+            scenes = (TabletopScenes(sources, Path(folder), 1, ONE_OBJECT) for _ in repeat(None))
             for photo in photos_of(scenes, given.count, given.side, given.paths, given.seed):
                 rows.append(measured(photo))
                 if given.json:

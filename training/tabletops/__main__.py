@@ -18,11 +18,9 @@ import numpy as np
 from isc_core.cli.interface.values import count
 from isc_core.errors import InputError
 
-from ..world.backgrounds import panoramas_in
-from ..world.bodies.sources import BodyFolders, body_names
-from ..world.files import Split, read_patterns, split_of
 from .pictures import SIDE, rendered, write_pictures
 from .scenes import TabletopScenes
+from .sources import TabletopSources
 
 _LEAST_SIDE = 32
 _PATHS = 32  # of a pixel
@@ -78,17 +76,13 @@ def main() -> None:
     given = parser.parse_args()
     if given.size < _LEAST_SIDE:
         parser.error(f"--size {given.size}: pictures have {_LEAST_SIDE} pixels or more")
-    wanted = Split.UNSEEN_BODY if given.held_out else Split.TRAIN
     try:
-        listed = body_names(BodyFolders(given.furniture, None, None), given.seed, given.built, 0)
-        references = [one for one in listed if split_of(one.name) == wanted]
-        if not references:
-            raise InputError("no object is left: raise --built, or name a folder by --furniture")
-        panoramas = list(panoramas_in(given.panoramas, 0, held_out=given.held_out))
-        atlas = read_patterns(given.world)
+        sources = TabletopSources.read(
+            given.world, given.panoramas, given.built, given.furniture, given.seed, given.held_out
+        )
         given.output.mkdir(parents=True, exist_ok=True)
         with TemporaryDirectory() as folder:
-            scenes = TabletopScenes(references, panoramas, atlas, Path(folder))
+            scenes = TabletopScenes(sources, Path(folder))
             made = render_folder(scenes, given.output, given.count, given.seed, given.size)
     except InputError as error:
         parser.error(str(error))

@@ -24,9 +24,8 @@ from isc_core.networks.mask_network import Count
 from synth.scene.meshes import Mesh, write_ply
 from synth.scene.variant import load_mitsuba
 
-from ..world.bodies.sources import BodyReference
-from ..world.patterns import Atlas
 from .cameras import Box, camera
+from .sources import TabletopSources
 from .surfaces import FAR, lamp, object_material, table, wall
 
 OBJECT = "object"  # name of the first object in a scene
@@ -69,12 +68,7 @@ class TabletopScenes:
 
     Parameters
     ----------
-    references : sequence of BodyReference
-        Objects; those that cannot be loaded or pass no screening are skipped.
-    panoramas : sequence of (rows, 2 rows, 3) ndarray
-        Linear.
-    atlas : Atlas
-        Patterns.
+    sources : TabletopSources
     folder : Path
         For the files of meshes, which later scenes overwrite.
     cameras : int
@@ -85,14 +79,12 @@ class TabletopScenes:
 
     def __init__(
         self,
-        references: Sequence[BodyReference],
-        panoramas: Sequence[np.ndarray],
-        atlas: Atlas,
+        sources: TabletopSources,
         folder: Path,
         cameras: int = 4,
         shares: tuple[float, float, float] = SHARES,
     ) -> None:
-        self._references, self._panoramas, self._atlas = references, panoramas, atlas
+        self._sources, self._atlas = sources, sources.atlas
         self._folder, self._cameras, self._shares = folder, cameras, shares
         self._meshes: list[Mesh] = []
 
@@ -138,7 +130,8 @@ class TabletopScenes:
     def _sky(self, rng: np.random.Generator) -> dict[str, Any]:
         mi = load_mitsuba()
         turn = mi.ScalarTransform4f().rotate([0, 1, 0], float(rng.uniform(0, 360)))
-        panorama = self._panoramas[int(rng.integers(len(self._panoramas)))].astype(np.float32)
+        panoramas = self._sources.panoramas
+        panorama = panoramas[int(rng.integers(len(panoramas)))].astype(np.float32)
         bitmap = mi.Bitmap(panorama / panorama.mean())
         return {"type": "envmap", "bitmap": bitmap, "to_world": turn}
 
@@ -146,9 +139,10 @@ class TabletopScenes:
         """A mesh; half of them have stood in an earlier scene, since some take seconds to make."""
         if len(self._meshes) > _KEPT // 8 and rng.random() < 0.5:
             return self._meshes[int(rng.integers(len(self._meshes)))]
-        for k in rng.permutation(len(self._references)):
+        references = self._sources.references
+        for k in rng.permutation(len(references)):
             try:
-                bodies = self._references[int(k)].load()
+                bodies = references[int(k)].load()
             except InputError:
                 continue
             if bodies:

@@ -30,6 +30,7 @@ from training.tabletops.scenes import (
     TabletopScene,
     TabletopScenes,
 )
+from training.tabletops.sources import TabletopSources
 from training.world.bodies.body import Source
 from training.world.bodies.sources import BodyReference
 from training.world.patterns import make_atlas
@@ -54,7 +55,8 @@ def scenes(
         for k in range(3)
     ]
     sky = np.random.default_rng(0).uniform(0.2, 2, (8, 16, 3))
-    return TabletopScenes(references, [sky], make_atlas(0, 6, 32), folder, cameras, shares)
+    sources = TabletopSources(references, [sky], make_atlas(0, 6, 32))
+    return TabletopScenes(sources, folder, cameras, shares)
 
 
 def picture(seed: int = 0, shape: tuple[int, int] = (60, 80), objects: int = 1) -> TabletopPicture:
@@ -152,7 +154,8 @@ def test_damaged_and_missing_pictures_are_reported(tmp_path: Path) -> None:
 
 def test_no_usable_object_is_reported(tmp_path: Path) -> None:
     missing = BodyReference("urdf/0001", Source.URDF, "", tmp_path / "missing.urdf")
-    made = TabletopScenes([missing], [np.ones((4, 8, 3))], make_atlas(0, 2, 32), tmp_path)
+    sources = TabletopSources([missing], [np.ones((4, 8, 3))], make_atlas(0, 2, 32))
+    made = TabletopScenes(sources, tmp_path)
     with pytest.raises(InputError, match="none of the objects"):
         made.draw(np.random.default_rng(0))
 
