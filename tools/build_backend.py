@@ -66,6 +66,7 @@ LEFT_OUT = (
     "benchmarks/separation/print_set.py",
     "benchmarks/separation/prints.py",
     "benchmarks/sirfs",
+    "benchmarks/tabletops",
     "blender_addon/packaging",
 )
 _RENAMED = {folder: name for folder, name in PACKAGES.items() if folder != name}
