@@ -17,7 +17,6 @@ to that of no specular layer; of matt objects, the share of the light that was t
 import argparse
 import json
 from dataclasses import replace
-from itertools import repeat
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -33,7 +32,6 @@ from isc_core.shading.lights import VIEW
 from isc_core.shading.perspective import object_axis, rotation_between
 from isc_core.sirfs.priors.prior_file import shipped_priors
 from isc_core.sirfs.silhouette import silhouette_normals
-from training.tabletops.scenes import ONE_OBJECT, TabletopScenes
 from training.tabletops.sources import TabletopSources
 
 from .rendering import TabletopPhoto, photos_of
@@ -137,8 +135,8 @@ def main() -> None:
     try:
         with TemporaryDirectory() as folder:
             sources = TabletopSources.read(given.world, given.panoramas, given.built, held_out=True)
-            scenes = (TabletopScenes(sources, Path(folder), 1, ONE_OBJECT) for _ in repeat(None))
-            for photo in photos_of(scenes, given.count, given.side, given.paths, given.seed):
+            how = given.count, given.side, given.paths, given.seed
+            for photo in photos_of(sources, Path(folder), *how):
                 rows.append(measured(photo))
                 if given.json:
                     given.json.write_text(json.dumps(rows), encoding="utf-8")

@@ -16,6 +16,7 @@ specular. The paths are independent, so the specular layer has the noise of both
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,13 +28,14 @@ from isc_core.shading.perspective import view_directions
 from synth.scene.variant import load_mitsuba
 from training.tabletops.pictures import (
     CENTRES,
-    SAME,
     exposure,
     film_camera,
+    first_hits,
     path_traced,
     shows_objects,
 )
-from training.tabletops.scenes import OBJECT, TabletopScene, TabletopScenes
+from training.tabletops.scenes import OBJECT, ONE_OBJECT, TabletopScene, TabletopScenes
+from training.tabletops.sources import TabletopSources
 
 
 @dataclass(frozen=True)
@@ -81,7 +83,7 @@ def photographed(scene: TabletopScene, side: int, paths: int, seed: int) -> Tabl
     width, height = (int(n) for n in camera.film().size())
     pixels = side / 2 / np.tan(np.radians(scene.sensors[0]["fov"] / 2))
     view = Camera.of_frame(float(pixels), (width, height))
-    mask, normal = _first_hits(scene, side, view)
+    mask, normal = _mask_and_normals(scene, side, view)
     if not shows_objects(mask[..., None].mean(axis=(0, 1)), scene.count):
         return None
     matt = _without_gloss(scene.mitsuba[OBJECT])
@@ -105,15 +107,16 @@ def photographed(scene: TabletopScene, side: int, paths: int, seed: int) -> Tabl
 
 
 def photos_of(
-    scenes: Iterator[TabletopScenes], count: int, side: int, paths: int, seed: int
+    sources: TabletopSources, folder: Path, number: int, side: int, paths: int, seed: int
 ) -> Iterator[TabletopPhoto]:
-    """Render scenes until there are enough photos.
+    """Render scenes of one object until there are enough photos.
 
     Parameters
     ----------
-    scenes : iterator of TabletopScenes
-        One of each scene, so that no object is preferred.
-    count : int
+    sources : TabletopSources
+    folder : Path
+        For the files of meshes.
+    number : int
         Photos.
     side, paths : int
         As for `photographed`.
@@ -124,14 +127,15 @@ def photos_of(
     ------
     TabletopPhoto
     """
-    made = 0
-    for k, one in enumerate(scenes):
-        photo = photographed(one.draw(np.random.default_rng([seed, k])), side, paths, seed + k)
+    made, k = 0, 0
+    while made < number:
+        # new ones for each scene: these would prefer the objects of earlier scenes
+        scenes = TabletopScenes(sources, folder, cameras=1, shares=ONE_OBJECT)
+        photo = photographed(scenes.draw(np.random.default_rng([seed, k])), side, paths, seed + k)
         if photo is not None:
             made += 1
             yield photo
-        if made == count:
-            return
+        k += 1
 
 
 def _without_gloss(shape: dict[str, Any]) -> dict[str, Any]:
@@ -143,7 +147,9 @@ def _without_gloss(shape: dict[str, Any]) -> dict[str, Any]:
     return {**shape, "bsdf": {**shape["bsdf"], "side": matt}}
 
 
-def _first_hits(scene: TabletopScene, side: int, view: Camera) -> tuple[np.ndarray, np.ndarray]:
+def _mask_and_normals(
+    scene: TabletopScene, side: int, view: Camera
+) -> tuple[np.ndarray, np.ndarray]:
     """Where (H, W) the object is seen first, and its normals (H, W, 3), camera frame."""
     mi, camera = load_mitsuba(), film_camera(scene, 0, side, CENTRES)
     seen = mi.load_dict({"type": "aov", "aovs": "t:depth,flat:geo_normal,smooth:sh_normal"})
@@ -152,8 +158,7 @@ def _first_hits(scene: TabletopScene, side: int, view: Camera) -> tuple[np.ndarr
         np.array(mi.render(mi.load_dict(one), sensor=camera, integrator=seen, spp=1))[..., -7:]
         for one in (alone, scene.mitsuba)
     )
-    depth = hit[..., 0]
-    mask = (depth > 0) & (np.abs(depth - first[..., 0]) < SAME * depth)
+    mask = first_hits(hit[..., 0], first[..., 0])
     left, up, forward = np.array(scene.sensors[0]["to_world"].matrix)[:3, :3].T
     flat, smooth = (hit[..., k : k + 3] @ np.stack([-left, up, -forward], axis=1) for k in (1, 4))
     away = (flat * view_directions(view, (mask.shape[0], mask.shape[1]))).sum(axis=2) < 0

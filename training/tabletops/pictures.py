@@ -35,7 +35,7 @@ _UPPER_QUANTILE = 0.85
 _LEAST, _MOST = 0.015, 0.75  # share of the picture that the objects cover
 _LEAST_OF_EACH = 0.006  # the same, of each of several
 _UNSEEN = 5e-4  # the same, of an object outside the picture
-SAME = 1e-3  # difference of equal depths, of the depth
+_SAME = 1e-3  # difference of equal depths, of the depth
 
 
 @dataclass(frozen=True)
@@ -173,6 +173,21 @@ def shows_objects(shares: np.ndarray, count: Count) -> bool:
     return some and bool(_LEAST < shares.sum() < _MOST)
 
 
+def first_hits(of_object: np.ndarray, of_scene: np.ndarray) -> np.ndarray:
+    """Return which rays meet an object first.
+
+    Parameters
+    ----------
+    of_object, of_scene : (H, W) ndarray
+        Depth of the object alone, 0 where a ray misses it, and of the whole scene.
+
+    Returns
+    -------
+    (H, W) ndarray of bool
+    """
+    return (of_object > 0) & (np.abs(of_object - of_scene) < _SAME * of_object)
+
+
 def exposure(light: np.ndarray, shown: np.ndarray) -> float:
     """Return the factor that exposes a picture.
 
@@ -204,7 +219,7 @@ def _covers(whole: Any, alone: list[Any], camera: Any, seed: int) -> np.ndarray:
             ]
             for scene in (whole, *alone)
         )
-        seen = [(one > 0) & (np.abs(one - of_scene) < SAME * one) for one in of_objects]
+        seen = [first_hits(one, of_scene) for one in of_objects]
         total = total + np.stack(seen, axis=-1).astype(float)
     return np.asarray(total / _COVER_RAYS)
 
