@@ -114,12 +114,13 @@ def _seen(
     bodies = made.load()
     if not bodies:
         raise InputError("no object passes the screening")
-    placed = views.in_picture(bodies[0].mesh.rotated(views.random_side(rng)), np.inf)
-    view = views.view_of(kind, str(Source.BUILT), placed, np.inf, rng)
+    side, up = views.random_side(rng)
+    placed = views.in_picture(bodies[0].mesh.rotated(side), np.inf)
+    view = views.view_of(kind, str(Source.BUILT), placed, np.inf, rng, up)
     if view is None:
         raise InputError("too little is seen of it")
     ready = prepared(view)
-    recipe = draw_recipe(ready.directions, atlas, np.arange(environments), rng, Shares())
+    recipe = draw_recipe(ready.directions, ready.up, atlas, np.arange(environments), rng, Shares())
     lit = make_pictures(batch_of([ready]), stacked([recipe]), bank)
     layers = lit.layers[0].float().permute(1, 2, 0).numpy()
     mask = view.mask

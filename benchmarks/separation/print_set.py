@@ -215,7 +215,9 @@ def _scene(
         maps = np.stack([_EMPTY, _EMPTY] if kind is None else _MAPS[kind](rng))
         atlas = Atlas(maps, np.zeros(len(maps), np.uint8), np.zeros(len(maps), bool))
         bank = bank_of([rooms[int(rng.integers(len(rooms)))]], atlas)
-        recipe = _painted(draw_recipe(view.directions, atlas, np.zeros(1, int), rng, _SHARES), rng)
+        recipe = _painted(
+            draw_recipe(view.directions, view.up, atlas, np.zeros(1, int), rng, _SHARES), rng
+        )
         recipe = _plain(recipe, rng) if kind is None else _coloured(recipe, kind, rng)
         recipe = _finished(recipe, glossy, rng)
         pictures = make_pictures(batch_of([view]), stacked([recipe]), bank)

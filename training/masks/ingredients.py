@@ -70,7 +70,10 @@ def lit_cutouts(
     for start in range(0, len(views), _BATCH):
         some = views[start : start + _BATCH]
         recipes = stacked(
-            [draw_recipe(one.directions, world.atlas, environments, rng, shares) for one in some]
+            [
+                draw_recipe(one.directions, one.up, world.atlas, environments, rng, shares)
+                for one in some
+            ]
         )
         lit = make_pictures(batch_of(some), recipes, world.bank)
         light = (lit.layers[:, :3] + lit.layers[:, 3:6]).float()

@@ -66,7 +66,9 @@ class Painter:
         (N, 3) ndarray
             Linear albedo of the pixels that the body covers.
         """
-        recipe = draw_recipe(spread_directions(rng), self.atlas, np.array([0]), rng, _PAINT)
+        recipe = draw_recipe(
+            spread_directions(rng), np.zeros(3), self.atlas, np.array([0]), rng, _PAINT
+        )
         patterns = torch.from_numpy(self.atlas.maps[:, None]).float() / 255
         material = material_of(_as_batch(hits), stacked([recipe]), Bank(torch.zeros(0), patterns))
         return np.asarray(material.albedo[0].numpy())
@@ -164,7 +166,7 @@ def _range(height: np.ndarray, axis: int, start: int) -> np.ndarray:
 
 
 def _traced(mesh: Mesh, rng: np.random.Generator) -> Hits:
-    placed = in_picture(mesh.rotated(random_side(rng)), np.inf)
+    placed = in_picture(mesh.rotated(random_side(rng)[0]), np.inf)
     origins, rays = camera_rays(SIDE, np.inf)
     return Tracer(placed).hits(origins, rays)
 

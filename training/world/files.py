@@ -29,7 +29,7 @@ from ..archives import open_archive
 from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
-FORMAT = 1
+FORMAT = 2
 SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
 PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
@@ -173,6 +173,7 @@ def write_views(path: Path, reference: str, views: list[View], reason: str) -> N
         for part in _PARTS:
             arrays[f"{part}{k}"] = getattr(view, part)
         arrays[f"distance{k}"] = np.array(view.distance)
+        arrays[f"up{k}"] = view.up
     with new_file(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
@@ -202,6 +203,7 @@ def read_views(path: Path) -> tuple[str, list[View]]:
                 name=str(name),
                 source=source,
                 distance=float(data[f"distance{k}"]),
+                up=data[f"up{k}"],
                 **{part: data[f"{part}{k}"] for part in _PARTS},
             )
             for k, name in enumerate(data["names"])

@@ -31,7 +31,7 @@ from .files import Split, read_patterns, views_in
 from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
-FORMAT = 1
+FORMAT = 2
 SUFFIX = ".isw"
 _DEPTH, _THICKNESS = 1024.0, 100.0  # steps per unit
 _SHARES = {Split.TRAIN: 0.9, Split.UNSEEN_BODY: 0.08, Split.UNSEEN_SOURCE: 0.02}
@@ -78,6 +78,7 @@ def write_pack(path: Path, world: PackedWorld) -> int:
         "masks": _stream([np.packbits(view.mask) for view in views]),
         "directions": np.stack([view.directions for view in views]),
         "distances": np.array([view.distance for view in views]),
+        "ups": np.stack([view.up for view in views]),
         "panorama_names": np.array([one.name for one in world.panoramas]),
         "judged": np.array([one.held_out for one in world.panoramas]),
         "radiance": np.stack([one.radiance for one in world.panoramas]).astype(np.float16),
@@ -280,6 +281,7 @@ def _unpacked(data: dict[str, np.ndarray]) -> PackedWorld:
                 *_pixels(streams, start, end),
                 data["directions"][k],
                 float(data["distances"][k]),
+                data["ups"][k],
             )
         )
     steps = _bytes(data["patterns"]).reshape(-1, side, side)

@@ -26,6 +26,7 @@ from .view_batches import ViewBatch
 ALPHAS = (0.06, 0.12, 0.2, 0.33, 0.55)  # roughness of the bank's levels
 _WIDE = 0.16  # the level that serves the stored directions: as wide as they are apart, 20 degrees
 _MOST = 0.95
+_HORIZON = 0.5  # of a level's roughness: how far a table's edge is smoothed
 
 
 @dataclass(frozen=True)
@@ -181,8 +182,9 @@ def lights_of(recipes: dict[str, torch.Tensor], bank: Bank) -> Lights:
         Its harmonics are 0.
     """
     ambient = recipes["ambient"][:, None, :, None, None]
+    surroundings = bank.maps[recipes["environment"]].float() * ambient
     return Lights(
-        bank.maps[recipes["environment"]].float() * ambient,
+        _with_table(surroundings, recipes),
         torch.tensor((*ALPHAS, _WIDE), device=ambient.device),
         recipes["turn"],
         recipes["lamp"],
@@ -193,3 +195,19 @@ def lights_of(recipes: dict[str, torch.Tensor], bank: Bank) -> Lights:
         recipes["given"],
         recipes["bounce"],
     )
+
+
+def _with_table(surroundings: torch.Tensor, recipes: dict[str, torch.Tensor]) -> torch.Tensor:
+    """Surroundings (B, levels, 3, rows, 2 rows) whose lower half is a table, where one stands.
+
+    The table is matt, of one colour, and lit by the upper half and the lamps.
+    """
+    rows = surroundings.shape[-2]
+    angle = (torch.arange(rows, device=surroundings.device) + 0.5) * (math.pi / rows)
+    falling = torch.cos(angle).clamp(min=0) * torch.sin(angle) * (math.pi / rows**2)
+    lit = (surroundings[:, 0].sum(-1) * falling).sum(-1) + recipes["table_light"]
+    radiance = (recipes["table"] * lit)[:, None, :, None, None]
+    widths = torch.tensor((*ALPHAS, _WIDE), device=surroundings.device)[:, None]
+    share = torch.sigmoid(-torch.cos(angle) / (_HORIZON * widths))[:, None, :, None]
+    share = share * recipes["standing"][:, None, None, None, None]
+    return torch.lerp(surroundings, radiance.expand_as(surroundings), share)

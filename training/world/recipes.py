@@ -24,6 +24,8 @@ from .random_draws import log_uniform
 
 LAMPS, LAYERS = 4, 3
 _WHITE_BASE = 0.2  # of bodies in white and a strong colour
+_FROM_ABOVE = 0.05  # least sine of the angle under which a table is seen
+_LOWEST_LAMP = 0.1  # sine of its angle above a table
 
 
 class Kind(IntEnum):
@@ -55,6 +57,9 @@ class LightKind(IntEnum):
     LABORATORY = 4
 
 
+_WITH_TABLE = (LightKind.HARMONICS, LightKind.AROUND, LightKind.ONE_LAMP, LightKind.LAMPS)
+
+
 @dataclass(frozen=True)
 class Shares:
     """How often each choice is drawn; an ablation sets some to 0.
@@ -74,6 +79,8 @@ class Shares:
     white : float
         Bodies with stripes, dots, checks or patches that are white on a strong colour, or the other
         way round.
+    standing : float
+        Bodies seen from above that stand on a table.
     stretch : float
         Deviation of the logarithm of the factor by which depth is scaled; the aspect ratio varies
         as much.
@@ -86,6 +93,7 @@ class Shares:
     matte: float = 0.25
     coated: float = 0.12
     white: float = 0.0
+    standing: float = 0.6
     stretch: float = 0.0
 
 
@@ -118,6 +126,13 @@ class Recipe:
     environment : int
         Of the bank.
     turn : (3, 3) ndarray
+        From the camera frame to that of the surroundings.
+    standing : float
+        1: the lower half of the surroundings is a table.
+    table : (3,) ndarray
+        Its reflectance.
+    table_light : (3,) ndarray
+        Irradiance, over pi, of the table by the lamps.
     ambient : (3,) ndarray
         Factor of the surroundings.
     lamp : (LAMPS,) ndarray of int
@@ -148,6 +163,9 @@ class Recipe:
     kind: int
     environment: int
     turn: np.ndarray
+    standing: float
+    table: np.ndarray
+    table_light: np.ndarray
     ambient: np.ndarray
     lamp: np.ndarray
     power: np.ndarray
@@ -161,6 +179,7 @@ class Recipe:
 
 def draw_recipe(
     directions: np.ndarray,
+    up: np.ndarray,
     atlas: Atlas,
     environments: np.ndarray,
     rng: np.random.Generator,
@@ -172,6 +191,8 @@ def draw_recipe(
     ----------
     directions : (DIRECTIONS, 3) ndarray
         The view's.
+    up : (3,) ndarray
+        The view's; 0 for a body that lies anyhow.
     atlas : Atlas
     environments : (N,) ndarray of int
         Those of the bank that may be used.
@@ -186,13 +207,14 @@ def draw_recipe(
     light = LightKind(int(rng.choice(len(LightKind), p=shares.lights)))
     if kind != Kind.OPAQUE and light == LightKind.HARMONICS:
         light = LightKind.AROUND
+    stretch = _stretch(rng, shares) if shares.stretch else np.ones(3)
+    up = up / stretch  # as a normal of the table
     parts: dict[str, Any] = {
         **_paint(atlas, kind, rng, shares),
         **_gloss(kind, rng, shares),
-        **_light(directions, light, rng),
+        **_light(directions, up / max(np.linalg.norm(up), 1e-9), light, rng, shares),
     }
     environment = int(rng.choice(environments))
-    stretch = _stretch(rng, shares) if shares.stretch else np.ones(3)
     return Recipe(kind=int(kind), environment=environment, stretch=stretch, **parts)
 
 
@@ -327,7 +349,13 @@ def _gloss(kind: Kind, rng: np.random.Generator, shares: Shares) -> dict[str, An
     }
 
 
-def _light(directions: np.ndarray, light: LightKind, rng: np.random.Generator) -> dict[str, Any]:
+def _light(
+    directions: np.ndarray,
+    up: np.ndarray,
+    light: LightKind,
+    rng: np.random.Generator,
+    shares: Shares,
+) -> dict[str, Any]:
     count = {LightKind.ONE_LAMP: 1, LightKind.LABORATORY: 1}.get(light, 0)
     if light == LightKind.LAMPS:
         count = int(rng.choice([2, 2, 2, 3, 4]))
@@ -336,21 +364,24 @@ def _light(directions: np.ndarray, light: LightKind, rng: np.random.Generator) -
     if count:
         level = log_uniform(rng, 0.02, 0.15 if light == LightKind.LABORATORY else 0.6)
     power = np.zeros((LAMPS, 3))
-    places = lamp_places(directions, rng, LAMPS)
+    standing = up[2] > _FROM_ABOVE and light in _WITH_TABLE and rng.random() < shares.standing
+    places = lamp_places(directions, rng, LAMPS, up if standing else None)
     tint = 0.05 if rng.random() < 0.7 else 0.4
     for k in range(count):
         strength = rng.uniform(0.25, 1) if k else 1.0
         power[k] = strength * np.exp(rng.normal(0, tint, 3) * (balanced or tint))
     near = rng.random(LAMPS) < 0.3
     wide = rng.random(LAMPS) < 0.4
-    yaw, tilt = rng.uniform(0, 360), rng.normal(-15, 20)
-    angles = [tilt, yaw]
-    turn = Rotation.from_euler("xy", angles, degrees=True).as_matrix()
-    if rng.random() < 0.15:
+    turn = _turn(up, rng)
+    if not standing and rng.random() < 0.15:
         turn = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
+    falling = (directions[places] @ up).clip(0)
     cast = rng.normal(0, 0.06 if balanced else 0.3, 3)
     return {
         "turn": turn,
+        "standing": float(standing),
+        "table": _colour(rng, rng.uniform(0, 0.8) ** 2) if standing else np.zeros(3),
+        "table_light": falling @ power,
         "ambient": level * np.exp(cast),
         "lamp": places,
         "power": power,
@@ -363,7 +394,19 @@ def _light(directions: np.ndarray, light: LightKind, rng: np.random.Generator) -
     }
 
 
-def lamp_places(directions: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:
+def _turn(up: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Turn surroundings: upright with a body that stands, else as seen from a little above."""
+    yaw = Rotation.from_euler("y", rng.uniform(0, 360), degrees=True)
+    if up.any():
+        tilt = Rotation.align_vectors([(0.0, 1.0, 0.0)], [up])[0]
+    else:
+        tilt = Rotation.from_euler("x", rng.normal(-15, 20), degrees=True)
+    return np.asarray((yaw * tilt).as_matrix())
+
+
+def lamp_places(
+    directions: np.ndarray, rng: np.random.Generator, count: int, up: np.ndarray | None = None
+) -> np.ndarray:
     """Draw lamps at stored directions, at least 30 degrees apart; most shine from above.
 
     Parameters
@@ -371,6 +414,8 @@ def lamp_places(directions: np.ndarray, rng: np.random.Generator, count: int) ->
     directions : (DIRECTIONS, 3) ndarray
     rng : numpy.random.Generator
     count : int
+    up : (3,) ndarray, optional
+        Away from a table; lamps are above it.
 
     Returns
     -------
@@ -378,10 +423,11 @@ def lamp_places(directions: np.ndarray, rng: np.random.Generator, count: int) ->
         The first one shines from in front of the body.
     """
     apart = math.cos(math.radians(30))
-    near = np.flatnonzero(directions[:, 2] > math.cos(math.radians(80)))
+    above = np.ones(len(directions), bool) if up is None else directions @ up > _LOWEST_LAMP
+    near = np.flatnonzero(above & (directions[:, 2] > math.cos(math.radians(80))))
     likely = np.exp(0.8 * directions[near, 1])
     places = [int(rng.choice(near, p=likely / likely.sum()))]
-    for one in rng.permutation(np.flatnonzero(directions[:, 2] > -0.3)):
+    for one in rng.permutation(np.flatnonzero(above & (directions[:, 2] > -0.3))):
         if len(places) < count and all(directions[one] @ directions[p] < apart for p in places):
             places.append(int(one))
     return np.array(places[:1] * (count - len(places)) + places)[::-1][:count][::-1].copy()

@@ -210,7 +210,10 @@ def draw_batch(
     -------
     Draw
     """
-    recipes = [draw_recipe(views[k].directions, atlas, environments, rng, shares) for k in chosen]
+    recipes = [
+        draw_recipe(views[k].directions, views[k].up, atlas, environments, rng, shares)
+        for k in chosen
+    ]
     cameras = [draw_camera(rng, plain_camera) for _ in range(photos)]
     placements = [draw_placement(rng) for _ in range(photos)]
     return Draw(

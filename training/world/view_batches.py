@@ -33,6 +33,8 @@ class PreparedView:
     reached : (N, DIRECTIONS) uint8 ndarray
         Cosine to each direction that sees past the body, times 255.
     directions : (DIRECTIONS, 3) float32 ndarray
+    up : (3,) float32 ndarray
+        See `View`.
     """
 
     name: str
@@ -40,6 +42,7 @@ class PreparedView:
     surface: np.ndarray
     reached: np.ndarray
     directions: np.ndarray
+    up: np.ndarray
 
 
 def prepared(view: View) -> PreparedView:
@@ -64,6 +67,7 @@ def prepared(view: View) -> PreparedView:
         np.hstack([normal, *_places(view), thickness]).astype(np.float32),
         visible * facing,
         view.directions.astype(np.float32),
+        view.up,
     )
 
 

@@ -57,6 +57,9 @@ class View:
         Unit, camera frame.
     distance : float
         Of the camera from z = 0; infinite for an orthographic one.
+    up : (3,) float32 ndarray
+        Unit vector away from the ground on which the body stands, camera frame; 0 for a body that
+        lies anyhow.
     """
 
     name: str
@@ -68,6 +71,7 @@ class View:
     visible: np.ndarray
     directions: np.ndarray
     distance: float
+    up: np.ndarray
 
 
 def trace_view(name: str, source: str, mesh: Mesh, rng: np.random.Generator) -> View:
@@ -95,14 +99,20 @@ def trace_view(name: str, source: str, mesh: Mesh, rng: np.random.Generator) -> 
         distance = np.inf
         if rng.random() > _ORTHOGRAPHIC:
             distance = _NEAREST / rng.uniform(0.02, 1)
-        placed = in_picture(mesh.rotated(random_side(rng)), distance)
-        if (view := view_of(name, source, placed, distance, rng)) is not None:
+        side, up = random_side(rng)
+        placed = in_picture(mesh.rotated(side), distance)
+        if (view := view_of(name, source, placed, distance, rng, up)) is not None:
             return view
     raise InputError(f"{name}: no side shows enough of its surface")
 
 
 def view_of(
-    name: str, source: str, placed: Mesh, distance: float, rng: np.random.Generator
+    name: str,
+    source: str,
+    placed: Mesh,
+    distance: float,
+    rng: np.random.Generator,
+    up: np.ndarray,
 ) -> View | None:
     """Trace a body from the front.
 
@@ -116,6 +126,8 @@ def view_of(
         Of the camera; infinite for an orthographic one.
     rng : numpy.random.Generator
         Draws the directions.
+    up : (3,) ndarray
+        See `View`.
 
     Returns
     -------
@@ -139,6 +151,7 @@ def view_of(
         _visibility(tracer, position + LIFT * normal, directions),
         directions.astype(np.float32),
         float(distance),
+        up.astype(np.float32),
     )
 
 
@@ -186,7 +199,7 @@ def spread_directions(rng: np.random.Generator) -> np.ndarray:
     return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
 
 
-def random_side(rng: np.random.Generator) -> np.ndarray:
+def random_side(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Draw the side from which a body is seen: most stand upright, seen from a little above.
 
     Parameters
@@ -195,13 +208,18 @@ def random_side(rng: np.random.Generator) -> np.ndarray:
 
     Returns
     -------
-    (3, 3) ndarray
-        Rotation of the body.
+    rotation : (3, 3) ndarray
+        Of the body.
+    up : (3,) ndarray
+        Where its y axis points, if it stands upright; 0 if it lies anyhow.
     """
     if rng.random() > _UPRIGHT:
-        return np.asarray(Rotation.random(random_state=int(rng.integers(2**31))).as_matrix())
+        side = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
+        return np.asarray(side), np.zeros(3)
     yaw, tilt, roll = rng.uniform(0, 360), rng.uniform(-10, 60), rng.normal(0, 5)
-    return np.asarray(Rotation.from_euler("zxy", [roll, tilt, yaw], degrees=True).as_matrix())
+    # first about its own axis, then toward the camera: about the fixed axes y, x, z in turn
+    side = Rotation.from_euler("yxz", [yaw, tilt, roll], degrees=True).as_matrix()
+    return np.asarray(side), np.asarray(side[:, 1])
 
 
 def in_picture(mesh: Mesh, distance: float) -> Mesh:

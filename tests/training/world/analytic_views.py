@@ -37,4 +37,5 @@ def ellipsoid_view(
         np.packbits(normal @ directions.T > 0, axis=1),
         directions.astype(np.float32),
         np.inf,
+        np.zeros(3, np.float32),
     )

@@ -159,7 +159,7 @@ def slim_case(kind: Kind) -> Case:
     turn, polar = np.meshgrid(np.linspace(0, 2 * np.pi, 49), np.linspace(0, np.pi, 33))
     wide = 0.2 * np.sin(polar) * (1 - 0.6 * np.exp(-8 * np.cos(polar) ** 2))
     points = [wide * np.sin(turn), np.cos(polar), wide * np.cos(turn)]
-    return make_case(kind, swept(np.stack(points, -1)), np.random.default_rng(5))
+    return make_case(kind, swept(np.stack(points, -1)), np.random.default_rng(8))
 
 
 def lit(case: Case) -> LitViews:
@@ -171,6 +171,9 @@ def lit(case: Case) -> LitViews:
         "distance": case.distance,
         "radius": case.radius,
         "harmonic_noise": np.zeros((9, 3)),
+        "standing": np.array(0),
+        "table": np.zeros(3),
+        "table_light": np.zeros(3),
         "given": np.array(0),
         "bounce": np.array(0),
     }

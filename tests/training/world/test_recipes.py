@@ -1,6 +1,7 @@
 """Recipes are those that the shares ask for, and paint what they say."""
 
 import math
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -41,9 +42,11 @@ def only(kind: type[IntEnum], one: int) -> tuple[float, ...]:
     return tuple(float(each == one) for each in kind)
 
 
-def drawn(seed: int, shares: Shares, count: int = 40) -> list[Recipe]:
-    rng = np.random.default_rng(seed)
-    return [draw_recipe(DIRECTIONS, ATLAS, np.array([0, 2]), rng, shares) for _ in range(count)]
+def drawn(
+    seed: int, shares: Shares, count: int = 40, up: tuple[float, ...] = (0, 0, 0)
+) -> list[Recipe]:
+    rng, known = np.random.default_rng(seed), np.array([0, 2])
+    return [draw_recipe(DIRECTIONS, np.array(up), ATLAS, known, rng, shares) for _ in range(count)]
 
 
 def test_recipes_are_possible_and_repeat_with_the_seed() -> None:
@@ -97,6 +100,34 @@ def test_lamps_are_apart_and_the_first_is_in_front() -> None:
         assert apart.max() < math.cos(math.radians(30)) and towards[:, 2].min() > -0.3
 
 
+def test_bodies_on_a_table_are_lit_from_above_it() -> None:
+    up = np.array([0.1, 0.8, 0.5]) / np.linalg.norm([0.1, 0.8, 0.5])
+    recipes = drawn(6, Shares(stretch=0.0), 60, tuple(up))
+    standing = [one for one in recipes if one.standing]
+    assert 15 < len(standing) < 50
+    for one in standing:
+        np.testing.assert_allclose(one.turn @ up, (0, 1, 0), atol=1e-9)
+        assert (DIRECTIONS[one.lamp] @ up > 0).all() and (one.table > 0).all()
+        np.testing.assert_allclose(one.table_light, (DIRECTIONS[one.lamp] @ up) @ one.power)
+    assert not any(one.standing for one in drawn(6, Shares(), up=(0, 1, -0.3)))
+    assert not any(one.standing or one.table.any() for one in drawn(6, Shares()))
+
+
+def test_a_table_shows_what_falls_on_it() -> None:
+    up = (0.0, 0.8, 0.6)
+    recipes = [one for one in drawn(7, Shares(), 60, up) if one.standing][:6]
+    numbers = stacked(recipes)
+    white = replace(bank(), maps=torch.ones(3, 6, 3, 32, 64))
+    around = lights_of(numbers, white).surroundings
+    for k, one in enumerate(recipes):
+        lit = one.table * (one.ambient + one.table_light)
+        for level in range(6):
+            above, below = around[k, level, :, 0, 0], around[k, level, :, -1, 0]
+            blur = 0.04 * torch.from_numpy(np.abs(lit - one.ambient))
+            assert ((above - one.ambient).abs() < blur + 1e-3).all()
+            assert ((below - lit).abs() < blur + 1e-3).all()
+
+
 def test_painted_views_follow_their_recipes() -> None:
     recipes = drawn(5, Shares(), 6)
     views = batch_of([prepared(ellipsoid_view(np.random.default_rng(k))) for k in range(6)])
@@ -119,7 +150,9 @@ def test_painted_views_follow_their_recipes() -> None:
 
 def test_recipes_without_patterns_at_hand_still_work() -> None:
     atlas = Atlas(GREY[:1], np.zeros(1, np.uint8), np.ones(1, bool))
-    one = draw_recipe(DIRECTIONS, atlas, np.array([0]), np.random.default_rng(0), Shares())
+    one = draw_recipe(
+        DIRECTIONS, np.zeros(3), atlas, np.array([0]), np.random.default_rng(0), Shares()
+    )
     assert (one.maps == 0).all()
 
 

@@ -17,6 +17,7 @@ from training.world.views import (
     SIDE,
     View,
     camera_rays,
+    random_side,
     spread_directions,
     trace_view,
 )
@@ -68,6 +69,18 @@ def test_a_ball_is_seen_as_a_ball(near: bool) -> None:
     open_to = np.unpackbits(view.visible, axis=1)[right]
     facing = normal @ view.directions.T
     assert (open_to[facing > 0.05] == 1).all() and (open_to[facing < -0.05] == 0).all()
+
+
+def test_most_bodies_stand_and_are_seen_from_above() -> None:
+    sides = [random_side(np.random.default_rng(seed)) for seed in range(400)]
+    standing = [(side, up) for side, up in sides if up.any()]
+    assert 0.6 < len(standing) / len(sides) < 0.8
+    for side, up in standing:
+        np.testing.assert_array_equal(side @ (0, 1, 0), up)
+        assert np.degrees(np.arcsin(up[2])) == pytest.approx(25, abs=36)
+        assert abs(up[0]) < 0.3 and up[1] > 0.4
+    front = np.array([side[:, 2] for side, _ in standing])
+    assert np.abs(front[:, [0, 2]].mean(0)).max() < 0.2  # turned anyhow about their own axis
 
 
 def test_a_view_repeats_with_its_seed() -> None:
