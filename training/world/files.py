@@ -34,7 +34,7 @@ SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
 PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
 HELD_OUT_SOURCES = ("scan/", "furniture/Reallusion", "furniture/KatorLegaz")
-_PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions")
+_PARTS = ("mask", "normal", "depth", "thickness", "visible", "directions", "up")
 
 
 class Split(StrEnum):
@@ -106,15 +106,24 @@ def claim_folder(folder: Path, settings: WorldSettings) -> None:
         with new_file(path) as temporary:
             temporary.write_text(json.dumps(settings.as_json(), indent=1), encoding="utf-8")
         return
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (ValueError, OSError) as error:
-        raise InputError(f"{path} cannot be read: {error}") from error
+    found = _read_settings(path)
     if found != settings.as_json():
         raise InputError(
             f"{folder} holds a world of other settings ({found}, not {settings.as_json()}): "
             "choose another folder or the same settings"
         )
+
+
+def _read_settings(path: Path) -> dict[str, int]:
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise InputError(f"{path} cannot be read: {error}") from error
+    if not isinstance(found, dict) or found.get("format") != FORMAT:
+        raise InputError(
+            f"{path.parent} is a world of another version: build a new one with isc world build"
+        )
+    return found
 
 
 def write_patterns(folder: Path, atlas: Atlas) -> None:
@@ -173,7 +182,6 @@ def write_views(path: Path, reference: str, views: list[View], reason: str) -> N
         for part in _PARTS:
             arrays[f"{part}{k}"] = getattr(view, part)
         arrays[f"distance{k}"] = np.array(view.distance)
-        arrays[f"up{k}"] = view.up
     with new_file(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, **arrays)  # type: ignore[arg-type]
 
@@ -203,7 +211,6 @@ def read_views(path: Path) -> tuple[str, list[View]]:
                 name=str(name),
                 source=source,
                 distance=float(data[f"distance{k}"]),
-                up=data[f"up{k}"],
                 **{part: data[f"{part}{k}"] for part in _PARTS},
             )
             for k, name in enumerate(data["names"])
@@ -211,7 +218,7 @@ def read_views(path: Path) -> tuple[str, list[View]]:
     for view in views:
         count = int(view.mask.sum())
         wanted = ((SIDE, SIDE), (count, 3), (count,), (count,), (count, DIRECTIONS // 8))
-        if tuple(getattr(view, part).shape for part in _PARTS) != (*wanted, (DIRECTIONS, 3)):
+        if tuple(getattr(view, part).shape for part in _PARTS) != (*wanted, (DIRECTIONS, 3), (3,)):
             raise InputError(f"{path} holds views of another shape: delete it and build it again")
     return reference, views
 
@@ -232,10 +239,11 @@ def views_in(folder: Path, split: Split) -> Iterator[View]:
     Raises
     ------
     InputError
-        If the folder is no world.
+        If the folder is no world, or one of another version.
     """
     if not (folder / SETTINGS).is_file():
         raise InputError(f"{folder} is no world: make one with isc world build")
+    _read_settings(folder / SETTINGS)
     for path in sorted((folder / VIEWS).glob("*.npz")):
         if split_of(_reference_of(path)) == split:
             yield from read_views(path)[1]

@@ -87,7 +87,9 @@ def test_damaged_archives_are_refused(tmp_path: Path) -> None:
     refused(tmp_path / "absent.npz", r"cannot be read \(No such file or directory\)")
 
 
-@pytest.mark.parametrize("part", ["mask", "normal", "depth", "thickness", "visible", "directions"])
+@pytest.mark.parametrize(
+    "part", ["mask", "normal", "depth", "thickness", "visible", "directions", "up"]
+)
 def test_views_of_another_shape_are_refused(tmp_path: Path, part: str) -> None:
     path = tmp_path / "00000.npz"
     first = some_views()[0]
@@ -115,8 +117,10 @@ def test_a_folder_is_claimed_once_and_by_the_same_settings_only(tmp_path: Path) 
     with pytest.raises(InputError, match="cannot be read"):
         claim_folder(folder, SETTINGS_OF_ALL)
     (folder / SETTINGS).write_text(json.dumps({"format": 99}))
-    with pytest.raises(InputError, match="other settings"):
+    with pytest.raises(InputError, match="another version: build a new one"):
         claim_folder(folder, SETTINGS_OF_ALL)
+    with pytest.raises(InputError, match="another version: build a new one"):
+        list(views_in(folder, Split.TRAIN))
 
 
 def test_folders_and_files_that_are_no_world_are_left_alone(tmp_path: Path) -> None:
