@@ -21,7 +21,7 @@ import numpy as np
 from ..imaging.bounding_box import FramePart
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
-from ..io.decoders import write_png
+from ..io.decoders.png import write_png
 from ..io.decoders.raw import CAMERA_RAW
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like

@@ -3,7 +3,8 @@
 Problem: a photo without a mask is either masked, or refused with a message that says what to do. A
 wrong mask spoils everything that follows.
 
-Method: a mask is found (`search`) and used unless there is a reason not to (`refusal`).
+Method: a mask is found (`search`) and used unless there is a reason not to (`refusal`). Both are
+imported when they are needed: most photos have a mask, or a black border.
 """
 
 from dataclasses import dataclass, field, replace
@@ -20,8 +21,6 @@ from ..photo.photo import Photo
 from ..photo.reading import photo_from_raster
 from .components import connected_components
 from .hints import Hints
-from .refusal import MIN_CONFIDENCE, REMEDY, refusal_reason
-from .search import find_mask, find_masks
 
 _MIN_LENIENT_CONFIDENCE = 0.5  # the same if the whole photo can be used instead
 
@@ -66,6 +65,9 @@ class MaskSearch:
         InputError
             If the mask is refused, or the hints do not match the photo.
         """
+        from .refusal import MIN_CONFIDENCE, refusal_reason
+        from .search import find_mask
+
         self.hints.check(light.shape[1], light.shape[0])
         found = find_mask(light, self.hints)
         problem = refusal_reason(
@@ -112,6 +114,9 @@ class EachObjectSearch:
         InputError
             If there is none.
         """
+        from .refusal import REMEDY
+        from .search import find_masks
+
         self.found = [one for one in find_masks(light) if int(one.mask.sum()) >= MIN_MASK_PIXELS]
         if not self.found:
             raise InputError(f"{name}: no distinct objects found: {REMEDY}")

@@ -22,7 +22,6 @@ from ..imaging.bounding_box import FramePart
 from ..imaging.row_blocks import row_blocks
 from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..io.decoders.colour.space import ColourSpace
-from ..io.decoders.colour.table_profile import table_to_srgb
 from ..io.decoders.raster import Raster, as_rgb
 from .names import TRANSFERS
 from .primaries import in_rec709, to_rec709
@@ -87,6 +86,8 @@ def to_linear(raster: Raster, transfer: str) -> np.ndarray:
     """
     space = raster.space
     if transfer == PROFILE and space is not None and space.is_table and raster.peak is not None:
+        from ..io.decoders.colour.table_profile import table_to_srgb  # LittleCMS
+
         codes = table_to_srgb(raster.values, raster.peak, space.profile)
         return to_linear(replace(raster, values=codes, peak=255, space=None), "srgb")
     linear = _decoded(raster, transfer)

@@ -16,7 +16,7 @@ import numpy as np
 
 from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.io.decoders import write_png
+from isc_core.io.decoders.png import write_png
 from isc_core.photo import Raster
 from isc_core.photo.grabcut import write_mask
 from tests.properties.photos import MadePhoto

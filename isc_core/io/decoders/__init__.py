@@ -1,4 +1,7 @@
-"""Decoders of image files: one format per module, detected from the content, not the name."""
+"""Decoders of image files: one format per module, detected from the content, not the name.
+
+Only the module of a file's format is imported, with the part of Pillow that it needs.
+"""
 
 import hashlib
 import math
@@ -6,7 +9,9 @@ import struct
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from PIL import Image
@@ -16,18 +21,8 @@ from ..limits import DEFAULT_LIMITS, Limits
 from ..memory import READING_BYTES_PER_PIXEL, is_available, is_exhausted, memory_error
 from ..native_io import suppress_native_output
 from ..regular_files import read_regular
-from .avif import read_avif
-from .bmp import read_bmp
-from .exr import read_exr
-from .hdr import read_hdr
-from .heif import read_heif
-from .jpeg import read_jpeg
-from .npy import read_npy
-from .png import read_png, write_png
-from .pnm import read_pnm
 from .raster import MIN_SIDE, Raster
-from .raw import is_raw, read_raw
-from .tiff import read_tiff
+from .raw import is_raw
 
 _DECODING_ERRORS = (
     OSError,
@@ -45,19 +40,20 @@ _DECODING_ERRORS = (
 )
 
 _Reader = Callable[[bytes, Path, Limits], Raster]
-_READERS: tuple[tuple[bytes, str, _Reader], ...] = (
-    (b"\x89PNG\r\n\x1a\n", "PNG", read_png),
-    (b"\xff\xd8\xff", "JPEG", read_jpeg),
-    (b"II*\0", "TIFF", read_tiff),
-    (b"MM\0*", "TIFF", read_tiff),
-    (b"II+\0", "TIFF", read_tiff),
-    (b"MM\0+", "TIFF", read_tiff),
-    (b"\x76\x2f\x31\x01", "EXR", read_exr),
-    (b"#?RADIANCE", "HDR", read_hdr),
-    (b"#?RGBE", "HDR", read_hdr),
-    (b"BM", "BMP", read_bmp),
-    (b"\x93NUMPY", "NPY", read_npy),
-    *((b"P%d" % n, "PPM", read_pnm) for n in range(1, 7)),
+# How files begin, their format, and its module: `read_png` in `png` reads a PNG.
+_FORMATS: tuple[tuple[bytes, str, str], ...] = (
+    (b"\x89PNG\r\n\x1a\n", "PNG", "png"),
+    (b"\xff\xd8\xff", "JPEG", "jpeg"),
+    (b"II*\0", "TIFF", "tiff"),
+    (b"MM\0*", "TIFF", "tiff"),
+    (b"II+\0", "TIFF", "tiff"),
+    (b"MM\0+", "TIFF", "tiff"),
+    (b"\x76\x2f\x31\x01", "EXR", "exr"),
+    (b"#?RADIANCE", "HDR", "hdr"),
+    (b"#?RGBE", "HDR", "hdr"),
+    (b"BM", "BMP", "bmp"),
+    (b"\x93NUMPY", "NPY", "npy"),
+    *((b"P%d" % n, "PPM", "pnm") for n in range(1, 7)),
 )
 
 
@@ -129,22 +125,28 @@ def read_raster(path: str | Path, limits: Limits = DEFAULT_LIMITS) -> Raster:
 
 def _reader_of(data: bytes, path: Path) -> tuple[str, _Reader]:
     """The format of a file and its reader."""
+    kind, module = _format_of(data, path)
+    return kind, cast(_Reader, getattr(import_module(f".{module}", __name__), f"read_{module}"))
+
+
+def _format_of(data: bytes, path: Path) -> tuple[str, str]:
+    """The format of a file and its module."""
     if is_raw(data):
-        return "raw", read_raw
+        return "raw", "raw"
     if data[4:8] == b"ftyp":
         (size,) = struct.unpack(">I", data[:4])
         brands = {data[8:12], *(data[k : k + 4] for k in range(16, min(size, 256), 4))}
         if brands & _AVIF_BRANDS:
-            return "AVIF", read_avif
+            return "AVIF", "avif"
         if brands & _HEIF_BRANDS:
-            return "HEIC", read_heif
-    for magic, kind, reader in _READERS:
+            return "HEIC", "heif"
+    for magic, kind, module in _FORMATS:
         if data.startswith(magic):
-            return kind, reader
+            return kind, module
     raise InputError(
         f"{path}: not an image of a known format (PNG, JPEG, TIFF, HEIC, AVIF, camera raw, EXR, "
         "HDR, BMP, PPM, PGM, NPY): convert it to PNG"
     )
 
 
-__all__ = ["MIN_SIDE", "Raster", "read_raster", "write_png"]
+__all__ = ["MIN_SIDE", "Raster", "read_raster"]

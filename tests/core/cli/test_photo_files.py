@@ -10,8 +10,8 @@ from PIL import Image
 
 from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.io.decoders import write_png
 from isc_core.io.decoders.colour.space import ColourSpace
+from isc_core.io.decoders.png import write_png
 from isc_core.io.decoders.raster import raster_of_codes
 from isc_core.photo import read_linear
 from isc_core.result_files.reading_notes_text import stored_note_lines

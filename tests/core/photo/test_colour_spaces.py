@@ -14,8 +14,8 @@ from PIL import Image, ImageCms
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
-from isc_core.io.decoders import write_png
 from isc_core.io.decoders.colour.space import ColourSpace
+from isc_core.io.decoders.png import write_png
 from isc_core.io.decoders.raster import raster_of_codes
 from isc_core.io.reading_notes import ReadingNote, ReadingNoteKind
 from isc_core.photo import encode_like, read_linear, read_photo, read_raster

@@ -20,7 +20,6 @@ import numpy as np
 from ...printable_names import readable
 from ...reading_notes import ReadingNote, ReadingNoteKind
 from .space import ColourSpace, PowerCurve, SampledCurve, ToneCurve
-from .table_profile import check_table
 
 MOST_BYTES = 1 << 24
 _MOST_TAGS, _MOST_SAMPLES, _LONGEST_NAME = 100, 65536, 60
@@ -83,6 +82,8 @@ def read_profile(profile: bytes, channels: int) -> ColourSpace:
         if not {b"rXYZ", b"gXYZ", b"bXYZ", b"rTRC", b"gTRC", b"bTRC"} <= tags.keys():
             if channels != 3:
                 raise ValueError("a table of colours for grey pixels")
+            from .table_profile import check_table  # few profiles are tables: LittleCMS
+
             check_table(profile)
             return ColourSpace(name, profile=profile, is_table=True)
         curves = tuple(_curve(tags[b"%cTRC" % letter]) for letter in b"rgb")
