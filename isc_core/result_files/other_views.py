@@ -70,21 +70,12 @@ def turned_panels(
         empty = np.zeros((SIDE, SIDE))
         return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
     body, vertices = found
-    places = (body.texture[:, ::-1] + 0.5) * _STEP - 0.5
+    places = (body.texture + 0.5) * _STEP - 0.5
 
     def panel(name: str, yaw: float) -> Panel:
         texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
-
-        def colors_of(places: np.ndarray) -> np.ndarray:
-            column, row = places.T
-            layers = [
-                ndimage.map_coordinates(layer, (row, column), order=1, mode="nearest")
-                for layer in np.moveaxis(texture, -1, 0)
-            ]
-            return np.stack(layers, -1)
-
         room = 1 - 2 * MARGIN
-        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, colors_of)
+        view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, texture)
         return Panel(gain * view.values, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
 
     with ThreadPoolExecutor(2) as pool:

@@ -9,8 +9,8 @@ triangle (a, b, c) covers the pixel centres p whose barycentric coordinates, u =
 c] and so on, [.] being the signed area, are not negative. Depth and values are interpolated with
 them, and of all triangles at a pixel the nearest is visible, of equally near ones the first. Each
 is tested at all pixel centres of its bounding box. The picture is supersampled by 2 and averaged;
-where values are texture coordinates, the looked-up colours are averaged, because a mean of the
-coordinates of two surfaces would be meaningless.
+where values are places in a texture, its colours there, interpolated linearly, are averaged,
+because a mean of the places on two surfaces would be meaningless.
 
 Citation: J. Pineda, "A parallel algorithm for polygon rasterization", SIGGRAPH 1988,
 doi:10.1145/54852.378457; the depth buffer: E. Catmull, "A subdivision algorithm for computer
@@ -20,7 +20,6 @@ Limits: no perspective; values are interpolated linearly. Efficient for triangle
 the cost of a triangle is that of its bounding box.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +57,7 @@ def turned_view(
     zoom: float,
     room: float = 1.0,
     closed: bool = False,
-    colors_of: Callable[[np.ndarray], np.ndarray] | None = None,
+    texture: np.ndarray | None = None,
 ) -> View:
     """Render a mesh that is rotated about the vertical axis.
 
@@ -80,8 +79,8 @@ def turned_view(
         Share of the picture's side that the mesh may fill, in (0, 1].
     closed : bool
         Whether the mesh is closed, so that back faces are culled.
-    colors_of : callable, optional
-        Maps values (N, C) to colours (N, D), which are averaged instead.
+    texture : (h, w, D) ndarray, optional
+        Values are row and column in it, clipped to its pixels; its colours are averaged instead.
 
     Returns
     -------
@@ -97,23 +96,13 @@ def turned_view(
         a, b, c = points[faces, :2].transpose(1, 0, 2)
         faces = faces[_cross(b - a, c - a) < 0]  # rows point downward
     fine = _nearest(points, faces, values, _FINE * side)
-    if colors_of is not None:
-        fine = _with_colors(fine, colors_of)
-    steps = [(row, column) for row in range(_FINE) for column in range(_FINE)]
-    cells = np.zeros((side, side, fine.shape[2]))
-    for row, column in steps:
-        cells += fine[row::_FINE, column::_FINE]
+    if texture is None:
+        cells = fine.reshape(side, _FINE, side, _FINE, -1).sum(axis=(1, 3))
+    else:
+        cells = np.zeros((side, side, texture.shape[2] + 1))
+        _add_colors(fine, np.ascontiguousarray(texture, np.float64), cells)
     covered = np.rint(cells[..., -1])
     return View(cells[..., :-1] / np.maximum(covered, 1)[..., None], covered / _FINE**2)
-
-
-def _with_colors(fine: np.ndarray, colors_of: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    covered = fine[..., -1] > 0
-    colors = colors_of(fine[covered, :-1])
-    picture = np.zeros((*covered.shape, colors.shape[1] + 1))
-    picture[covered, :-1] = colors
-    picture[..., -1] = covered
-    return picture
 
 
 def _nearest(points: np.ndarray, faces: np.ndarray, values: np.ndarray, side: int) -> np.ndarray:
@@ -159,6 +148,29 @@ def _draw(points, faces, carried, nearest, picture):
                     picture[row, column, c] = (
                         u * carried[i, c] + v * carried[j, c] + w * carried[k, c]
                     )
+
+
+@jit(types="f8[3] f8[3] f8[3]")
+def _add_colors(fine, texture, cells):
+    """Add the colours of a `texture` (h, w, D) at the places in `fine` (2N, 2N, 3), where the last
+    value is 1, to the pixels of `cells` (N, N, D + 1), and count them there.
+    """
+    last_row, last_column = texture.shape[0] - 1, texture.shape[1] - 1
+    for row in range(fine.shape[0]):
+        for column in range(fine.shape[1]):
+            if fine[row, column, 2] == 0.0:
+                continue
+            y = min(max(fine[row, column, 0], 0.0), float(last_row))
+            x = min(max(fine[row, column, 1], 0.0), float(last_column))
+            above, left = int(y), int(x)
+            below, right = min(above + 1, last_row), min(left + 1, last_column)
+            down, along = y - above, x - left
+            for c in range(texture.shape[2]):
+                upper = (1 - along) * texture[above, left, c] + along * texture[above, right, c]
+                lower = (1 - along) * texture[below, left, c] + along * texture[below, right, c]
+                color = (1 - down) * upper + down * lower
+                cells[row // _FINE, column // _FINE, c] += color
+            cells[row // _FINE, column // _FINE, texture.shape[2]] += 1.0
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -174,7 +174,9 @@ def _run_programs() -> None:
     fill_patches(diffuse, gloss < 0.1, gloss >= 0.1, alone)
     roughness(rng.random((9, 10, 11)).astype(np.float32))
     corners = np.array([(-9, -7, 0), (8, -6, 2), (1, 9, 5), (0, 0, 9.0)])
-    turned_view(corners, np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)]), corners, 20.0, _SIDE, 2.0)
+    faces, places = np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)]), np.abs(corners[:, :2])
+    turned_view(corners, faces, corners, 20.0, _SIDE, 2.0)
+    turned_view(corners, faces, places, 20.0, _SIDE, 2.0, texture=rng.random((9, 8, 3)))
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
         kind = np.float32 if single else np.float64

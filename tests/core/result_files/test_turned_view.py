@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from isc_core.result_files.turned_view import turned_view
 
@@ -103,12 +104,24 @@ def test_colours_are_averaged_rather_than_places_in_the_texture() -> None:
     (far, faces), (near, _) = plane(), plane(size=31.0)
     vertices = np.concatenate([far, near + (0, 0, 5)])
     both = np.concatenate([faces, faces + 4])
-    places = np.repeat([[0.0], [2.0]], 4, axis=0)
-
-    def colors_of(places: np.ndarray) -> np.ndarray:
-        return np.where(np.abs(places - 1) < 0.5, 1.0, 0.0)
-
+    places = np.repeat([[0.0, 0.0], [2.0, 0.0]], 4, axis=0)
+    texture = np.array([0.0, 1.0, 0.0]).reshape(3, 1, 1)
     args = vertices, both, places, 0.0, SIDE, 1.0
-    between = np.abs(turned_view(*args).values - 1) < 0.5
+    between = np.abs(turned_view(*args).values[..., 0] - 1) < 0.5
     assert between.any()
-    assert turned_view(*args, colors_of=colors_of).values.max() == 0
+    assert turned_view(*args, texture=texture).values.max() < 1e-12
+
+
+def test_colours_are_interpolated_in_the_texture() -> None:
+    """As by SciPy, also at places beyond its border."""
+    vertices, faces = plane()
+    places = np.array([[8.0, -2], [8, 5], [-1, 5], [-1, -2]])
+    texture = np.random.default_rng(2).random((7, 5, 2))
+    view = turned_view(vertices, faces, places, 0.0, SIDE, 1.0, texture=texture)
+    fine = (np.arange(120) + 0.5) / 120
+    at = np.meshgrid(9 * fine - 1, 7 * fine - 2, indexing="ij")
+    for channel in (0, 1):
+        plane_of = texture[..., channel]
+        expected = ndimage.map_coordinates(plane_of, at, order=1, mode="nearest")
+        means = expected.reshape(60, 2, 60, 2).mean(axis=(1, 3))
+        np.testing.assert_allclose(view.values[20:80, 20:80, channel], means, atol=1e-9)
