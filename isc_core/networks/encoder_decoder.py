@@ -101,28 +101,32 @@ class EncoderDecoder(Network):
         """Channels of the encoder's levels, finest first."""
         return [w.shape[-1] for w in self.weights[1 : 2 * self.depth : 2]]
 
-    def forward(self, channels: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    def forward(self, *photos: np.ndarray) -> list[tuple[np.ndarray, list[np.ndarray]]]:
         """Apply encoder and decoder.
 
         Parameters
         ----------
-        channels : (H, W, inputs) ndarray
-            Sides are multiples of `BLOCK` * 2^(depth - 1).
+        *photos : (H, W, inputs) ndarray
+            Channels of photos of one size, whose sides are multiples of `BLOCK` * 2^(depth - 1).
 
         Returns
         -------
-        maps : (H, W, outputs) float32 ndarray
-        levels : list of ndarray
-            The encoder's maps, finest first.
+        list of tuple
+            For each photo the maps, (H, W, outputs) float32, and a list of the encoder's maps,
+            finest first. They do not depend on the other photos.
         """
-        layer = space_to_depth(channels, BLOCK)
-        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
+        layers = [space_to_depth(channels, BLOCK) for channels in photos]
+        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[list[np.ndarray]]()
         for level in range(self.depth):
-            layer = conv_block(layer if level == 0 else block_means(layer, 2), steps)
-            levels.append(layer)
-        for skip in levels[-2::-1]:
-            layer = conv_block(_concatenated(skip, layer), steps)
-        return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
+            if level > 0:
+                layers = [block_means(layer, 2) for layer in layers]
+            layers = conv_block(layers, steps)
+            levels.append(layers)
+        for skips in levels[-2::-1]:
+            joined = [_concatenated(*pair) for pair in zip(skips, layers, strict=True)]
+            layers = conv_block(joined, steps)
+        maps = [depth_to_space(layer, BLOCK) for layer in convolved(layers, *next(steps))]
+        return [(one, list(seen)) for one, *seen in zip(maps, *levels, strict=True)]
 
 
 @dataclass(frozen=True)

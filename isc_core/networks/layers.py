@@ -18,7 +18,7 @@ import numpy as np
 
 DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
-_BLOCK_BYTES = 16_000_000  # of the neighbourhoods that are processed at a time
+_BLOCK_BYTES = 4_000_000  # of the neighbourhoods that are processed at a time
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
@@ -153,63 +153,78 @@ def depth_to_space(layer: np.ndarray, block: int) -> np.ndarray:
     )
 
 
-def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
+def conv_block(layers: list[np.ndarray], steps: Steps) -> list[np.ndarray]:
     """Apply the next two convolutions of `steps`, each followed by max(0, .).
 
     Parameters
     ----------
-    layer : (H, W, C) ndarray
+    layers : list of (H, W, C) ndarray
+        One for each photo.
     steps : Steps
         Weights and biases of the remaining convolutions; advanced by two.
 
     Returns
     -------
-    (H, W, D) float32 ndarray
+    list of (H, W, D) float32 ndarray
     """
     for _ in range(2):
-        layer = convolved(layer, *next(steps))
-        np.maximum(layer, 0, out=layer)
-    return layer
+        layers = convolved(layers, *next(steps))
+        for layer in layers:
+            np.maximum(layer, 0, out=layer)
+    return layers
 
 
-def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
+def convolved(layers: list[np.ndarray], weight: np.ndarray, bias: np.ndarray) -> list[np.ndarray]:
     """Convolve with a 3 x 3 kernel and zero padding, as matrix products of neighbourhoods.
 
     Both factors are rounded to integer multiples of a power of two, such that float64 represents
     every sum of their products exactly: the order of summation, which in libraries depends on the
-    number of threads, does not affect the result.
+    number of threads and of photos, does not affect the result.
 
     Parameters
     ----------
-    layer : (H, W, C) ndarray
+    layers : list of (H, W, C) ndarray
+        One for each photo: the weights are converted once, and one product for two photos takes
+        less time than two.
     weight : (9, C, D) ndarray
     bias : (D,) ndarray
 
     Returns
     -------
-    (H, W, D) float32 ndarray
+    list of (H, W, D) float32 ndarray
     """
-    rows, columns, channels = layer.shape
-    kernel_step, layer_step = _step_of(weight), _step_of(layer)
+    rows, columns, channels = layers[0].shape
+    kernel_step, layer_steps = _step_of(weight), [_step_of(layer) for layer in layers]
     kernel = weight.reshape(-1, weight.shape[2]).astype(np.float64)
     _to_multiples(kernel, kernel_step)
-    scale, out = layer_step * kernel_step, np.empty((rows, columns, weight.shape[2]), np.float32)
-    height = max(1, _BLOCK_BYTES // (72 * channels * columns))
+    found = [np.empty((rows, columns, weight.shape[2]), np.float32) for _ in layers]
+    height = max(1, _BLOCK_BYTES // (72 * channels * columns * len(layers)))
     for top in range(0, rows, height):
         count = min(height, rows - top)
-        near = layer[max(top - 1, 0) : top + count + 1]
-        block, above = np.zeros((count + 2, columns + 2, channels), np.float32), int(top == 0)
-        block[above : above + len(near), 1:-1] = near
-        _to_multiples(block, layer_step)
-        neighbourhoods = np.empty((count, columns, 9, channels))
-        for k in range(9):
-            i, j = divmod(k, 3)
-            neighbourhoods[:, :, k] = block[i : i + count, j : j + columns]
-        sums = neighbourhoods.reshape(-1, 9 * channels) @ kernel
-        sums *= scale
-        sums += bias
-        out[top : top + count] = sums.reshape(count, columns, -1)
-    return out
+        near = np.empty((len(layers), count, columns, 9, channels))
+        for layer, step, out in zip(layers, layer_steps, near, strict=True):
+            _gather_neighbourhoods(layer, top, step, out)
+        sums = near.reshape(-1, 9 * channels) @ kernel
+        parts = sums.reshape(len(layers), count, columns, -1)
+        for part, step, out in zip(parts, layer_steps, found, strict=True):
+            part *= step * kernel_step
+            part += bias
+            out[top : top + count] = part
+    return found
+
+
+def _gather_neighbourhoods(layer: np.ndarray, top: int, step: float, out: np.ndarray) -> None:
+    """The 3 x 3 pixels around each pixel of some rows from `top` on, as multiples of `step`, into
+    `out` (rows, W, 9, C).
+    """
+    count, columns, _, channels = out.shape
+    near = layer[max(top - 1, 0) : top + count + 1]
+    block, above = np.zeros((count + 2, columns + 2, channels), np.float32), int(top == 0)
+    block[above : above + len(near), 1:-1] = near
+    _to_multiples(block, step)
+    for k in range(9):
+        i, j = divmod(k, 3)
+        out[:, :, k] = block[i : i + count, j : j + columns]
 
 
 def _to_multiples(values: np.ndarray, step: float) -> None:

@@ -138,8 +138,30 @@ class SceneNetwork(PhotoNetwork):
         -------
         RawPrediction
         """
-        maps, levels = self.forward(channels_of(image, mask))
+        ((maps, levels),) = self.forward(channels_of(image, mask))
         return RawPrediction(maps, self._light(levels, mask))
+
+    def with_mirror_image(
+        self, image: np.ndarray, mask: np.ndarray
+    ) -> tuple[RawPrediction, RawPrediction]:
+        """Predict for a photo and for its mirror image together, which takes less time.
+
+        Parameters
+        ----------
+        image : (H, W, 3) ndarray
+        mask : (H, W) bool ndarray
+
+        Returns
+        -------
+        tuple of RawPrediction
+        """
+        masks = mask, mask[:, ::-1]
+        found = self.forward(channels_of(image, mask), channels_of(image[:, ::-1], masks[1]))
+        direct, mirrored = (
+            RawPrediction(maps, self._light(levels, seen))
+            for (maps, levels), seen in zip(found, masks, strict=True)
+        )
+        return direct, mirrored
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
@@ -331,8 +353,7 @@ def _computed(
     frame: NetworkFrame, network: SceneNetwork
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `_run` returns."""
-    direct = network(frame.image, frame.mask)
-    mirrored = network(frame.image[:, ::-1], frame.mask[:, ::-1])
+    direct, mirrored = network.with_mirror_image(frame.image, frame.mask)
     maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED
     return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 
