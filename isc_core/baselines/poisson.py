@@ -152,21 +152,31 @@ def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
     """
     padded = np.pad(mask, [(0, n % 2) for n in mask.shape])
     coarse = padded.reshape(padded.shape[0] // 2, 2, padded.shape[1] // 2, 2).any(axis=(1, 3))
-    along = [
-        _interpolation_1d(fine, rough) for fine, rough in zip(mask.shape, coarse.shape, strict=True)
-    ]
-    full = sparse.kron(*along, format="csr")[np.flatnonzero(mask)][:, np.flatnonzero(coarse)]
-    return sparse.csr_array(sparse.diags_array(1 / full.sum(axis=1)) @ full), coarse
-
-
-def _interpolation_1d(fine: int, coarse: int) -> sparse.csr_array:
-    at = np.arange(fine)
-    beside = np.clip(at // 2 + np.where(at % 2, 1, -1), 0, coarse - 1)
-    entries = (
-        np.repeat([0.75, 0.25], fine),
-        (np.concatenate([at, at]), np.concatenate([at // 2, beside])),
+    place = np.full(coarse.shape, -1)
+    place[coarse] = np.arange(coarse.sum())
+    rows, columns = (
+        _two_nearest(at, size) for at, size in zip(np.nonzero(mask), coarse.shape, strict=True)
     )
-    return sparse.csr_array(entries, shape=(fine, coarse))
+    # From the last coarse pixel to the first; sums over them have this order.
+    beside = np.stack([place[row, column] for row, _ in rows for column, _ in columns], axis=1)
+    weight = np.stack([one * other for _, one in rows for _, other in columns], axis=1)
+    kept = (weight > 0) & (beside >= 0)
+    weight[~kept] = 0
+    weight *= 1 / weight.sum(axis=1, keepdims=True)
+    starts = np.concatenate([[0], kept.sum(axis=1).cumsum()])
+    shape = len(kept), int(coarse.sum())
+    return sparse.csr_array((weight[kept], beside[kept], starts), shape=shape), coarse
+
+
+def _two_nearest(at: np.ndarray, coarse: int) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """The two coarse rows, of `coarse`, whose centres are nearest to each row, and their weights,
+    the later first; at the frame, one and nothing.
+    """
+    own = at // 2
+    other = np.clip(own + np.where(at % 2, 1, -1), 0, coarse - 1)
+    share = np.where(own == other, 1.0, 0.75)
+    later = np.where(own >= other, share, 0.25)
+    return (np.maximum(own, other), later), (np.minimum(own, other), 1 - later)
 
 
 def _centred(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
