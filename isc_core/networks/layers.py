@@ -18,6 +18,8 @@ import numpy as np
 
 DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
+_SIGN_AND_NUMBER = np.int32(-0x70000001)  # without the three bits between them
+_LARGEST_HALF = np.float32(65504)  # 16 bits; infinity and NaN are converted to larger numbers
 _BLOCK_BYTES = 4_000_000  # of the neighbourhoods that are processed at a time
 
 Steps = Iterator[
@@ -47,12 +49,30 @@ def weights_in(
     """
     count = sum(name.startswith("weight") for name in data)
     weights, biases = (
-        tuple(data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count))
-        for kind in ("weight", "bias")
+        tuple(_single(data[f"{kind}{k:02d}"]) for k in range(count)) for kind in ("weight", "bias")
     )
-    if not all(np.isfinite(values).all() for values in (*weights, *biases)):
-        raise ValueError("some of its values are not finite")
     return weights, biases
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    """A copy in float32; ValueError if a number is not finite.
+
+    NumPy converts numbers of 16 bits one by one. Shifted to the place of their exponent, they are
+    the number times 2^-112.
+    """
+    if values.dtype != np.float16:
+        single = values.astype(np.float32)
+        finite = bool(np.isfinite(single).all())
+    else:
+        bits = values.view(np.int16).astype(np.int32)  # which extends the sign
+        bits <<= 13
+        bits &= _SIGN_AND_NUMBER
+        single = bits.view(np.float32)
+        single *= np.float32(2.0**112)
+        finite = not single.size or max(single.max(), -single.min()) <= _LARGEST_HALF
+    if not finite:
+        raise ValueError("some of its values are not finite")
+    return single
 
 
 def is_chain(
