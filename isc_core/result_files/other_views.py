@@ -26,8 +26,8 @@ from ..photo.camera import Camera
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit
 from ..shading.brdf.ggx import F0
+from ..shading.brdf.model import Model
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions, toward, turn
-from ..shading.lobe_rendering import Lobe
 from ..shading.radiance import DistantLights, radiance, sh_shading
 from .mesh.options import MeshOptions
 from .mesh.rim_heights import limit_rim
@@ -174,21 +174,23 @@ def _highlights(
     layer = np.zeros((SIDE, SIDE, 3))
     if fit is None or fit.alpha is None or not fit.lights:
         return layer
-    lobe, inside = _lobe(fit), frame.coverage > 0
+    model, inside = _model(fit), frame.coverage > 0
     normal = unit_normals(small["normal"][inside])
     directions = np.stack([light.direction for light in fit.lights])
     strengths = np.stack([light.strength_light for light in fit.lights])
-    present = radiance(lobe.model, normal, VIEW, DistantLights(directions, strengths))
+    present = radiance(model, normal, VIEW, DistantLights(directions, strengths))
     observed = float(small["specular"][inside].sum())
     share = min(1.0, observed / max(float(present.sum()), 1e-12))
     if moved is not None:
         directions, strengths = moved[None], strengths.sum(axis=0, keepdims=True)
-    layer[inside] = share * radiance(lobe.model, normal, view, DistantLights(directions, strengths))
+    layer[inside] = share * radiance(model, normal, view, DistantLights(directions, strengths))
     return layer
 
 
-def _lobe(fit: LobeFit) -> Lobe:
+def _model(fit: LobeFit) -> Model:
+    from ..shading.lobe_rendering import Lobe  # for results with highlights
+
     alpha = float(np.clip(fit.alpha or 1.0, _NARROWEST, 1.0))
     if fit.model.startswith("ggx"):
-        return Lobe(alpha=alpha, f0=F0)
-    return Lobe(max(2 / alpha**2 - 2, 1.0))
+        return Lobe(alpha=alpha, f0=F0).model
+    return Lobe(max(2 / alpha**2 - 2, 1.0)).model

@@ -13,12 +13,11 @@ https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
 from dataclasses import dataclass, field, replace
 from math import log, pi, sqrt
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...imaging.bounding_box import FramePart
-from ...lobe_fitting.specular_layer import CoatedSurface
 from ...lobe_fitting.specular_level import SpecularFit, SpecularSource
 from ...photo.camera import Camera
 from ..solids.back import Back
@@ -26,6 +25,9 @@ from .glb import ExtraPrimitive, TexturedMesh, encode_glb
 from .object_cover import ObjectCover
 from .options import MeshOptions
 from .texture_codes import alpha_codes, color_codes, encoded_png, vector_codes
+
+if TYPE_CHECKING:
+    from ...lobe_fitting.specular_layer import CoatedSurface
 
 _SPECULAR = "KHR_materials_specular"
 
@@ -87,7 +89,7 @@ class MeshResult:
     texture: np.ndarray | None = None
     texture_part: FramePart | None = None
     cover: ObjectCover | None = None
-    coated: CoatedSurface | None = None
+    coated: "CoatedSurface | None" = None
     part: FramePart | None = None
 
     @property

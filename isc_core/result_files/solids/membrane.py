@@ -80,8 +80,17 @@ def _relaxed(found: np.ndarray, inside: np.ndarray, load: float) -> np.ndarray:
     sweeps, over = _SWEEPS, _OVER
     if length > _LONG:
         sweeps, over = max(_SWEEPS * _LONG // length, _FEWEST), _OVER_LONG
+    around = [(at - 1, at + 1, at - width, at + width) for at in colors]
+    kept = [flat.take(at) for at in colors]
     for _ in range(sweeps):
-        for at in colors:
-            near = flat[at - 1] + flat[at + 1] + flat[at - width] + flat[at + width]
-            flat[at] += over * ((near + load) / 4 - flat[at])
+        for at, sides, values in zip(colors, around, kept, strict=True):
+            change = flat.take(sides[0])
+            for side in sides[1:]:
+                change += flat.take(side)
+            change += load
+            change /= 4
+            change -= values
+            change *= over
+            values += change
+            flat[at] = values
     return found
