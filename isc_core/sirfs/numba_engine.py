@@ -395,7 +395,9 @@ class NumbaEngine:
         overlap = float((blurred * counts).sum())
         costs = table.values[tuple(slice(a, b) for a, b in bounds)]
         scale = w.absolute / (reflectance.ABSOLUTE_DIVISOR * pixels)
-        node_gradient = (-2 * w.parsimony / overlap) * blurred + scale * costs
+        node_gradient = blurred
+        node_gradient *= -2 * w.parsimony / overlap
+        node_gradient += scale * costs
         self._palette_terms = {
             "parsimony": -w.parsimony * float(np.log(overlap)),
             "absolute": scale * float((costs * counts).sum()),
