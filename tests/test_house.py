@@ -236,7 +236,7 @@ def test_the_core_imports_fast() -> None:
 def test_the_commands_import_no_graphs_and_no_optimisers() -> None:
     """SciPy's take a tenth of the start, and most photos need neither."""
     code = (
-        "import sys, isc_core.cli.commands.decompose; "
+        "import sys, isc_core.cli.commands.decompose, isc_core.masking.search; "
         "print(*sys.modules.keys() & {'scipy.sparse.csgraph', 'scipy.optimize'}); "
         "print('isc_core.masking.geodesic_region' in sys.modules)"
     )

@@ -55,6 +55,22 @@ def test_decompose_loads_its_compiler_while_it_works() -> None:
     assert not modules & {"numba", "llvmlite", "cv2"}
 
 
+def test_a_plain_photo_loads_nothing_that_other_photos_need(tmp_path: Path) -> None:
+    """Decoders of other files, the search for masks, other commands."""
+    photo = ball_photo(tmp_path)
+    modules = loaded("decompose", str(photo), "-o", str(tmp_path / "result"), "--quiet")
+    assert "isc_core.result_files.result_folder" in modules
+    assert not modules & {
+        *("scipy.optimize", "scipy.sparse.csgraph", "cv2", "matplotlib", "trimesh"),
+        *("PIL.ImageCms", "PIL.BmpImagePlugin", "PIL.JpegImagePlugin", "PIL.TiffImagePlugin"),
+        *("isc_core.masking.search", "isc_core.networks.mask_network"),
+    }
+    decoders = {name for name in modules if name.startswith("isc_core.io.decoders.")}
+    assert not {name.rpartition(".")[2] for name in decoders} & {"jpeg", "tiff", "exr", "avif"}
+    packages = {name.split(".")[1] for name in modules if name.startswith("isc_core.")}
+    assert not packages & {"batch", "datasets", "editing", "evaluation", "refinement"}
+
+
 def test_a_command_of_the_core_does_not_search_other_packages() -> None:
     """The search among installed packages takes a tenth of a second."""
     code = (
