@@ -49,6 +49,6 @@ def test_weights_of_16_bits_are_converted_exactly() -> None:
 @pytest.mark.parametrize("kind", [np.float16, np.float32])
 @pytest.mark.parametrize("value", [np.inf, -np.inf, np.nan, -np.nan])
 def test_weights_are_finite(kind: type, value: float) -> None:
-    values = np.array([1, value, -2], kind)
+    values: np.ndarray = np.array([1, value, -2], kind)
     with pytest.raises(ValueError, match="not finite"):
         weights_in({"weight00": np.ones(2, kind), "bias00": values})
