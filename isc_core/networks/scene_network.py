@@ -126,42 +126,23 @@ class SceneNetwork(PhotoNetwork):
             and bool((self.temperatures > 0).all())
         )
 
-    def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
-        """Predict maps and light from the image of a `NetworkFrame`.
+    def __call__(self, *frames: tuple[np.ndarray, np.ndarray]) -> list[RawPrediction]:
+        """Predict maps and light of photos together, which takes less time than one by one.
 
         Parameters
         ----------
-        image : (H, W, 3) ndarray
-        mask : (H, W) bool ndarray
+        *frames : tuple of ((H, W, 3) ndarray, (H, W) bool ndarray)
+            Image and mask of a `NetworkFrame`, all of one size.
 
         Returns
         -------
-        RawPrediction
+        list of RawPrediction
         """
-        ((maps, levels),) = self.forward(channels_of(image, mask))
-        return RawPrediction(maps, self._light(levels, mask))
-
-    def with_mirror_image(
-        self, image: np.ndarray, mask: np.ndarray
-    ) -> tuple[RawPrediction, RawPrediction]:
-        """Predict for a photo and for its mirror image together, which takes less time.
-
-        Parameters
-        ----------
-        image : (H, W, 3) ndarray
-        mask : (H, W) bool ndarray
-
-        Returns
-        -------
-        tuple of RawPrediction
-        """
-        masks = mask, mask[:, ::-1]
-        found = self.forward(channels_of(image, mask), channels_of(image[:, ::-1], masks[1]))
-        direct, mirrored = (
-            RawPrediction(maps, self._light(levels, seen))
-            for (maps, levels), seen in zip(found, masks, strict=True)
-        )
-        return direct, mirrored
+        found = self.forward(*(channels_of(image, mask) for image, mask in frames))
+        return [
+            RawPrediction(maps, self._light(levels, mask))
+            for (maps, levels), (_, mask) in zip(found, frames, strict=True)
+        ]
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
@@ -353,7 +334,8 @@ def _computed(
     frame: NetworkFrame, network: SceneNetwork
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `_run` returns."""
-    direct, mirrored = network.with_mirror_image(frame.image, frame.mask)
+    image, mask = frame.image, frame.mask
+    direct, mirrored = network((image, mask), (image[:, ::-1], mask[:, ::-1]))
     maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED
     return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 

@@ -5,7 +5,8 @@ the device of the fit paints and lights whole batches.
 
 Equation: see `training.world.recipes` (paint) and `training.world.lighting` (light).
 
-Limits: all surroundings of the bank have as many rows, so that they lie in one tensor.
+Limits: all surroundings of the bank have as many rows, so that they lie in one tensor. A table is
+infinitely far below a body, without its shadow.
 """
 
 import math

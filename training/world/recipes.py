@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from isc_core.shading.perspective import rotation_between
+
 from .patterns import Atlas, PatternKind
 from .random_draws import log_uniform
 
@@ -396,12 +398,12 @@ def _light(
 
 def _turn(up: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Turn surroundings: upright with a body that stands, else as seen from a little above."""
-    yaw = Rotation.from_euler("y", rng.uniform(0, 360), degrees=True)
+    yaw = Rotation.from_euler("y", rng.uniform(0, 360), degrees=True).as_matrix()
     if up.any():
-        tilt = Rotation.align_vectors([(0.0, 1.0, 0.0)], [up])[0]
+        tilt = rotation_between(up, np.array([0.0, 1, 0]))
     else:
-        tilt = Rotation.from_euler("x", rng.normal(-15, 20), degrees=True)
-    return np.asarray((yaw * tilt).as_matrix())
+        tilt = Rotation.from_euler("x", rng.normal(-15, 20), degrees=True).as_matrix()
+    return np.asarray(yaw @ tilt)
 
 
 def lamp_places(
