@@ -17,8 +17,9 @@ doi:10.6028/jres.049.044.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage, sparse
+from scipy import sparse
 
+from ..filters.components import labelled
 from ..numerics.linear import solve_linear
 
 _COARSEST = 60
@@ -180,7 +181,7 @@ def _two_nearest(at: np.ndarray, coarse: int) -> tuple[tuple[np.ndarray, np.ndar
 
 
 def _centred(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    parts, count = ndimage.label(mask)
+    parts, count = labelled(mask)
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     for channel in values.reshape(*mask.shape, -1).transpose(2, 0, 1):
         means = np.bincount(parts.ravel(), channel.ravel(), minlength=count + 1) / np.maximum(

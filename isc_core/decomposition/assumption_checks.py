@@ -19,8 +19,8 @@ coloured light is covered by `illuminant.gamut`.
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.morphology import opened_by_blocks
 from ..networks.scene_network import Kind, ScenePrediction
 from ..photo import Photo
 from ..scene.diagnostics import AssumptionWarning, Diagnostics, WarningKind
@@ -110,7 +110,7 @@ def share_in_blocks(mask: np.ndarray) -> float:
     float
         In [0, 1].
     """
-    return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
+    return float(opened_by_blocks(mask).sum() / max(int(mask.sum()), 1))
 
 
 def confidence_factor(diagnostics: Diagnostics) -> float:

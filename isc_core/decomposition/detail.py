@@ -37,8 +37,8 @@ from functools import cached_property
 from itertools import takewhile
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.distance import nearest_pixels
 from ..imaging.blocks import block_means, means_inside
 from ..imaging.bounding_box import mask_slices
 from ..imaging.cross_bilateral import CrossBilateral
@@ -301,12 +301,9 @@ class Pyramid:
         mask, evidence = self.levels[-1].mask, self.evidence()
         if evidence is None:
             return np.zeros(tuple(n // BLOCK for n in mask.shape), np.float32)
-        outside = block_means(mask.astype(np.float32), BLOCK) == 0
-        nearest = ndimage.distance_transform_edt(
-            outside, return_distances=False, return_indices=True
-        )
+        nearest = nearest_pixels(block_means(mask.astype(np.float32), BLOCK) > 0)
         found = added_share(rule.probability(evidence)).astype(np.float32)
-        return np.asarray(found[tuple(nearest)])
+        return np.asarray(found[nearest])
 
     def relief(
         self,

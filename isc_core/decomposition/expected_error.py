@@ -28,8 +28,8 @@ unknown. Measured in docs/methods/expected_error.md.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.distance import nearest_pixels
 from ..imaging.resampling import nearest_samples
 from ..imaging.upsampling import enlarge_inside
 from ..networks.scene_network import ScenePrediction
@@ -188,10 +188,7 @@ def with_expected_error(
     small = np.zeros((*mask.shape, 2))
     small[mask] = np.stack(Evidence.of(prediction, normal, shading, mask).errors(), axis=1)
     if mask.shape != d.mask.shape:
-        rows, columns = ndimage.distance_transform_edt(
-            ~mask, return_distances=False, return_indices=True
-        )
-        small = small[rows, columns]
+        small = small[nearest_pixels(mask)]
     maps = np.empty((*d.mask.shape, 2), np.float32)
     enlarge_inside(small, d.mask, 1 / factor, maps)
     error, diagnostics = ExpectedError(maps[..., 0], maps[..., 1]), d.provenance.diagnostics

@@ -39,8 +39,10 @@ is inpainted smoothly.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.components import labelled, means
+from ..filters.gaussian import gaussian_average
+from ..filters.morphology import dilated, opened_by_blocks
 from ..imaging.bounding_box import mask_diagonal
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian
@@ -305,10 +307,9 @@ def _hidden(kept: np.ndarray, clipped: np.ndarray | None, mask: np.ndarray) -> n
     """
     if clipped is None or not clipped.any():
         return np.zeros_like(kept)
-    holes = ndimage.binary_dilation(clipped, iterations=_SPREAD) & mask
-    labels, count = ndimage.label(holes, np.ones((3, 3)))
-    shares = np.asarray(ndimage.mean(kept, labels, np.arange(1, count + 1)))
-    belongs = np.concatenate([[False], shares > _MOSTLY])
+    holes = dilated(clipped, _SPREAD) & mask
+    labels, count = labelled(holes, corners=True)
+    belongs = np.concatenate([[False], means(kept, labels, count) > _MOSTLY])
     return np.asarray(belongs[labels])
 
 
@@ -354,7 +355,7 @@ def detect_residual_highlights(
     if not highlights_stand_out(left, mask, options.removal.stands_out):
         return None
     much = left.mean(axis=2) > options.unreliable_from
-    unreliable = ndimage.binary_opening(much, np.ones((2, 2))) & mask
+    unreliable = opened_by_blocks(much) & mask
     if unreliable[mask].mean() > _HALF:
         unreliable = np.zeros_like(mask)
     cleaner = np.empty_like(diffuse)
@@ -504,9 +505,7 @@ def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.nd
     answer, settled = np.zeros_like(values), np.zeros(known.shape)
     for reach in _REACHES:
         sigma = max(reach * diagonal, 1.0)
-        near = np.clip(
-            ndimage.gaussian_filter(known.astype(float), sigma, truncate=3) / _ENOUGH, 0, 1
-        )
+        near = np.clip(gaussian_average(known.astype(float), sigma, cut=3) / _ENOUGH, 0, 1)
         share = ((1 - settled) * near)[..., None]
         answer += share * masked_gaussian(values, known, sigma)
         settled += share[..., 0]

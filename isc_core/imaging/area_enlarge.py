@@ -19,7 +19,11 @@ overshoots; values below the darkest of the neighbouring old pixels are raised t
 """
 
 import numpy as np
-from scipy import ndimage, sparse
+
+from ..filters.axis_weights import AxisWeights, resampled_plane
+from ..filters.distance import nearest_pixels
+from ..filters.extrema import window_minimum
+from ..filters.splines import spline_coefficients
 
 
 def enlarge_averages(values: np.ndarray, inside: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -38,16 +42,14 @@ def enlarge_averages(values: np.ndarray, inside: np.ndarray, shape: tuple[int, .
     -------
     (h, w, C) float64 ndarray
     """
-    nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
-    whole = np.asarray(values, float)[tuple(nearest)]
+    whole = np.asarray(values, float)[nearest_pixels(inside)]
     down, right = (_overlaps(old, new) for old, new in zip(inside.shape, shape, strict=True))
     places = np.ix_(*(_nearest(old, new) for old, new in zip(inside.shape, shape, strict=True)))
     found = np.empty((*shape, values.shape[2]))
     for channel in range(values.shape[2]):
         plane = whole[..., channel]
-        spline = ndimage.spline_filter(plane, order=3, mode="mirror")
-        darkest = ndimage.minimum_filter(plane, 3, mode="nearest")[places]
-        found[..., channel] = np.maximum((right @ (down @ spline).T).T, darkest)
+        enlarged = resampled_plane(spline_coefficients(plane), down, right)
+        found[..., channel] = np.maximum(enlarged, window_minimum(plane, 3)[places])
     return found
 
 
@@ -56,7 +58,7 @@ def _nearest(size: int, new: int) -> np.ndarray:
     return (2 * np.arange(new) + 1) * size // (2 * new)
 
 
-def _overlaps(size: int, new: int) -> sparse.csr_array:
+def _overlaps(size: int, new: int) -> AxisWeights:
     """(new, size) averages of the B-splines of degree 2 over the new pixels; the image is mirrored
     at its border.
     """
@@ -67,8 +69,8 @@ def _overlaps(size: int, new: int) -> sparse.csr_array:
     weight = (_integral(end) - _integral(start)) * (new / size)
     mirrored = np.minimum(np.abs(column), 2 * (size - 1) - column)
     row = np.broadcast_to(np.arange(new)[:, None], column.shape)
-    places = row.ravel(), np.clip(mirrored, 0, size - 1).ravel()
-    return sparse.csr_array((weight.ravel(), places), shape=(new, size))
+    places = np.clip(mirrored, 0, size - 1)
+    return AxisWeights.of(row.ravel(), places.ravel(), weight.ravel(), new)
 
 
 def _integral(x: np.ndarray) -> np.ndarray:

@@ -8,11 +8,10 @@ Limits: downscaling only.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy import sparse
 
+from ..filters.axis_weights import AxisWeights, resampled_plane
 from .bounding_box import mask_slices
 
 
@@ -24,14 +23,14 @@ class AreaFilter:
 
     Attributes
     ----------
-    rows, columns : sparse array
+    rows, columns : AxisWeights
         Overlap of new and old rows and columns.
     full : (h, w) ndarray
         Area of each new pixel that lies on the image.
     """
 
-    rows: Any
-    columns: Any
+    rows: AxisWeights
+    columns: AxisWeights
     full: np.ndarray
 
     @staticmethod
@@ -50,10 +49,11 @@ class AreaFilter:
         AreaFilter
         """
         rows, columns = _overlaps(shape[0], factor), _overlaps(shape[1], factor)
-        return AreaFilter(rows, columns, np.outer(rows.sum(axis=1), columns.sum(axis=1)))
+        down, across = rows @ np.ones(shape[0]), columns @ np.ones(shape[1])
+        return AreaFilter(rows, columns, np.outer(down, across))
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
-        return (self.columns @ (self.rows @ values.astype(np.float32, copy=False)).T).T
+        return resampled_plane(values, self.rows, self.columns)
 
 
 def reduced_count(count: int, factor: float) -> int:
@@ -74,8 +74,8 @@ def reduced_count(count: int, factor: float) -> int:
     return max(1, int(np.ceil(count * factor - 1e-6)))
 
 
-def _overlaps(count: int, factor: float) -> Any:
-    """Sparse (new, old) float32: the share of each new pixel covered by each of the `count` old
+def _overlaps(count: int, factor: float) -> AxisWeights:
+    """(new, old) float32: the share of each new pixel covered by each of the `count` old
     pixels; 0 < factor <= 1.
     """
     new = reduced_count(count, factor)
@@ -85,9 +85,7 @@ def _overlaps(count: int, factor: float) -> Any:
     second = np.minimum(first + 1, new - 1)
     weights = np.concatenate([split - start, end - split]).astype(np.float32)
     old = np.arange(count)
-    return sparse.csr_matrix(
-        (weights, (np.concatenate([first, second]), np.concatenate([old, old]))), shape=(new, count)
-    )
+    return AxisWeights.of(np.concatenate([first, second]), np.concatenate([old, old]), weights, new)
 
 
 def averaged_object(

@@ -9,7 +9,9 @@ Limits: a box-shaped object cropped exactly along its sides counts as cut.
 """
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.components import labelled
+from ..filters.distance import nearest_pixels
 
 DEPTH = 5
 CUT_RATIO = 0.75
@@ -27,8 +29,8 @@ def cut_line(mask: np.ndarray) -> np.ndarray:
     (W,) bool ndarray
     """
     line, inner = mask[0], mask[min(DEPTH, mask.shape[0] - 1)]
-    runs, count = ndimage.label(line)
-    inner_runs, _ = ndimage.label(inner)
+    (runs,), count = labelled(line[None])
+    (inner_runs,), _ = labelled(inner[None])
     cut = np.zeros_like(line)
     for run in range(1, count + 1):
         here = runs == run
@@ -97,12 +99,12 @@ def continued_height(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
     -------
     (H, W) ndarray
     """
-    rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    rim = nearest_pixels(mask)
     rows, columns = (
         np.clip(2 * r - i, 0, n - 1)
         for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True)
     )
-    at_rim = height[tuple(rim)]
+    at_rim = height[rim]
     return np.where(
         mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim)
     )

@@ -6,7 +6,9 @@ object, so that no background bleeds in.
 """
 
 import numpy as np
-from scipy import ndimage, sparse
+
+from ..filters.axis_weights import AxisWeights, linear_interpolation, resampled_plane
+from ..filters.splines import spline_coefficients, spline_values
 
 
 def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
@@ -65,11 +67,11 @@ def resample_inside(
     """
     rows, columns = resampled_shape(inside.shape, factor)
     down, right = _weights(inside.shape[0], rows), _weights(inside.shape[1], columns)
-    share = _apply(inside.astype(float), down, right)
+    share = resampled_plane(inside, down, right)
     planes = values if values.ndim == 3 else values[..., None]
     sums = np.stack(
         [
-            _apply(np.where(inside, planes[..., c], 0.0).astype(float), down, right)
+            resampled_plane(np.where(inside, planes[..., c], 0.0), down, right)
             for c in range(planes.shape[2])
         ],
         axis=-1,
@@ -96,14 +98,12 @@ def resampled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     if (rows, columns) == shape:
         return values
     down, right = (
-        _weights(old, new).astype(np.float32)
-        for old, new in zip((rows, columns), shape, strict=True)
+        _weights(old, new, np.float32) for old, new in zip((rows, columns), shape, strict=True)
     )
-    lines = down @ np.ascontiguousarray(values, np.float32).reshape(rows, -1)
-    planes = lines.reshape(shape[0], columns, -1)
+    planes = (down @ values).reshape(shape[0], columns, -1)
     result = np.empty((*shape, planes.shape[2]), np.float32)
     for c in range(planes.shape[2]):
-        result[..., c] = (right @ np.ascontiguousarray(planes[..., c].T)).T
+        result[..., c] = (right @ planes[..., c].T).T
     return result.reshape(*shape, *values.shape[2:])
 
 
@@ -135,10 +135,8 @@ def resample_height(
         np.clip((np.arange(n) + 0.5) * s - 0.5, 0, m - 1)
         for n, m, s in zip(shape, height.shape, steps, strict=True)
     ]
-    spline = ndimage.spline_filter(np.asarray(height, float), order=3, mode="nearest")
-    grid = np.meshgrid(*places, indexing="ij")
     scale = height_scale(height.shape, shape) if factor is None else factor
-    return scale * ndimage.map_coordinates(spline, grid, order=3, mode="nearest", prefilter=False)
+    return scale * spline_values(spline_coefficients(height, half_step=True), *places)
 
 
 def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
@@ -163,32 +161,16 @@ def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -
     return np.asarray(values[np.ix_(rows, columns)], float)
 
 
-def _apply(plane: np.ndarray, down: sparse.csr_array, right: sparse.csr_array) -> np.ndarray:
-    return np.asarray((right @ (down @ plane).T).T)
-
-
-def _weights(size: int, new: int) -> sparse.csr_array:
+def _weights(size: int, new: int, dtype: type = np.float64) -> AxisWeights:
     """(new, size) weights, rows summing to 1: box filter when shrinking, linear interpolation when
     enlarging.
     """
     if new >= size:
-        place = np.clip((np.arange(new) + 0.5) * size / new - 0.5, 0, size - 1)
-        low = np.minimum(place.astype(int), max(size - 2, 0))
-        part = place - low
-        high = np.minimum(low + 1, size - 1)
-        rows = np.arange(new)
-        entries = (
-            np.concatenate([1 - part, part]),
-            (np.concatenate([rows, rows]), np.concatenate([low, high])),
-        )
-        return sparse.csr_array(entries, shape=(new, size))
+        return linear_interpolation((np.arange(new) + 0.5) * size / new - 0.5, size, dtype)
     edges = np.arange(new + 1) * (size / new)
     first, last = np.floor(edges[:-1]).astype(int), np.minimum(np.ceil(edges[1:]).astype(int), size)
     widest = int((last - first).max())
     column = first[:, None] + np.arange(widest)
     overlap = np.minimum(column + 1, edges[1:, None]) - np.maximum(column, edges[:-1, None])
-    keep = (overlap > 1e-12) & (column < size)
-    row = np.broadcast_to(np.arange(new)[:, None], column.shape)
-    return sparse.csr_array(
-        (overlap[keep] * (new / size), (row[keep], column[keep])), shape=(new, size)
-    )
+    share = np.where((overlap > 1e-12) & (column < size), overlap * (new / size), 0)
+    return AxisWeights(np.minimum(column, size - 1), share.astype(dtype))

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.gaussian import gaussian_average
 
 _TINY = 1e-9
 
@@ -93,12 +94,12 @@ def weighted_gaussian(
     ndarray
         Of the layer's shape.
     """
-    below = ndimage.gaussian_filter(weight, sigma, truncate=3) + weight.dtype.type(floor)
+    below = gaussian_average(weight, sigma, cut=3) + weight.dtype.type(floor)
     if layer.ndim == 2:
-        return ndimage.gaussian_filter(weight * layer, sigma, truncate=3) / below
+        return gaussian_average(weight * layer, sigma, cut=3) / below
     return np.stack(
         [
-            ndimage.gaussian_filter(weight * layer[..., c], sigma, truncate=3) / below
+            gaussian_average(weight * layer[..., c], sigma, cut=3) / below
             for c in range(layer.shape[2])
         ],
         axis=2,

@@ -21,9 +21,9 @@ exists, the fill is smooth.
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
+from ..filters.distance import distance_to
 from ..imaging.bounding_box import mask_slices
 from ..progress import Monitor
 from .coherency_sensitive_hashing import (
@@ -121,7 +121,7 @@ def _filled(
         return current
     search = CshSearch(source, options.matching)
     near = mask_slices(wanted, PATCH - 1)  # contains all patches with a wanted pixel
-    depth = ndimage.distance_transform_edt(~known)[near]
+    depth = distance_to(known)[near]
     filled, unknown = current[near], ~known[near]
     count = min(options.iterations + level, options.most_iterations)
     matches = None

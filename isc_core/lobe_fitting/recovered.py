@@ -44,8 +44,8 @@ determine how dark an albedo is, so the shading's own scale may be off by two.
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.gaussian import gaussian_average
 from ..imaging.bounding_box import mask_slices
 from ..imaging.channels import channel_means, length
 from ..imaging.row_blocks import row_blocks
@@ -195,7 +195,7 @@ def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     step = max(1, int(width / _BLOCKS))
     sums = np.dstack(
         [
-            ndimage.gaussian_filter(layer, width / step, mode="constant")
+            gaussian_average(layer, width / step, mirrored=False)
             for layer in _block_sums(normal[box], inside, step)
         ]
     )

@@ -29,8 +29,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.gaussian import gaussian_average
 from ..imaging.channels import channel_means
 from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
@@ -206,7 +206,7 @@ def _ratio(
 ) -> np.ndarray:
     """t (H, W) from the `known` pixels nearby, regularised toward 1 in dark predictions."""
     common, square = (
-        ndimage.gaussian_filter(np.where(known, part, 0.0), 0.5 * block, mode="constant")
+        gaussian_average(np.where(known, part, 0.0), 0.5 * block, mirrored=False)
         for part in (specular * predicted, predicted**2)
     )
     ridge = 0.02 * float(square.max())

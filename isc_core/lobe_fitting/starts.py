@@ -13,7 +13,8 @@ Limits: cells of normals that do not occur are empty; cells are 3 degrees wide.
 """
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.gaussian import gaussian_average
 
 _CELLS = 41
 _BLUR, _MIN_DISTANCE = 1.0, 5.0  # cells
@@ -45,7 +46,7 @@ def bright_half_vectors(
     index = cell[:, 0] * _CELLS + cell[:, 1]
     total = np.bincount(index, weight * value, _CELLS**2).reshape(_CELLS, _CELLS)
     number = np.bincount(index, weight, _CELLS**2).reshape(_CELLS, _CELLS)
-    total, number = (ndimage.gaussian_filter(a, _BLUR, mode="constant") for a in (total, number))
+    total, number = (gaussian_average(a, _BLUR, mirrored=False) for a in (total, number))
     mean = total / (number + 0.05 * max(float(number.max()), 1e-300))
     rows, columns = np.indices(mean.shape)
     found = []

@@ -1,8 +1,8 @@
 """The connected components of a mask."""
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.components import labelled
 from ..imaging.bounding_box import mask_box
 
 _SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
@@ -22,7 +22,7 @@ def connected_components(mask: np.ndarray, share: float = 0.1) -> list[np.ndarra
     list of (H, W) bool ndarray
         From left to right.
     """
-    labels, _ = ndimage.label(mask, np.ones((3, 3)))
+    labels, _ = labelled(mask, corners=True)
     areas = np.bincount(labels.ravel())
     areas[0] = 0
     chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))

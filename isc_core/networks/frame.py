@@ -7,8 +7,8 @@ a square; smaller objects are not resampled. Maps of the frame are upsampled to 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.distance import nearest_pixels
 from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarge_inside
@@ -78,10 +78,7 @@ def at_full_size(maps: np.ndarray, frame: NetworkFrame, mask: np.ndarray) -> np.
         0 outside the mask.
     """
     box = mask_slices(mask)
-    nearest = ndimage.distance_transform_edt(
-        ~frame.mask, return_distances=False, return_indices=True
-    )
-    values, inside = maps[tuple(nearest)][frame.place], mask[box]
+    values, inside = maps[nearest_pixels(frame.mask)][frame.place], mask[box]
     full = np.zeros((*mask.shape, maps.shape[2]), np.float32)
     enlarge_inside(values, inside, 1 / frame.factor, full[box])
     return full

@@ -19,8 +19,9 @@ downscaled photo wide, is lost. A shadow that is wider than that stays.
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.extrema import window_maximum, window_minimum
+from ..filters.morphology import eroded
 from ..imaging.bounding_box import mask_slices
 from ..imaging.resampling import resampled
 
@@ -101,18 +102,20 @@ def _limit_outermost(image: np.ndarray, mask: np.ndarray) -> None:
     height, width = inside.shape
     size = _downscaled(inside.shape, _LIMITED)
     small, share = resampled(part, size), resampled(inside.astype(np.float32), size)
-    inner = ndimage.binary_erosion(share >= 0.5, border_value=1)
+    inner = eroded(share >= 0.5, beyond=True)
     at = (np.arange(height) * size[0]) // height, (np.arange(width) * size[1]) // width
     rows, columns = np.nonzero(inside & ~inner[np.ix_(*at)])
-    shown, window, near = inner[..., None], (3, 3, 1), (at[0][rows], at[1][columns])
-    least = ndimage.minimum_filter(np.where(shown, small, np.inf), window)[near]
-    most = ndimage.maximum_filter(np.where(shown, small, -np.inf), window)[near]
+    shown, near = inner[..., None], (at[0][rows], at[1][columns])
+    least = window_minimum(np.where(shown, small, np.inf), 3)[near]
+    most = window_maximum(np.where(shown, small, -np.inf), 3)[near]
     seen = part[rows, columns]
     part[rows, columns] = np.where(np.isinf(least), seen, np.clip(seen, least, most))
 
 
 def _means(image: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Weighted means over windows."""
+    from scipy import ndimage  # few photos have a soft mask
+
     size = (_WINDOW, _WINDOW, 1)
     total = ndimage.uniform_filter(image * weight, size)
     return np.asarray(total / np.maximum(ndimage.uniform_filter(weight, size), _LEAST))

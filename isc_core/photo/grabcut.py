@@ -22,9 +22,9 @@ from enum import IntEnum
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
+from ..filters.morphology import dilated, eroded
 from ..imaging.minimum_cut import STEPS, minimum_cut, shifted
 from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_codes
@@ -147,8 +147,8 @@ def _reduced(coded: np.ndarray, box: Box, most: int) -> tuple[np.ndarray, tuple[
 
 def _band(found: np.ndarray, part: tuple[slice, slice]) -> np.ndarray:
     """Labels that are uncertain near the outline of a mask, inside the box."""
-    near = ndimage.binary_dilation(found, iterations=_BAND)
-    deep = ndimage.binary_erosion(found, iterations=_BAND, border_value=1)
+    near = dilated(found, _BAND)
+    deep = eroded(found, _BAND, beyond=True)
     labels = np.where(found, Label.PROBABLY_OBJECT, Label.PROBABLY_BACKGROUND).astype(np.uint8)
     labels[deep] = Label.OBJECT
     outside = np.ones(found.shape, bool)

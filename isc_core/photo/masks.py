@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.ndimage import label
 
 from ..errors import InputError
+from ..filters.components import labelled
 from ..imaging.bounding_box import mask_box
 from ..imaging.channels import largest
 from ..imaging.row_blocks import row_blocks
@@ -57,10 +57,10 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
     -------
     (H, W) bool ndarray
     """
-    labels, _ = label(~mask)
+    labels, _ = labelled(~mask)
     outside = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
     filled = mask | ~np.isin(labels, outside)
-    labels, _ = label(filled, np.ones((3, 3)))
+    labels, _ = labelled(filled, corners=True)
     areas = np.bincount(labels.ravel())
     areas[0] = 0
     return (areas >= max(0.01 * areas.max(), 1))[labels]

@@ -20,8 +20,9 @@ feathered over a few pixels, and is never soft.
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.components import labelled
+from ..filters.extrema import window_maximum
 from ..imaging.bounding_box import mask_slices
 
 _PARTLY = (0.1, 0.9)
@@ -51,12 +52,14 @@ def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | Non
     longest = max(mask[mask_slices(mask)].shape)
     window = 2 * _edge(longest, own) + 1
     partly = (share > _PARTLY[0]) & (share < _PARTLY[1])
+    from scipy import ndimage  # few photos have a soft mask
+
     density = ndimage.uniform_filter(partly.astype(np.float32), window, mode="constant")
     dense = partly & (density >= _DENSE)
     if dense.sum() < longest:
         return None
-    zone = ndimage.maximum_filter(dense, window + 2)
-    labels, count = ndimage.label(zone)
+    zone = window_maximum(dense, window + 2)
+    labels, count = labelled(zone)
     found, above = (
         np.bincount(labels[kind], minlength=count + 1) for kind in (partly, partly & (share > 0.5))
     )

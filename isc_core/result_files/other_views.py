@@ -19,8 +19,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.morphology import opened_by_blocks
 from ..imaging.luminance import luminance
 from ..photo.camera import Camera
 from ..scene.decomposition import Decomposition
@@ -90,7 +90,7 @@ def _coarse_body(
     """
     share = _blocks(frame.coverage)
     inside = share > 0.5
-    if not ndimage.binary_opening(inside, np.ones((2, 2))).any():
+    if not opened_by_blocks(inside).any():
         return None
     weight = frame.coverage > 0.5
     sums, count = _blocks(np.where(weight, small["height"], 0)), _blocks(weight)

@@ -28,9 +28,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
+from ..filters.distance import distance_to
 from ..imaging.channels import largest, smallest
 from ..inpainting.coherency_sensitive_hashing import (
     CshOptions,
@@ -144,7 +144,7 @@ def separate(
     specular = find_specular(scaled, mask, options)
     if options.rim > 0 and specular.any():
         reach = max(1.0, options.rim * float(np.sqrt(mask.sum())))
-        specular = mask & (ndimage.distance_transform_edt(~specular) <= reach)
+        specular = mask & (distance_to(specular) <= reach)
     valid = mask & ~specular if clipped is None else mask & ~specular & ~clipped
     if not specular.any() or not valid.any():
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)

@@ -36,9 +36,10 @@ most of a reflectance shifts R_k and stays.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from ..errors import InputError
+from ..filters.correlation import correlated
+from ..filters.gaussian import gaussian_taps
 from ..imaging.smoothing import masked_gaussian
 from ..numerics.jit import jit
 from ..progress import Monitor
@@ -309,7 +310,9 @@ def _learn(free: _Invariants, informative: np.ndarray, options: SparseCodingOpti
     votes = np.bincount(k * size + place, free.alpha[informative], options.hues * size).reshape(
         options.hues, size
     )
-    summed = np.cumsum(ndimage.gaussian_filter1d(votes, 1.0, axis=0, mode="wrap"), axis=1)
+    half = gaussian_taps(1.0)
+    taps = np.concatenate([half[:0:-1], half])
+    summed = np.cumsum(correlated(votes, taps, axis=0, periodic=True), axis=1)
 
     def quantile(q: float) -> np.ndarray:
         return np.array([np.interp(q * row[-1], row, _LOG_RATIOS) for row in summed])

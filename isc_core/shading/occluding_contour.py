@@ -13,7 +13,9 @@ cut gives no normal.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.correlation import correlated
+from ..filters.extrema import window_maximum
 
 RADIUS = 5
 
@@ -63,7 +65,7 @@ def occluding_contour(mask: np.ndarray, *, drop_near_edge: bool = False) -> Cont
         cut = np.zeros_like(mask)
         cut[[0, -1], :] = mask[[0, -1], :]
         cut[:, [0, -1]] |= mask[:, [0, -1]]
-        keep &= ~ndimage.maximum_filter(cut, size=2 * RADIUS + 1, mode="constant", cval=0)
+        keep &= ~window_maximum(cut, 2 * RADIUS + 1)
     offset = np.arange(-RADIUS, RADIUS + 1, dtype=float)
     bell = np.exp(-5.0 * offset**2 / RADIUS**2)
     filled = mask.astype(float)
@@ -76,5 +78,4 @@ def occluding_contour(mask: np.ndarray, *, drop_near_edge: bool = False) -> Cont
 
 
 def _window_sum(image: np.ndarray, along_rows: np.ndarray, along_columns: np.ndarray) -> np.ndarray:
-    once = ndimage.correlate1d(image, along_rows, axis=0, mode="constant")
-    return ndimage.correlate1d(once, along_columns, axis=1, mode="constant")
+    return correlated(correlated(image, along_rows, axis=0), along_columns, axis=1)

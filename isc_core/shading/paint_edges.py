@@ -24,8 +24,8 @@ grain of wood, looks uniform; so does paint under light of a colour that hides i
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.extrema import window_maximum, window_minimum
 from ..imaging.smoothing import masked_gaussian
 
 ONE_PAINT = 0.1  # deviation of g within one paint
@@ -92,8 +92,8 @@ def uniformity(guide: np.ndarray, mask: np.ndarray) -> np.ndarray:
     (H, W) float32 ndarray
         In [0, 1]; 1 outside of the mask.
     """
-    far, size, inside = np.float32(1e3), (3, 3, 1), mask[..., None]
-    highest = ndimage.maximum_filter(np.where(inside, guide, -far), size)
-    lowest = ndimage.minimum_filter(np.where(inside, guide, far), size)
+    far, inside = np.float32(1e3), mask[..., None]
+    highest = window_maximum(np.where(inside, guide, -far), 3)
+    lowest = window_minimum(np.where(inside, guide, far), 3)
     ranges = np.square(np.where(inside, highest - lowest, 0)).sum(axis=2)
     return np.asarray(np.exp(-ranges / np.float32(2 * _EDGE**2)))

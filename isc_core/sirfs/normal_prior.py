@@ -22,9 +22,9 @@ for that on average. The surface is continuous: depth discontinuities become slo
 """
 
 import numpy as np
-from scipy import ndimage
 
 from ..baselines.poisson import integrate
+from ..filters.distance import nearest_pixels
 from ..imaging.blocks import padded_means_inside
 from ..imaging.channels import length
 from ..imaging.framing import continued_height
@@ -55,11 +55,7 @@ def normals_from_prediction(
     """
     if predicted is None:
         return None
-    nearest = tuple(
-        ndimage.distance_transform_edt(
-            predicted.deviation <= 0, return_distances=False, return_indices=True
-        )
-    )
+    nearest = nearest_pixels(predicted.deviation > 0)
     normal = predicted.normal[nearest].astype(float)
     normal /= np.maximum(length(normal), _SHORTEST)[..., None]
     deviation = predicted.deviation[nearest].astype(float)

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.correlation import correlated
 from .priors.priors import AbsoluteTable, Priors
 from .problem import PAIR_OFFSETS
 from .settings import Weights
@@ -208,7 +208,7 @@ def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
     ndarray
     """
     for axis in range(counts.ndim):
-        counts = ndimage.correlate1d(counts, taps, axis=axis, mode="constant")
+        counts = correlated(counts, taps, axis)
     return np.maximum(counts, np.finfo(float).eps)
 
 

@@ -20,8 +20,9 @@ Limits: one object, wholly inside the frame; hollow shapes violate the prior.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.distance import distance_to
+from ..filters.gaussian import gaussian_average
 from ..imaging.channels import length
 from ..imaging.row_blocks import row_blocks
 from .precision import scaled_precision
@@ -117,9 +118,7 @@ def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
     Ones if there is no silhouette.
     """
     padded = np.pad(mask, 1, mode="edge")
-    distance = (
-        np.ones(mask.shape) if padded.all() else ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
-    )
+    distance = np.ones(mask.shape) if padded.all() else distance_to(~padded)[1:-1, 1:-1]
     return distance, max(float(distance.max()), 1.0)
 
 
@@ -128,7 +127,7 @@ def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarr
 
 
 def _smoothed(distance: np.ndarray, deepest: float) -> np.ndarray:
-    return np.asarray(ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest)))
+    return gaussian_average(distance, max(1.0, _SMOOTHING * deepest))
 
 
 def _descent(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

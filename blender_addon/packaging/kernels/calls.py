@@ -1,9 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, a turned mesh, and, in both precisions,
-averages along paths and SIRFS on a ball of a few pixels call each version of each kernel. The first
-calls of each are kept, with what the arrays held before and after. They run on one thread: others
-would write to these arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, filters, and, in both
+precisions, averages along paths and SIRFS on a ball of a few pixels call each version of each
+kernel. The first calls of each are kept, with what the arrays held before and after. They run on
+one thread: others would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -14,6 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from isc_core.filters.axis_weights import linear_interpolation
+from isc_core.filters.components import labelled
+from isc_core.filters.distance import nearest_pixels
+from isc_core.filters.gaussian import gaussian_average
+from isc_core.filters.splines import spline_coefficients
 from isc_core.inpainting.coherency_sensitive_hashing import CshOptions
 from isc_core.inpainting.patch_fill import PatchFillOptions, fill_patches
 from isc_core.numerics.jit import Kernel
@@ -177,9 +182,14 @@ def _run_programs() -> None:
     faces, places = np.array([(0, 1, 3), (1, 2, 3), (2, 0, 3)]), np.abs(corners[:, :2])
     turned_view(corners, faces, corners, 20.0, _SIDE, 2.0)
     turned_view(corners, faces, places, 20.0, _SIDE, 2.0, texture=rng.random((9, 8, 3)))
+    labelled(mask)
+    nearest_pixels(mask)
+    spline_coefficients(facing)
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
         kind = np.float32 if single else np.float64
+        gaussian_average(facing.astype(kind), 2.0)
+        linear_interpolation(x[0], _SIDE, kind) @ facing
         across, down, *layers = (1 + rng.random((4, 9, 11))).astype(kind)
         Paths(across, down, 5.0).average(np.stack(layers))
 

@@ -24,8 +24,9 @@ Limits: shading and highlights that are finer than the maps become base colour.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.distance import distance_to, nearest_pixels
+from ...filters.morphology import eroded
 from ...imaging.area_resize import AreaFilter
 from ...imaging.bounding_box import mask_slices
 from ...imaging.upsampling import enlarged
@@ -123,10 +124,11 @@ def _grids(mask: np.ndarray, box: tuple[slice, slice], d: Decomposition, factor:
     whole, (rows, columns) = AreaFilter.of(mask.shape, 1 / factor), box
     height, width = d.mask.shape
     area = AreaFilter(
-        whole.rows[:height, rows], whole.columns[:width, columns], whole.full[:height, :width]
+        whole.rows.part(slice(0, height), rows),
+        whole.columns.part(slice(0, width), columns),
+        whole.full[:height, :width],
     )
-    nearest = ndimage.distance_transform_edt(~d.mask, return_distances=False, return_indices=True)
-    return _Grids(mask[box], area, factor, (rows.start, columns.start), tuple(nearest))
+    return _Grids(mask[box], area, factor, (rows.start, columns.start), nearest_pixels(d.mask))
 
 
 def _texture(
@@ -138,7 +140,7 @@ def _texture(
 ) -> np.ndarray:
     """(h, w, 3) float32, linear: the texture in that part of the photo."""
     grids = _grids(photo.mask, box, d, factor)
-    rings = dark_rings(d.reflectance, ndimage.distance_transform_edt(d.mask))
+    rings = dark_rings(d.reflectance, distance_to(~d.mask))
     rim = max(1, round(factor * rings))
     interior = _interior(grids.inside, rim)
     near, source = nearest_inside(interior, round(_RIM * factor) + 1 + rim)
@@ -167,5 +169,5 @@ def _texture(
 
 def _interior(mask: np.ndarray, rim: int) -> np.ndarray:
     """The mask without its outermost pixels; the whole mask if nothing would remain."""
-    inner = ndimage.binary_erosion(mask, iterations=rim, border_value=1)
+    inner = eroded(mask, rim, beyond=True)
     return inner if inner.any() else mask

@@ -9,8 +9,8 @@ Limits: reflectances above 1 / k are clipped (at most 0.5 % of the pixels).
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.distance import distance_to, distances, nearest_pixels
 from ...imaging.bounding_box import mask_slices
 from ...imaging.channels import largest
 from ...imaging.row_blocks import row_blocks
@@ -64,7 +64,7 @@ def _depth_near(mask: np.ndarray, reach: int) -> np.ndarray:
     for block in row_blocks(mask.shape, reach):
         near = mask[block.wide]
         if not near.all():
-            depth[block.rows] = ndimage.distance_transform_edt(near)[block.own]
+            depth[block.rows] = distance_to(~near)[block.own]
     return depth
 
 
@@ -122,8 +122,8 @@ def nearest_inside(mask: np.ndarray, distance: int) -> tuple[np.ndarray, np.ndar
         inside, first = mask[block.wide], block.wide.start
         if not inside.any():
             continue
-        away, (rows, columns) = ndimage.distance_transform_edt(~inside, return_indices=True)
-        near = ~inside & (away <= distance)
+        rows, columns = nearest_pixels(inside)
+        near = ~inside & (distances(rows, columns) <= distance)
         near[: block.own.start] = near[block.own.stop :] = False
         row, column = np.nonzero(near)
         source = (rows[near].astype(np.int64) + first) * width + columns[near]

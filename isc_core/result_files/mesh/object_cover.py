@@ -20,8 +20,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.components import labelled
+from ...filters.morphology import dilated
 from ...imaging.area_resize import AreaFilter, reduced_count
 from ...imaging.bounding_box import FramePart
 from ...imaging.row_blocks import row_blocks
@@ -163,9 +164,12 @@ def _codes(cover: np.ndarray) -> np.ndarray:
 
 def _near(share: np.ndarray, mask: np.ndarray, own: bool) -> tuple[np.ndarray, np.ndarray | None]:
     """The coverage of the object alone, and where its rim is soft."""
-    near = ndimage.binary_dilation(mask, iterations=_NEAR)
+    near = dilated(mask, _NEAR)
     way = near | ((share > _SOME) & (share < 0.5))
-    share[~ndimage.binary_propagation(mask, mask=way)] = 0
+    parts, count = labelled(way)
+    reached = np.zeros(count + 1, bool)
+    reached[parts[mask]] = True
+    share[~reached[parts]] = 0
     soft = soft_rim(share, mask, own)
     share[~near if soft is None else ~(near | soft)] = 0
     return share, soft

@@ -12,8 +12,8 @@ Limits: see the package.
 from concurrent.futures import Future
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.extrema import window_maximum
 from ...imaging.channels import largest, smallest
 from ...imaging.smoothing import masked_gaussian
 from ..support.edge_aware import Paths
@@ -88,9 +88,7 @@ def place_candidate(
     agreed = np.minimum(gain, in_groups.result() / np.maximum(candidate, TINY))
     proven = np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0)
     # A highlight fades out: around proven pixels, weaker candidates belong to it as well.
-    around = ndimage.maximum_filter(
-        ramp(proven, options.proven), 2 * round(_RIM * photo.diagonal) + 1
-    )
+    around = window_maximum(ramp(proven, options.proven), 2 * round(_RIM * photo.diagonal) + 1)
     faint = edge_weight * ramp(candidate / np.maximum(error, TINY), options.faint)
     faint *= ramp(photo.chroma / np.maximum(usual_chroma, TINY), options.present)
     return candidate, np.where(mask, np.maximum(proven, np.minimum(faint, around)), 0), share

@@ -27,8 +27,10 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.components import boxes, labelled
+from ...filters.extrema import window_maximum
+from ...filters.morphology import dilated
 from ...imaging.bounding_box import mask_slices
 from ...imaging.tiles import Place
 from ...inpainting.pull_push import fill
@@ -38,7 +40,6 @@ _BETTER = 0.8  # of the smooth fill's error on the ring, to be undercut by patch
 _DARK = 1e-3  # of the brightest value: the least in logarithms
 _LARGEST_WHOLE = 1 << 20  # pixels: objects with a larger box are not searched as a whole
 _CELL = 64  # pixels: holes that are nearer than about two cells are filled together
-_TOUCHING = np.ones((3, 3))
 
 
 def inpaint_clipped(
@@ -92,8 +93,8 @@ def _windows(
     padded = np.pad(of_box, [(0, -n % _CELL) for n in of_box.shape])
     rows, columns = (n // _CELL for n in padded.shape)
     cells = padded.reshape(rows, _CELL, columns, _CELL).any(axis=(1, 3))
-    labels, _ = ndimage.label(ndimage.binary_dilation(cells, _TOUCHING), _TOUCHING)
-    for k, part in enumerate(ndimage.find_objects(labels), 1):
+    labels, count = labelled(dilated(cells, square=True), corners=True)
+    for k, part in enumerate(boxes(labels, count), 1):
         length = _CELL * max(1, max(one.stop - one.start for one in part) // 2)
         while True:
             near = tuple(
@@ -118,7 +119,7 @@ def _continued(
 ) -> np.ndarray:
     """`diffuse` (h, w, 3) with each hole filled by the better of the two fills."""
     albedo = np.log(np.maximum(diffuse, dark)) - shading
-    ring = ndimage.binary_dilation(holes, _TOUCHING, _RING) & known
+    ring = dilated(holes, _RING, square=True) & known
     smooth = fill(diffuse, known)
     rest = known & ~ring
     if not ring.any() or not rest.any():
@@ -131,11 +132,9 @@ def _continued(
         both = np.log(np.maximum(fill(diffuse, rest), dark)), tried.result() + shading
     truth = albedo + shading
     errors = [np.square(one - truth).sum(axis=2) for one in both]
-    labels, count = ndimage.label(holes, _TOUCHING)
-    near = np.where(ring, ndimage.grey_dilation(labels, size=2 * _RING + 1), 0)
-    of_smooth, of_copied = (
-        np.asarray(ndimage.sum(one, near, np.arange(count + 1))) for one in errors
-    )
+    labels, count = labelled(holes, corners=True)
+    near = np.where(ring, window_maximum(labels, 2 * _RING + 1), 0)
+    of_smooth, of_copied = (np.bincount(near.ravel(), one.ravel(), count + 1) for one in errors)
     better = of_copied < _BETTER * of_smooth
     better[0] = False
     return np.where(better[labels][..., None], copied, smooth)

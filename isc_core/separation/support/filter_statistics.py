@@ -32,9 +32,9 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from scipy import ndimage
 
 from ...errors import InputError
+from ...filters.axis_weights import linear_interpolation, resampled_plane
 from ...imaging.blocks import padded_means_inside
 from ...imaging.bounding_box import mask_slices
 from ...imaging.smoothing import masked_gaussian
@@ -210,10 +210,11 @@ def highlight_prior(
     pooled = pooled_evidence(light, inside, table) / table.temperature
     if factor > 1:
         filled = np.where(inside, pooled, masked_gaussian(pooled, inside, 1.0))
-        places = np.meshgrid(
-            *((np.arange(n) + 0.5) / factor - 0.5 for n in intensity.shape), indexing="ij"
+        down, across = (
+            linear_interpolation((np.arange(n) + 0.5) / factor - 0.5, m)
+            for n, m in zip(intensity.shape, filled.shape, strict=True)
         )
-        pooled = ndimage.map_coordinates(filled, places, order=1, mode="nearest")
+        pooled = resampled_plane(filled, down, across)
     probability = np.full(mask.shape, 0.5, np.float32)
     probability[box] = np.where(
         mask[box], np.clip(1 / (1 + np.exp(-np.clip(pooled, -50, 50))), _MARGIN, 1 - _MARGIN), 0.5

@@ -19,8 +19,9 @@ highlight.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.gaussian import gaussian_average
+from ...filters.morphology import eroded
 from ...imaging.smoothing import masked_gaussian, weighted_gaussian
 
 _TINY = 1e-12
@@ -58,15 +59,9 @@ def noise_level(image: np.ndarray, mask: np.ndarray) -> float:
     float
         Mean over the channels.
     """
-    kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]]) / 6
-    return float(
-        np.mean(
-            [
-                1.4826 * np.median(np.abs(ndimage.convolve(image[..., c], kernel)[mask]))
-                for c in range(3)
-            ]
-        )
-    )
+    mirrored = np.pad(image.astype(float), [(1, 1), (1, 1), (0, 0)], mode="symmetric")
+    change = np.diff(np.diff(mirrored, 2, axis=0), 2, axis=1) / 6
+    return float(1.4826 * np.median(np.abs(change[mask]), axis=0).mean())
 
 
 @dataclass(frozen=True)
@@ -161,14 +156,14 @@ def roughness(
     local : (H, W) ndarray
     """
     raised = np.where(mask, specular - weighted_gaussian(specular, weight, scale, 1e-6), 0)
-    detail = np.square(raised - ndimage.gaussian_filter(raised, fine))
+    detail = np.square(raised - gaussian_average(raised, fine))
     squared = np.where(mask, np.square(weight), 0)
     up = squared * (raised > 0)
     over_all = np.sqrt(
         (up * detail).sum(dtype=float) / max((up * np.square(raised)).sum(dtype=float), _TINY)
     )
-    below = ndimage.gaussian_filter(squared * np.square(raised), scale) + _TINY
-    return float(over_all), np.sqrt(ndimage.gaussian_filter(squared * detail, scale) / below)
+    below = gaussian_average(squared * np.square(raised), scale) + _TINY
+    return float(over_all), np.sqrt(gaussian_average(squared * detail, scale) / below)
 
 
 def reflectance_mixing(
@@ -194,7 +189,7 @@ def reflectance_mixing(
         return np.zeros_like(specular)
     down, across = np.gradient(specular)
     chroma_down, chroma_across = np.gradient(chroma)
-    inner = ndimage.binary_erosion(mask, iterations=2)
+    inner = eroded(mask, 2)
     against = np.where(inner, -(down * chroma_down + across * chroma_across) * (1 + ratio), 0)
     steep = np.where(inner, np.square(down) + np.square(across), 0)
-    return ndimage.gaussian_filter(against, scale) / (ndimage.gaussian_filter(steep, scale) + _TINY)
+    return gaussian_average(against, scale) / (gaussian_average(steep, scale) + _TINY)

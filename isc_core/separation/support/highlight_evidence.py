@@ -35,9 +35,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
-from scipy.special import logit
 
+from ...filters.components import boxes, labelled, means
+from ...filters.distance import distances, nearest_pixels
+from ...filters.morphology import dilated
 from ...imaging.bounding_box import mask_diagonal
 from ...imaging.channels import largest, mean_channel, smallest
 from ...photo.highlight_marks import HighlightMarks, Place, mark_radius
@@ -101,13 +102,13 @@ def highlight_evidence(
     """
     removed = np.where(mask, mean_channel(image) - mean_channel(diffuse), 0).astype(float)
     bright = float(np.quantile(mean_channel(image)[mask], 0.99))
-    labels, count = ndimage.label(removed > max(_FAINT * bright, 1e-12))
+    labels, count = labelled(removed > max(_FAINT * bright, 1e-12))
     dark = _DARK * bright + 1e-12
-    clear = mask if clipped is None else mask & ~ndimage.binary_dilation(clipped)
+    clear = mask if clipped is None else mask & ~dilated(clipped)
     # whole pixels; the ring beyond it is two wide
     reach = max(2, int(_RING * mask_diagonal(mask)))
     numbers, found = list[int](), list[list[float]]()
-    for k, box in enumerate(ndimage.find_objects(labels, count), 1):
+    for k, box in enumerate(boxes(labels, count), 1):
         wide = tuple(slice(max(0, one.start - reach - 3), one.stop + reach + 3) for one in box)
         inside = labels[wide] == k
         if inside.sum() < _LEAST:
@@ -133,8 +134,8 @@ def _surroundings(
     """
     peak = float(np.quantile(removed[inside], 0.95))
     core = inside & (removed > _CORE * peak)
-    near = ndimage.binary_dilation(core, iterations=reach)
-    ring = ndimage.binary_dilation(near, iterations=2) & ~near & mask & (removed < _CORE * peak)
+    near = dilated(core, reach)
+    ring = dilated(near, 2) & ~near & mask & (removed < _CORE * peak)
     if ring.sum() < _LEAST - 1:
         ring = mask & ~core
     ring = ring if ring.any() else mask
@@ -236,7 +237,9 @@ def classify_highlights(
     seen = highlight_evidence(image, diffuse, mask, log_ratio, ratio_scale, clipped)
     score = WEIGHTS[0] + (seen.values * WEIGHTS[1:]).sum(axis=1)
     if prior is not None and len(seen.numbers):
-        score = score + logit(ndimage.mean(prior, seen.labels, seen.numbers))
+        share = means(prior, seen.labels, int(seen.labels.max()))[seen.numbers - 1]
+        with np.errstate(divide="ignore"):  # certain: odds of 0 or infinity
+            score = score + np.log(share) - np.log1p(-share)
     kept = np.isin(seen.labels, seen.numbers[np.exp(score) > odds])
     doubtful = np.isin(seen.labels, seen.numbers[score > 0]) & ~kept
     if marks:
@@ -260,10 +263,11 @@ def _marked(labels: np.ndarray, places: Sequence[Place], mask: np.ndarray) -> np
     found = np.zeros(labels.shape, bool)
     if not places or not labels.any():
         return found
-    distance, nearest = ndimage.distance_transform_edt(labels == 0, return_indices=True)
+    nearest = nearest_pixels(labels > 0)
+    distance = distances(*nearest)
     reach = mark_radius(mask)
     for x, y in places:
         at = (min(int(y), labels.shape[0] - 1), min(int(x), labels.shape[1] - 1))
         if distance[at] <= reach:
-            found |= labels == labels[tuple(nearest[(slice(None), *at)])]
+            found |= labels == labels[nearest[0][at], nearest[1][at]]
     return found

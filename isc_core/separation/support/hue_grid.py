@@ -17,7 +17,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import ndimage
+
+from ...filters.correlation import correlated
 
 _BLUR = np.array([0.25, 0.5, 0.25])
 # Weight of all pixels' histogram in that of each hue, so that a hue without votes has a value.
@@ -100,11 +101,10 @@ class HueGrid:
             np.concatenate([share * weight for _, share in places.corners]),
             int(np.prod(self.shape)) * count,
         )
-        near = votes.reshape(*self.shape, count)
-        ndimage.convolve1d(near, _BLUR, axis=2, output=near, mode="wrap")
+        near = correlated(votes.reshape(*self.shape, count), _BLUR, axis=2, periodic=True)
         everywhere = near.sum(axis=(0, 1))
         for axis in (0, 1):
-            ndimage.convolve1d(near, 2 * _BLUR, axis=axis, output=near, mode="constant")
+            near = correlated(near, 2 * _BLUR, axis)
         total = everywhere.sum(axis=0) + 1e-9
         return near, everywhere + _POOLED * total / total.sum()
 

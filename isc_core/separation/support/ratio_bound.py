@@ -18,8 +18,8 @@ Limits: those of the network.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.extrema import opened
 from ...imaging.bounding_box import mask_diagonal
 from ...networks.scene_network import LayerPrediction, ScenePrediction
 
@@ -78,5 +78,5 @@ def highlights_stand_out(ratio: np.ndarray, mask: np.ndarray, stands_out: float)
     """
     diagonal = mask_diagonal(mask)
     side = max(3, 2 * round(_SPECK * diagonal) + 1)
-    broad = ndimage.grey_opening(ratio.mean(axis=2), side)[mask]
+    broad = opened(ratio.mean(axis=2), side)[mask]
     return float(broad.max() - np.quantile(broad, _MOST_SHARE)) > stands_out

@@ -40,7 +40,6 @@ left out: it is nearly constant within a lobe seen along the normal.
 from typing import Literal, get_args
 
 import numpy as np
-from scipy.special import erfc
 
 from ...errors import InputError
 from .ggx import density, visible
@@ -231,6 +230,8 @@ def _beckmann(alpha: float, half: np.ndarray) -> np.ndarray:
     """D G1 of Beckmann facets at the half angle `half` in (0, pi/4), the view along the normal; G1
     is Smith's, exact.
     """
+    from scipy.special import erfc  # only to convert from another program's facets
+
     facets = np.exp(-np.square(np.tan(half) / alpha)) / (np.pi * alpha**2 * np.cos(half) ** 4)
     # The tangent is kept from rounding to 0 at the pole, where nothing is hidden.
     slope = 1 / (alpha * np.maximum(np.tan(2 * half), 1e-9))

@@ -11,8 +11,8 @@ import itertools
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse
 
+from ...filters.axis_weights import AxisWeights
 from .priors import AbsoluteTable
 
 LOW, HIGH = -7.0, 4.0
@@ -63,7 +63,7 @@ class CoarseTable:
         return AbsoluteTable(LOW, HIGH, values - values.min())
 
 
-def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_matrix:
+def synthesis_matrix(nodes: int, dtype: type = np.float64) -> AxisWeights:
     """Return the upsampling of one axis.
 
     Parameters
@@ -74,26 +74,24 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_m
 
     Returns
     -------
-    (nodes, ceil(nodes / 2)) sparse matrix
+    AxisWeights
+        (nodes, ceil(nodes / 2))
     """
     coarse = -(-nodes // 2)
     taps = {-2: 0.125, -1: 0.5, 0: 0.75, 1: 0.5, 2: 0.125}
-    rows = [
-        (2 * k + o, k, tap)
-        for k in range(coarse)
-        for o, tap in taps.items()
-        if 0 <= 2 * k + o < nodes
-    ]
-    row, column, value = zip(*rows, strict=True)
-    return scipy.sparse.csr_matrix((np.array(value, dtype), (row, column)), shape=(nodes, coarse))
+    column, offset = np.meshgrid(np.arange(coarse), list(taps), indexing="ij")
+    row, weight = 2 * column + offset, np.broadcast_to(list(taps.values()), column.shape)
+    kept = (row >= 0) & (row < nodes)
+    return AxisWeights.of(row[kept], column[kept], weight[kept].astype(dtype), nodes)
 
 
-def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
+def synthesise(matrix: AxisWeights, values: np.ndarray) -> np.ndarray:
     """Apply a matrix along every axis.
 
     Parameters
     ----------
-    matrix : (n, m) sparse matrix
+    matrix : AxisWeights
+        (n, m)
     values : (m, ..., m) ndarray
 
     Returns
