@@ -17,9 +17,9 @@ doi:10.6028/jres.049.044.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import sparse
 
 from ..filters.components import labelled
+from ..numerics.ellpack import Ellpack
 from ..numerics.linear import solve_linear
 
 _COARSEST = 60
@@ -32,13 +32,14 @@ _RIDGE = 1e-9
 
 @dataclass(frozen=True)
 class _Level:
-    """One grid: its operator, the inverse of its diagonal, and the interpolation from the next
-    coarser grid.
+    """One grid: its operator, the inverse of its diagonal, the interpolation from the next coarser
+    grid, and its adjoint.
     """
 
-    operator: sparse.csr_array
+    operator: Ellpack
     inverse_diagonal: np.ndarray
-    up: sparse.csr_array
+    up: Ellpack
+    down: Ellpack
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class _Multigrid:
             return np.einsum("ij,j->i", self.coarsest_inverse, residual)
         level = self.levels[depth]
         z = _DAMPING * level.inverse_diagonal * residual
-        z += level.up @ self.cycle(level.up.T @ (residual - level.operator @ z), depth + 1)
+        z += level.up @ self.cycle(level.down @ (residual - level.operator @ z), depth + 1)
         return z + _DAMPING * level.inverse_diagonal * (residual - level.operator @ z)
 
 
@@ -79,17 +80,18 @@ def integrate(
     if not mask.any():
         return out
     difference, horizontal, vertical = _differences(mask)
-    operator = (difference.T @ difference).tocsr()
+    adjoint = difference.transposed
+    operator = adjoint.times(difference)
     multigrid = _build(operator, mask)
     target = np.concatenate([right[:, :-1][horizontal], down[:-1][vertical]]).astype(float)
-    columns = (difference.T @ target).reshape(operator.shape[0], -1)
+    columns = (adjoint @ target).reshape(operator.width, -1)
     values = [_conjugate_gradients(operator, multigrid, b, tolerance) for b in columns.T]
     out[mask] = np.stack(values, axis=1).reshape(out[mask].shape)
     return _centred(out, mask)
 
 
 def _conjugate_gradients(
-    operator: sparse.csr_array, multigrid: _Multigrid, right: np.ndarray, tolerance: float
+    operator: Ellpack, multigrid: _Multigrid, right: np.ndarray, tolerance: float
 ) -> np.ndarray:
     """x (n,) of `operator` x = `right` (n,), to a relative residual of `tolerance`."""
     size = np.abs(right).max(initial=0)
@@ -114,7 +116,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.einsum("i,i->", a, b))
 
 
-def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
+def _differences(mask: np.ndarray) -> tuple[Ellpack, np.ndarray, np.ndarray]:
     """The matrix (pairs, pixels) of differences z_q - z_p, and masks of its pairs: (H, W-1) and
     (H-1, W) bool.
     """
@@ -123,23 +125,19 @@ def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.nda
     horizontal, vertical = mask[:, 1:] & mask[:, :-1], mask[1:] & mask[:-1]
     p = np.concatenate([index[:, :-1][horizontal], index[:-1][vertical]])
     q = np.concatenate([index[:, 1:][horizontal], index[1:][vertical]])
-    pair = np.arange(len(p))
-    entries = (
-        np.repeat([-1.0, 1.0], len(p)),
-        (np.concatenate([pair, pair]), np.concatenate([p, q])),
-    )
-    return sparse.csr_array(entries, shape=(len(p), int(mask.sum()))), horizontal, vertical
+    weights = np.tile([-1.0, 1.0], (len(p), 1))
+    return Ellpack(np.stack([p, q], axis=1), weights, int(mask.sum())), horizontal, vertical
 
 
-def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
+def _build(operator: Ellpack, mask: np.ndarray) -> _Multigrid:
     levels = []
-    while operator.shape[0] > _COARSEST:
+    while operator.width > _COARSEST:
         up, mask = _interpolation(mask)
         # An isolated pixel has no equation to solve; any diagonal is valid.
-        diagonal = operator.diagonal()
-        levels.append(_Level(operator, 1 / np.where(diagonal > 0, diagonal, 1), up))
-        operator = (up.T @ operator @ up).tocsr()
-    coarsest = operator.toarray()
+        diagonal, down = operator.diagonal, up.transposed
+        levels.append(_Level(operator, 1 / np.where(diagonal > 0, diagonal, 1), up, down))
+        operator = down.times(operator.times(up))
+    coarsest = operator.dense
     largest = coarsest.diagonal().max(initial=0) or 1.0
     return _Multigrid(
         levels,
@@ -147,7 +145,7 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
     )
 
 
-def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
+def _interpolation(mask: np.ndarray) -> tuple[Ellpack, np.ndarray]:
     """Interpolation (pixels, coarse pixels) from the grid of 2 x 2 blocks that contain any pixel of
     the mask, and that grid's mask.
     """
@@ -158,15 +156,12 @@ def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
     rows, columns = (
         _two_nearest(at, size) for at, size in zip(np.nonzero(mask), coarse.shape, strict=True)
     )
-    # From the last coarse pixel to the first; sums over them have this order.
     beside = np.stack([place[row, column] for row, _ in rows for column, _ in columns], axis=1)
     weight = np.stack([one * other for _, one in rows for _, other in columns], axis=1)
     kept = (weight > 0) & (beside >= 0)
     weight[~kept] = 0
     weight *= 1 / weight.sum(axis=1, keepdims=True)
-    starts = np.concatenate([[0], kept.sum(axis=1).cumsum()])
-    shape = len(kept), int(coarse.sum())
-    return sparse.csr_array((weight[kept], beside[kept], starts), shape=shape), coarse
+    return Ellpack(np.maximum(beside, 0), weight, int(coarse.sum())), coarse
 
 
 def _two_nearest(at: np.ndarray, coarse: int) -> tuple[tuple[np.ndarray, np.ndarray], ...]:

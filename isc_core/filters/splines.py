@@ -10,8 +10,9 @@ Citation: M. Unser, A. Aldroubi and M. Eden 1991, doi:10.1109/34.75515.
 
 import numpy as np
 
+from ..numerics.ellpack import Ellpack
 from ..numerics.jit import jit
-from .axis_weights import AxisWeights, resampled_plane
+from .interpolation import resampled_plane
 
 _POLE = np.sqrt(3.0) - 2.0
 _GAIN = (1.0 - _POLE) * (1.0 - 1.0 / _POLE)
@@ -63,7 +64,7 @@ def _filtered(values: np.ndarray, half_step: bool) -> np.ndarray:
     return values
 
 
-def _taps(places: np.ndarray, size: int) -> AxisWeights:
+def _taps(places: np.ndarray, size: int) -> Ellpack:
     """(n, size) values of the four B-splines that are not zero at each place."""
     first = np.minimum(np.floor(places), size - 1).astype(np.int64)
     x = places - first
@@ -72,7 +73,7 @@ def _taps(places: np.ndarray, size: int) -> AxisWeights:
     at = first[:, None] + np.arange(-1, 3)
     at = np.where(at < 0, -1 - at, at)
     at = np.where(at >= size, 2 * size - 1 - at, at)
-    return AxisWeights(np.clip(at, 0, size - 1), weights / 6)
+    return Ellpack(np.clip(at, 0, size - 1), weights / 6, size)
 
 
 @jit(types="f8[2] f8 b1 f8[1]")

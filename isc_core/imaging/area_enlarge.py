@@ -20,10 +20,11 @@ overshoots; values below the darkest of the neighbouring old pixels are raised t
 
 import numpy as np
 
-from ..filters.axis_weights import AxisWeights, resampled_plane
 from ..filters.distance import nearest_pixels
 from ..filters.extrema import window_minimum
+from ..filters.interpolation import resampled_plane
 from ..filters.splines import spline_coefficients
+from ..numerics.ellpack import Ellpack
 
 
 def enlarge_averages(values: np.ndarray, inside: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
@@ -58,7 +59,7 @@ def _nearest(size: int, new: int) -> np.ndarray:
     return (2 * np.arange(new) + 1) * size // (2 * new)
 
 
-def _overlaps(size: int, new: int) -> AxisWeights:
+def _overlaps(size: int, new: int) -> Ellpack:
     """(new, size) averages of the B-splines of degree 2 over the new pixels; the image is mirrored
     at its border.
     """
@@ -70,7 +71,7 @@ def _overlaps(size: int, new: int) -> AxisWeights:
     mirrored = np.minimum(np.abs(column), 2 * (size - 1) - column)
     row = np.broadcast_to(np.arange(new)[:, None], column.shape)
     places = np.clip(mirrored, 0, size - 1)
-    return AxisWeights.of(row.ravel(), places.ravel(), weight.ravel(), new)
+    return Ellpack.of(row.ravel(), places.ravel(), weight.ravel(), (new, size))
 
 
 def _integral(x: np.ndarray) -> np.ndarray:

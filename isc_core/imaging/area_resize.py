@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filters.axis_weights import AxisWeights, resampled_plane
+from ..filters.interpolation import resampled_plane
+from ..numerics.ellpack import Ellpack
 from .bounding_box import mask_slices
 
 
@@ -23,14 +24,14 @@ class AreaFilter:
 
     Attributes
     ----------
-    rows, columns : AxisWeights
+    rows, columns : Ellpack
         Overlap of new and old rows and columns.
     full : (h, w) ndarray
         Area of each new pixel that lies on the image.
     """
 
-    rows: AxisWeights
-    columns: AxisWeights
+    rows: Ellpack
+    columns: Ellpack
     full: np.ndarray
 
     @staticmethod
@@ -74,7 +75,7 @@ def reduced_count(count: int, factor: float) -> int:
     return max(1, int(np.ceil(count * factor - 1e-6)))
 
 
-def _overlaps(count: int, factor: float) -> AxisWeights:
+def _overlaps(count: int, factor: float) -> Ellpack:
     """(new, old) float32: the share of each new pixel covered by each of the `count` old
     pixels; 0 < factor <= 1.
     """
@@ -85,7 +86,9 @@ def _overlaps(count: int, factor: float) -> AxisWeights:
     second = np.minimum(first + 1, new - 1)
     weights = np.concatenate([split - start, end - split]).astype(np.float32)
     old = np.arange(count)
-    return AxisWeights.of(np.concatenate([first, second]), np.concatenate([old, old]), weights, new)
+    return Ellpack.of(
+        np.concatenate([first, second]), np.concatenate([old, old]), weights, (new, count)
+    )
 
 
 def averaged_object(

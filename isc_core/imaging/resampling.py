@@ -7,8 +7,9 @@ object, so that no background bleeds in.
 
 import numpy as np
 
-from ..filters.axis_weights import AxisWeights, linear_interpolation, resampled_plane
+from ..filters.interpolation import linear_interpolation, resampled_plane
 from ..filters.splines import spline_coefficients, spline_values
+from ..numerics.ellpack import Ellpack
 
 
 def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
@@ -161,7 +162,7 @@ def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -
     return np.asarray(values[np.ix_(rows, columns)], float)
 
 
-def _weights(size: int, new: int, dtype: type = np.float64) -> AxisWeights:
+def _weights(size: int, new: int, dtype: type = np.float64) -> Ellpack:
     """(new, size) weights, rows summing to 1: box filter when shrinking, linear interpolation when
     enlarging.
     """
@@ -173,4 +174,4 @@ def _weights(size: int, new: int, dtype: type = np.float64) -> AxisWeights:
     column = first[:, None] + np.arange(widest)
     overlap = np.minimum(column + 1, edges[1:, None]) - np.maximum(column, edges[:-1, None])
     share = np.where((overlap > 1e-12) & (column < size), overlap * (new / size), 0)
-    return AxisWeights(np.minimum(column, size - 1), share.astype(dtype))
+    return Ellpack(np.minimum(column, size - 1), share.astype(dtype), size)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filters.axis_weights import AxisWeights
+from ..numerics.ellpack import Ellpack
 from ..numerics.lbfgs import LbfgsOptions, NumpyAlgebra, minimise
 from ..sirfs.priors.absolute_table import CoarseTable, synthesis_matrix, synthesise
 from .roughness import roughness
@@ -100,16 +100,14 @@ class _Problem:
     def __init__(self, histogram: np.ndarray, options: TableFitOptions) -> None:
         self.histogram = histogram.astype(np.float32)
         self.weight = options.smoothness / histogram.size
-        self.matrices: list[AxisWeights] = []
-        self.transposed: list[AxisWeights] = []
+        self.matrices: list[Ellpack] = []
         self.shapes: list[tuple[int, ...]] = []
         nodes = histogram.shape[0]
         for _ in range(options.levels - 1):
-            matrix = synthesis_matrix(nodes, np.float32)
+            self.matrices.append(synthesis_matrix(nodes, np.float32))
             nodes = -(-nodes // 2)
-            self.matrices.append(matrix)
-            self.transposed.append(matrix.transposed(nodes))
             self.shapes.append((nodes,) * histogram.ndim)
+        self.transposed = [one.transposed for one in self.matrices]
         self.ends = np.cumsum([int(np.prod(shape)) for shape in self.shapes])
         self.size = int(self.ends[-1])
 

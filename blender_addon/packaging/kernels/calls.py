@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.filters.axis_weights import linear_interpolation
+from isc_core.baselines.poisson import integrate
 from isc_core.filters.components import labelled
 from isc_core.filters.distance import nearest_pixels
 from isc_core.filters.gaussian import gaussian_average
+from isc_core.filters.interpolation import linear_interpolation
 from isc_core.filters.splines import spline_coefficients
 from isc_core.inpainting.coherency_sensitive_hashing import CshOptions
 from isc_core.inpainting.patch_fill import PatchFillOptions, fill_patches
@@ -185,11 +186,13 @@ def _run_programs() -> None:
     labelled(mask)
     nearest_pixels(mask)
     spline_coefficients(facing)
+    integrate(x, y, mask)
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
         kind = np.float32 if single else np.float64
         gaussian_average(facing.astype(kind), 2.0)
-        linear_interpolation(x[0], _SIDE, kind) @ facing
+        matrix = linear_interpolation(x[0], _SIDE, kind)
+        matrix @ facing, matrix @ x[0], matrix.transposed
         across, down, *layers = (1 + rng.random((4, 9, 11))).astype(kind)
         Paths(across, down, 5.0).average(np.stack(layers))
 

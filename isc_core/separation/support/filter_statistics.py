@@ -34,7 +34,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError
-from ...filters.axis_weights import linear_interpolation, resampled_plane
+from ...filters.interpolation import linear_interpolation, resampled_plane
 from ...imaging.blocks import padded_means_inside
 from ...imaging.bounding_box import mask_slices
 from ...imaging.smoothing import masked_gaussian

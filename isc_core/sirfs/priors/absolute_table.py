@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...filters.axis_weights import AxisWeights
+from ...numerics.ellpack import Ellpack
 from .priors import AbsoluteTable
 
 LOW, HIGH = -7.0, 4.0
@@ -63,7 +63,7 @@ class CoarseTable:
         return AbsoluteTable(LOW, HIGH, values - values.min())
 
 
-def synthesis_matrix(nodes: int, dtype: type = np.float64) -> AxisWeights:
+def synthesis_matrix(nodes: int, dtype: type = np.float64) -> Ellpack:
     """Return the upsampling of one axis.
 
     Parameters
@@ -74,7 +74,7 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> AxisWeights:
 
     Returns
     -------
-    AxisWeights
+    Ellpack
         (nodes, ceil(nodes / 2))
     """
     coarse = -(-nodes // 2)
@@ -82,15 +82,15 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> AxisWeights:
     column, offset = np.meshgrid(np.arange(coarse), list(taps), indexing="ij")
     row, weight = 2 * column + offset, np.broadcast_to(list(taps.values()), column.shape)
     kept = (row >= 0) & (row < nodes)
-    return AxisWeights.of(row[kept], column[kept], weight[kept].astype(dtype), nodes)
+    return Ellpack.of(row[kept], column[kept], weight[kept].astype(dtype), (nodes, coarse))
 
 
-def synthesise(matrix: AxisWeights, values: np.ndarray) -> np.ndarray:
+def synthesise(matrix: Ellpack, values: np.ndarray) -> np.ndarray:
     """Apply a matrix along every axis.
 
     Parameters
     ----------
-    matrix : AxisWeights
+    matrix : Ellpack
         (n, m)
     values : (m, ..., m) ndarray
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy import ndimage, sparse
+from scipy import ndimage
 
-from isc_core.filters.axis_weights import AxisWeights, linear_interpolation, resampled_plane
 from isc_core.filters.components import boxes, labelled, means
 from isc_core.filters.correlation import correlated
 from isc_core.filters.distance import distance_to, nearest_pixels
 from isc_core.filters.extrema import opened, window_maximum, window_minimum
 from isc_core.filters.gaussian import gaussian_average, gaussian_taps
+from isc_core.filters.interpolation import linear_interpolation, resampled_plane
 from isc_core.filters.morphology import dilated, eroded, opened_by_blocks
 from isc_core.filters.splines import spline_coefficients, spline_values
 
@@ -33,7 +33,7 @@ def masks_of(shape: tuple[int, int]) -> list[np.ndarray]:
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("shape", SHAPES)
 def test_gaussian_averages_have_the_bits_of_scipy(shape: tuple[int, int], dtype: type) -> None:
-    image = image_of(shape).astype(dtype)
+    image: np.ndarray = image_of(shape).astype(dtype)
     for sigma in (0.1, 0.4, 1.0, 2.7, 6.0):
         for cut, mode in ((3.0, "reflect"), (4.0, "constant")):
             ours = gaussian_average(image, sigma, cut=cut, mirrored=mode == "reflect")
@@ -154,26 +154,6 @@ def test_splines_are_those_of_scipy_between_the_values() -> None:
     grid = np.meshgrid(rows, columns, indexing="ij")
     expected = ndimage.map_coordinates(coefficients, grid, order=3, mode="nearest", prefilter=False)
     assert_allclose(spline_values(coefficients, rows, columns), expected, atol=1e-13)
-
-
-@pytest.mark.parametrize("dtype", [np.float32, np.float64])
-def test_matrices_have_the_bits_of_scipy(dtype: type) -> None:
-    rng = np.random.default_rng(5)
-    rows, columns = np.divmod(rng.permutation(20 * 33)[:150], 33)
-    weights, values = rng.random(150).astype(dtype), rng.random((33, 7)).astype(dtype)
-    expected = sparse.csr_array((weights, (rows, columns)), shape=(20, 33))
-    ours = AxisWeights.of(rows, columns, weights, 20)
-    assert (ours @ values).dtype == dtype
-    assert_array_equal(ours @ values, expected @ values)
-    assert_array_equal(ours.transposed(33) @ values[:20], expected.T.tocsr() @ values[:20])
-    part = ours.part(slice(2, 9), slice(5, 20))
-    assert part.weights.dtype == dtype
-    assert_array_equal(part @ values[5:20], expected[2:9, 5:20] @ values[5:20])
-
-
-def test_entries_at_one_place_are_added() -> None:
-    matrix = AxisWeights.of(np.array([1, 1, 0]), np.array([2, 2, 0]), np.array([3.0, 4.0, 1.0]), 3)
-    assert_array_equal(matrix @ np.eye(3), [[1, 0, 0], [0, 0, 7], [0, 0, 0]])
 
 
 def test_a_plane_is_resampled_along_both_axes() -> None:
