@@ -87,7 +87,7 @@ def read_arrays(path: Path, limits: Limits = DEFAULT_LIMITS) -> dict[str, np.nda
     Returns
     -------
     dict of str to ndarray
-        Writable.
+        Read-only.
 
     Raises
     ------
@@ -163,7 +163,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dic
     Returns
     -------
     dict of str to ndarray
-        Writable; strings too.
+        Read-only; strings too.
 
     Raises
     ------
@@ -184,7 +184,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dic
                 raise ValueError("not an archive of arrays")
             size = sum(member.file_size for member in members)
             limits.check_unpacked(name, size, len(data))
-            needed += 2 * size  # the member's bytes, and the array
+            needed += size
             unpacked = {
                 member.filename.removesuffix(".npy"): archive.read(member) for member in members
             }
@@ -197,7 +197,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = DEFAULT_LIMITS) -> dic
             f"{name} is damaged or not an archive of NumPy arrays: write it again"
         ) from error
     return {
-        key: parse_array(content, f"{name} ({key})"[:400], KINDS + "U", limits).copy()
+        key: parse_array(content, f"{name} ({key})"[:400], KINDS + "U", limits)
         for key, content in unpacked.items()
     }
 

@@ -165,7 +165,7 @@ def test_an_array_that_does_not_fit_is_no_damage(
         raise MemoryError
 
     monkeypatch.setattr("zipfile.ZipFile.read", fail)
-    with pytest.raises(InputError, match=r"its arrays need about 24.0 MB of memory"):
+    with pytest.raises(InputError, match=r"its arrays need about 16.0 MB of memory"):
         read_arrays(path)
 
 
