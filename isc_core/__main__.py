@@ -3,10 +3,10 @@
 Importing the libraries takes long enough for a user to press Ctrl-C, and some of them catch the
 exception that it raises. Until `cli.main` takes over, nothing has been written, so Ctrl-C ends the
 process at once. The handler is installed before anything else is imported. Garbage collection,
-which takes a tenth of the time of imports and frees nothing, is enabled after them. BLAS runs on
-one thread unless the environment sets another number: its threads wait for work by spinning, which
-takes cores from ISC's own threads. It uses the instructions of this processor even if it is older
-than it.
+which takes a tenth of the time of imports and frees nothing, is enabled after them. Threads share
+one heap. BLAS runs on one thread unless the environment sets another number: its threads wait for
+work by spinning, which takes cores from ISC's own threads. It uses the instructions of this
+processor even if it is older than it.
 
 Finalising the interpreter after a decomposition takes a third of a second and only frees memory
 that the system reclaims anyway. So the process calls the functions registered with `atexit` and
@@ -53,6 +53,9 @@ def start() -> NoReturn:
     gc.disable()  # until `cli.main` has imported the command
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _choose_blas()
+    from .io.memory import reuse_memory
+
+    reuse_memory()
     from .cli.main import main
 
     code = main()

@@ -12,6 +12,7 @@ to need more than the free memory is rejected before it begins (`require_memory`
 import contextlib
 import ctypes
 import mmap
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -19,6 +20,8 @@ from pathlib import Path
 from ..errors import InputError
 
 _SYSTEM, _GROUP = Path("/proc/meminfo"), Path("/sys/fs/cgroup")
+# Of glibc's malloc.h: M_ARENA_MAX, M_MMAP_THRESHOLD (its largest) and M_TRIM_THRESHOLD.
+_MALLOC_OPTIONS = {-8: 1, -3: 1 << 25, -1: 1 << 27}
 LARGE_PHOTO = 1 << 18  # pixels: only above is it worth the time to return memory to the system
 READING_BYTES_PER_PIXEL = 32  # bytes per pixel, at most, from the file to linear light
 _WORDS = ("out of memory", "nsufficient memory", "bad_alloc", "bad alloc", "nable to allocate")
@@ -91,13 +94,29 @@ def free_memory(system: Path = _SYSTEM, group: Path = _GROUP) -> int | None:
     return max(0, min(known))
 
 
+def reuse_memory() -> None:
+    """Let threads reuse freed memory, also each other's, where the C library is glibc.
+
+    By default it gives each thread a heap of its own, and returns large blocks to the system, which
+    clears them when they are allocated again. To be called before there are other threads.
+    """
+    for option, value in _MALLOC_OPTIONS.items():
+        _allocator("mallopt", option, value)
+
+
 def release_memory() -> None:
-    """Return freed memory to the system, where the C library can.
+    """Return freed memory to the system, where the C library is glibc.
 
     The allocator keeps freed memory for reuse: after work on large arrays, as much as is in use.
     """
-    with contextlib.suppress(OSError, AttributeError):  # another library than glibc
-        ctypes.CDLL(None).malloc_trim(0)
+    _allocator("malloc_trim", 0)
+
+
+def _allocator(name: str, *arguments: int) -> None:
+    """Call a function of glibc's allocator, if that is this process's."""
+    if sys.platform == "linux":
+        with contextlib.suppress(AttributeError):  # another library than glibc
+            getattr(ctypes.CDLL(None), name)(*arguments)
 
 
 def require_memory(work: str, needed: int, allowed: int | None, remedy: str) -> None:
