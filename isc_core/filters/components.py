@@ -80,11 +80,23 @@ def means(values: np.ndarray, labels: np.ndarray, count: int) -> np.ndarray:
 
 
 @jit(inline=True)
-def _root(parents, label):
-    while parents[label] != label:
-        parents[label] = parents[parents[label]]
-        label = parents[label]
-    return label
+def root(parents, member):
+    """Return the first member of a tree, and shorten the way to it.
+
+    Parameters
+    ----------
+    parents : (n,) int ndarray
+        Of each member; a root is its own parent. Changed in place.
+    member : int
+
+    Returns
+    -------
+    int
+    """
+    while parents[member] != member:
+        parents[member] = parents[parents[member]]
+        member = parents[member]
+    return member
 
 
 @jit(types="b1[2] b1 i4[2] i4[1] -> i8")
@@ -100,13 +112,13 @@ def _label(mask, corners, labels, parents):
                 continue
             own = 0
             if j > 0 and mask[i, j - 1]:
-                own = _root(parents, labels[i, j - 1])
+                own = root(parents, labels[i, j - 1])
             if i > 0:
                 first = j - 1 if corners and j > 0 else j
                 last = j + 2 if corners and j + 1 < width else j + 1
                 for k in range(first, last):
                     if mask[i - 1, k]:
-                        other = _root(parents, labels[i - 1, k])
+                        other = root(parents, labels[i - 1, k])
                         if own == 0:
                             own = other
                         elif other < own:

@@ -38,6 +38,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..filters.components import root
 from ..filters.correlation import correlated
 from ..filters.gaussian import gaussian_taps
 from ..imaging.smoothing import masked_gaussian
@@ -455,14 +456,6 @@ def _change(colour, considered, y, x, v, u):
     return min(one[3], two[3]) * np.sqrt(square), abs(one[4] - two[4]), max(one[4], two[4])
 
 
-@jit
-def _root(parent, pixel):
-    while parent[pixel] != pixel:
-        parent[pixel] = parent[parent[pixel]]
-        pixel = parent[pixel]
-    return pixel
-
-
 @jit(types="f8[3] b1[2] (b1 b1) f8 f8 i8[1]")
 def _groups(colour, active, considered, edge, floor, parent):
     """Point each pixel, row * W + column, at the first one of its connected region; edges and
@@ -475,10 +468,10 @@ def _groups(colour, active, considered, edge, floor, parent):
                 if v < height and u < width and active[y, x] and active[v, u]:
                     change, _, peak = _change(colour, considered, y, x, v, u)
                     if change <= max(edge * peak, floor):
-                        one, two = _root(parent, y * width + x), _root(parent, v * width + u)
+                        one, two = root(parent, y * width + x), root(parent, v * width + u)
                         parent[max(one, two)] = min(one, two)
     for pixel in range(height * width):
-        parent[pixel] = _root(parent, pixel)
+        parent[pixel] = root(parent, pixel)
 
 
 @jit(types="f8[3] i8[2] b1[2:] (b1 b1) f8 f8 f8[2]")
