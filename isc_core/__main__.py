@@ -18,8 +18,6 @@ import gc
 import os
 import signal
 import sys
-from contextlib import suppress
-from typing import NoReturn
 
 _CANCELLED = 130
 # Seconds (Python's default is 5e-3) that a thread waits, after each array operation, for a thread
@@ -46,13 +44,15 @@ def _choose_blas() -> None:
         os.environ.setdefault("OPENBLAS_CORETYPE", core_type)
 
 
-def start() -> NoReturn:
+def start() -> None:
     """Run `isc` with the arguments of the process, and end the process with its exit code."""
     if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
         signal.signal(signal.SIGINT, _end)
     gc.disable()  # until `cli.main` has imported the command
     sys.setswitchinterval(_SWITCH_INTERVAL)
     _choose_blas()
+    from contextlib import suppress
+
     from .io.memory import reuse_memory
 
     reuse_memory()
