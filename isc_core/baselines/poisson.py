@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..filters.components import labelled
+from ..filters.components import labelled, means
 from ..numerics.ellpack import Ellpack
 from ..numerics.linear import solve_linear
 
@@ -177,10 +177,7 @@ def _two_nearest(at: np.ndarray, coarse: int) -> tuple[tuple[np.ndarray, np.ndar
 
 def _centred(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     parts, count = labelled(mask)
-    sizes = np.bincount(parts.ravel(), minlength=count + 1)
+    own = parts[mask] - 1
     for channel in values.reshape(*mask.shape, -1).transpose(2, 0, 1):
-        means = np.bincount(parts.ravel(), channel.ravel(), minlength=count + 1) / np.maximum(
-            sizes, 1
-        )
-        channel[mask] -= means[parts[mask]]
+        channel[mask] -= means(channel, parts, count)[own]
     return values
