@@ -8,7 +8,7 @@ resolution. Two dense layers make a global prediction from statistics of the coa
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28.
 
-Limits: those of `layers`.
+Limits: those of `convolution`.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.blocks import block_means
-from .layers import conv_block, convolved, depth_to_space, is_chain, space_to_depth
+from .convolution import convolved
+from .layers import conv_block, depth_to_space, is_chain, space_to_depth
 from .loader import Network, Parameters
 
 BLOCK = 4  # side of a block, pixels
@@ -101,32 +102,28 @@ class EncoderDecoder(Network):
         """Channels of the encoder's levels, finest first."""
         return [w.shape[-1] for w in self.weights[1 : 2 * self.depth : 2]]
 
-    def forward(self, *photos: np.ndarray) -> list[tuple[np.ndarray, list[np.ndarray]]]:
+    def forward(self, photo: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Apply encoder and decoder.
 
         Parameters
         ----------
-        *photos : (H, W, inputs) ndarray
-            Channels of photos of one size, whose sides are multiples of `BLOCK` * 2^(depth - 1).
+        photo : (H, W, inputs) ndarray
+            Channels of a photo whose sides are multiples of `BLOCK` * 2^(depth - 1).
 
         Returns
         -------
-        list of tuple
-            For each photo the maps, (H, W, outputs) float32, and a list of the encoder's maps,
-            finest first. They do not depend on the other photos.
+        maps : (H, W, outputs) float32 ndarray
+        levels : list of ndarray
+            The encoder's maps, finest first.
         """
-        layers = [space_to_depth(channels, BLOCK) for channels in photos]
-        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[list[np.ndarray]]()
+        layer = space_to_depth(photo, BLOCK)
+        steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
         for level in range(self.depth):
-            if level > 0:
-                layers = [block_means(layer, 2) for layer in layers]
-            layers = conv_block(layers, steps)
-            levels.append(layers)
-        for skips in levels[-2::-1]:
-            joined = [_concatenated(*pair) for pair in zip(skips, layers, strict=True)]
-            layers = conv_block(joined, steps)
-        maps = [depth_to_space(layer, BLOCK) for layer in convolved(layers, *next(steps))]
-        return [(one, list(seen)) for one, *seen in zip(maps, *levels, strict=True)]
+            layer = conv_block(block_means(layer, 2) if level > 0 else layer, steps)
+            levels.append(layer)
+        for skip in levels[-2::-1]:
+            layer = conv_block(_concatenated(skip, layer), steps)
+        return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
 
 
 @dataclass(frozen=True)

@@ -94,10 +94,8 @@ def predict_highlights(
     """
     network = network or HighlightNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    (direct, _), (mirrored, _) = network.forward(
-        channels_of(frame.image, frame.mask),
-        channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]),
-    )
+    direct, _ = network.forward(channels_of(frame.image, frame.mask))
+    mirrored, _ = network.forward(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
     odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
     scale = 1 / frame.factor
     values = smallest_channel = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The layers of the networks: convolutions whose results are identical on any number of threads.
+"""The inputs and the layers of the networks.
 
 Equation: the input is log(I / mean I + .03) and the mask, in blocks of pixels (space to depth);
 each level has two 3 x 3 convolutions with max(0, .) and zero padding, and half the resolution of
@@ -7,20 +7,18 @@ the previous one.
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
 
-Limits: one matrix product in float64 per layer: designed for networks of up to a few million
-weights. A library such as onnxruntime would be faster, but cannot be shipped in a Blender extension
-for all versions, and its order of summation is not defined.
+Limits: those of `convolution`.
 """
 
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from .convolution import convolved
+
 DARK = 0.03  # of the mean light: below it, logarithms are dominated by noise
-_BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits sum to less than 2^53
 _SIGN_AND_NUMBER = np.int32(-0x70000001)  # without the three bits between them
 _LARGEST_HALF = np.float32(65504)  # 16 bits; infinity and NaN are converted to larger numbers
-_BLOCK_BYTES = 4_000_000  # of the neighbourhoods that are processed at a time
 
 Steps = Iterator[
     tuple[np.ndarray, np.ndarray]
@@ -173,90 +171,23 @@ def depth_to_space(layer: np.ndarray, block: int) -> np.ndarray:
     )
 
 
-def conv_block(layers: list[np.ndarray], steps: Steps) -> list[np.ndarray]:
+def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
     """Apply the next two convolutions of `steps`, each followed by max(0, .).
 
     Parameters
     ----------
-    layers : list of (H, W, C) ndarray
-        One for each photo.
+    layer : (H, W, C) ndarray
     steps : Steps
         Weights and biases of the remaining convolutions; advanced by two.
 
     Returns
     -------
-    list of (H, W, D) float32 ndarray
+    (H, W, D) float32 ndarray
     """
     for _ in range(2):
-        layers = convolved(layers, *next(steps))
-        for layer in layers:
-            np.maximum(layer, 0, out=layer)
-    return layers
-
-
-def convolved(layers: list[np.ndarray], weight: np.ndarray, bias: np.ndarray) -> list[np.ndarray]:
-    """Convolve with a 3 x 3 kernel and zero padding, as matrix products of neighbourhoods.
-
-    Both factors are rounded to integer multiples of a power of two, such that float64 represents
-    every sum of their products exactly: the order of summation, which in libraries depends on the
-    number of threads and of photos, does not affect the result.
-
-    Parameters
-    ----------
-    layers : list of (H, W, C) ndarray
-        One for each photo: the weights are converted once, and one product for two photos takes
-        less time than two.
-    weight : (9, C, D) ndarray
-    bias : (D,) ndarray
-
-    Returns
-    -------
-    list of (H, W, D) float32 ndarray
-    """
-    rows, columns, channels = layers[0].shape
-    kernel_step, layer_steps = _step_of(weight), [_step_of(layer) for layer in layers]
-    kernel = weight.reshape(-1, weight.shape[2]).astype(np.float64)
-    _to_multiples(kernel, kernel_step)
-    found = [np.empty((rows, columns, weight.shape[2]), np.float32) for _ in layers]
-    height = max(1, _BLOCK_BYTES // (72 * channels * columns * len(layers)))
-    for top in range(0, rows, height):
-        count = min(height, rows - top)
-        near = np.empty((len(layers), count, columns, 9, channels))
-        for layer, step, out in zip(layers, layer_steps, near, strict=True):
-            _gather_neighbourhoods(layer, top, step, out)
-        sums = near.reshape(-1, 9 * channels) @ kernel
-        parts = sums.reshape(len(layers), count, columns, -1)
-        for part, step, out in zip(parts, layer_steps, found, strict=True):
-            part *= step * kernel_step
-            part += bias
-            out[top : top + count] = part
-    return found
-
-
-def _gather_neighbourhoods(layer: np.ndarray, top: int, step: float, out: np.ndarray) -> None:
-    """The 3 x 3 pixels around each pixel of some rows from `top` on, as multiples of `step`, into
-    `out` (rows, W, 9, C).
-    """
-    count, columns, _, channels = out.shape
-    near = layer[max(top - 1, 0) : top + count + 1]
-    block, above = np.zeros((count + 2, columns + 2, channels), np.float32), int(top == 0)
-    block[above : above + len(near), 1:-1] = near
-    _to_multiples(block, step)
-    for k in range(9):
-        i, j = divmod(k, 3)
-        out[:, :, k] = block[i : i + count, j : j + columns]
-
-
-def _to_multiples(values: np.ndarray, step: float) -> None:
-    """Convert values to integer multiples of a step, a power of two."""
-    values /= values.dtype.type(step)
-    np.rint(values, out=values)
-
-
-def _step_of(values: np.ndarray) -> float:
-    """A power of two such that the values are at most 2^20 multiples of it."""
-    largest = max(float(values.max()), -float(values.min()))
-    return float(2.0 ** (np.ceil(np.log2(largest)) - _BITS)) if largest > 0 else 1.0
+        layer = convolved(layer, *next(steps))
+        np.maximum(layer, 0, out=layer)
+    return layer
 
 
 def softmax(score: np.ndarray) -> np.ndarray:

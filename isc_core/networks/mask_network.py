@@ -77,7 +77,7 @@ class MaskNetwork(PhotoNetwork):
         counts : (3,) ndarray
             Log odds of `Count`.
         """
-        ((maps, levels),) = self.forward(channels)
+        maps, levels = self.forward(channels)
         features = []
         for layer in levels[-COARSE:]:
             values = layer.astype(np.float64)

@@ -126,23 +126,21 @@ class SceneNetwork(PhotoNetwork):
             and bool((self.temperatures > 0).all())
         )
 
-    def __call__(self, *frames: tuple[np.ndarray, np.ndarray]) -> list[RawPrediction]:
-        """Predict maps and light of photos together, which takes less time than one by one.
+    def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
+        """Predict maps and light.
 
         Parameters
         ----------
-        *frames : tuple of ((H, W, 3) ndarray, (H, W) bool ndarray)
-            Image and mask of a `NetworkFrame`, all of one size.
+        image : (H, W, 3) ndarray
+        mask : (H, W) bool ndarray
+            Of a `NetworkFrame`.
 
         Returns
         -------
-        list of RawPrediction
+        RawPrediction
         """
-        found = self.forward(*(channels_of(image, mask) for image, mask in frames))
-        return [
-            RawPrediction(maps, self._light(levels, mask))
-            for (maps, levels), (_, mask) in zip(found, frames, strict=True)
-        ]
+        maps, levels = self.forward(channels_of(image, mask))
+        return RawPrediction(maps, self._light(levels, mask))
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
@@ -335,7 +333,7 @@ def _computed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `_run` returns."""
     image, mask = frame.image, frame.mask
-    direct, mirrored = network((image, mask), (image[:, ::-1], mask[:, ::-1]))
+    direct, mirrored = network(image, mask), network(image[:, ::-1], mask[:, ::-1])
     maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED
     return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 

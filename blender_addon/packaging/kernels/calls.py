@@ -1,9 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, a turned mesh, filters, and, in both
-precisions, averages along paths and SIRFS on a ball of a few pixels call each version of each
-kernel. The first calls of each are kept, with what the arrays held before and after. They run on
-one thread: others would write to these arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, filters, a convolution,
+and, in both precisions, averages along paths and SIRFS on a ball of a few pixels call each version
+of each kernel. The first calls of each are kept, with what the arrays held before and after. They
+run on one thread: others would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -22,6 +22,7 @@ from isc_core.filters.interpolation import linear_interpolation
 from isc_core.filters.splines import spline_coefficients
 from isc_core.inpainting.coherency_sensitive_hashing import CshOptions
 from isc_core.inpainting.patch_fill import PatchFillOptions, fill_patches
+from isc_core.networks.convolution import convolved
 from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_check import mix, outcome
 from isc_core.numerics.kernel_library import KernelLibrary, flattened
@@ -187,6 +188,7 @@ def _run_programs() -> None:
     nearest_pixels(mask)
     spline_coefficients(facing)
     integrate(x, y, mask)
+    convolved(diffuse[:7, :9], rng.normal(size=(9, 3, 5)), rng.normal(size=5))
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
         kind = np.float32 if single else np.float64

@@ -1,35 +1,9 @@
-"""The layers' arithmetic against other people's."""
+"""Blocks of pixels, and weights as they are stored."""
 
 import numpy as np
 import pytest
-from scipy import ndimage
 
-from isc_core.networks.layers import convolved, depth_to_space, space_to_depth, weights_in
-
-
-def test_convolution_is_correlation_with_zeros_around() -> None:
-    rng = np.random.default_rng(0)
-    layer, weight, bias = rng.normal(size=(7, 9, 3)), rng.normal(size=(9, 3, 2)), rng.normal(size=2)
-    expected = [
-        sum(
-            ndimage.correlate(layer[..., i], weight[:, i, o].reshape(3, 3), mode="constant")
-            for i in range(3)
-        )
-        + bias[o]
-        for o in range(2)
-    ]
-    # steps of 2^-20 of the largest factors
-    (found,) = convolved([layer], weight, bias)
-    np.testing.assert_allclose(found, np.stack(expected, -1), atol=5e-5)
-
-
-def test_a_photo_does_not_depend_on_those_beside_it() -> None:
-    """Whose factors are rounded to other steps."""
-    rng = np.random.default_rng(1)
-    layers = [scale * rng.normal(size=(7, 9, 3)) for scale in (1.0, 30.0)]
-    weight, bias = rng.normal(size=(9, 3, 2)), rng.normal(size=2)
-    for layer, found in zip(layers, convolved(layers, weight, bias), strict=True):
-        np.testing.assert_array_equal(found, convolved([layer], weight, bias)[0])
+from isc_core.networks.layers import depth_to_space, space_to_depth, weights_in
 
 
 def test_blocks_of_pixels_go_there_and_back() -> None:
