@@ -33,9 +33,9 @@ class EncoderDecoder(Network):
     ----------
     inputs, outputs : int
         Channels per pixel.
-    weights : tuple of (9, inputs, outputs) float32 ndarray
-        Two for each level of the encoder, two for each of the decoder from the coarsest, the
-        output.
+    weights : tuple of (9, inputs, outputs) ndarray
+        As they are stored, float16 or float32. Two for each level of the encoder, two for each of
+        the decoder from the coarsest, the output.
     biases : tuple of (outputs,) float32 ndarray
     """
 
@@ -102,28 +102,28 @@ class EncoderDecoder(Network):
         """Channels of the encoder's levels, finest first."""
         return [w.shape[-1] for w in self.weights[1 : 2 * self.depth : 2]]
 
-    def forward(self, photo: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+    def forward(self, photos: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
         """Apply encoder and decoder.
 
         Parameters
         ----------
-        photo : (H, W, inputs) ndarray
-            Channels of a photo whose sides are multiples of `BLOCK` * 2^(depth - 1).
+        photos : (N, H, W, inputs) ndarray
+            Channels of photos whose sides are multiples of `BLOCK` * 2^(depth - 1).
 
         Returns
         -------
-        maps : (H, W, outputs) float32 ndarray
-        levels : list of ndarray
+        maps : (N, H, W, outputs) float32 ndarray
+        levels : list of (N, h, w, width) ndarray
             The encoder's maps, finest first.
         """
-        layer = space_to_depth(photo, BLOCK)
+        layers = space_to_depth(photos, BLOCK)
         steps, levels = iter(zip(self.weights, self.biases, strict=True)), list[np.ndarray]()
         for level in range(self.depth):
-            layer = conv_block(block_means(layer, 2) if level > 0 else layer, steps)
-            levels.append(layer)
-        for skip in levels[-2::-1]:
-            layer = conv_block(_concatenated(skip, layer), steps)
-        return depth_to_space(convolved(layer, *next(steps)), BLOCK), levels
+            layers = conv_block(_halved(layers) if level > 0 else layers, steps)
+            levels.append(layers)
+        for skips in levels[-2::-1]:
+            layers = conv_block(_concatenated(skips, layers), steps)
+        return depth_to_space(convolved(layers, *next(steps)), BLOCK), levels
 
 
 @dataclass(frozen=True)
@@ -217,10 +217,18 @@ class PhotoNetwork(EncoderDecoder):
         return np.einsum("n,nk->k", np.maximum(hidden, 0), self.dense[1]) + self.offsets[1]
 
 
-def _concatenated(skip: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """The map (H, W, C) of the encoder with the coarser one (H / 2, W / 2, D), upsampled."""
-    both = np.empty((*skip.shape[:2], skip.shape[2] + coarse.shape[2]), np.float32)
-    both[..., : skip.shape[2]] = skip
+def _halved(layers: np.ndarray) -> np.ndarray:
+    """The maps (N, H, W, C) at half their resolution; H is even."""
+    photos, rows, columns, channels = layers.shape
+    halved = block_means(layers.reshape(photos * rows, columns, channels), 2)
+    return halved.reshape(photos, rows // 2, columns // 2, channels)
+
+
+def _concatenated(skips: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """The maps (N, H, W, C) of the encoder with the coarser (N, H / 2, W / 2, D), upsampled."""
+    width = skips.shape[3]
+    both = np.empty((*skips.shape[:3], width + coarse.shape[3]), np.float32)
+    both[..., :width] = skips
     for row, column in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        both[row::2, column::2, skip.shape[2] :] = coarse
+        both[:, row::2, column::2, width:] = coarse
     return both

@@ -94,9 +94,10 @@ def predict_highlights(
     """
     network = network or HighlightNetwork.shipped()
     frame = framed(image, mask, SIDE, LONG_SIDE)
-    direct, _ = network.forward(channels_of(frame.image, frame.mask))
-    mirrored, _ = network.forward(channels_of(frame.image[:, ::-1], frame.mask[:, ::-1]))
-    odds = at_full_size((direct + mirrored[:, ::-1]) / 2, frame, mask)
+    direct = channels_of(frame.image, frame.mask)
+    mirrored = channels_of(frame.image[:, ::-1], frame.mask[:, ::-1])
+    both, _ = network.forward(np.stack([direct, mirrored]))
+    odds = at_full_size((both[0] + both[1][:, ::-1]) / 2, frame, mask)
     scale = 1 / frame.factor
     values = smallest_channel = smallest(np.where(mask[..., None], image, 0)).astype(np.float32)
     if scale > 1:

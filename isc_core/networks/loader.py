@@ -26,8 +26,8 @@ class Parameters:
 
     Attributes
     ----------
-    weights : tuple of (9, inputs, outputs) float32 ndarray
-        Of the convolutions; kernels in row-major order.
+    weights : tuple of (9, inputs, outputs) ndarray
+        Of the convolutions, as they are stored; kernels in row-major order.
     biases : tuple of (outputs,) float32 ndarray
     others : mapping of str to float64 ndarray
     """

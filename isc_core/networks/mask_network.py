@@ -62,27 +62,28 @@ class MaskNetwork(PhotoNetwork):
         """Return whether the shapes of the parts match."""
         return super().fits() and self.calibration.shape == (FEATURES,)
 
-    def __call__(self, channels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Predict the mask and the number of objects.
+    def __call__(self, photos: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Predict masks and numbers of objects.
 
         Parameters
         ----------
-        channels : (H, W, INPUTS) ndarray
+        photos : (N, H, W, INPUTS) ndarray
             See `channels_of`. Sides are multiples of 32.
 
         Returns
         -------
-        odds : (H, W) float32 ndarray
+        odds : (N, H, W) float32 ndarray
             Log odds of the object.
-        counts : (3,) ndarray
-            Log odds of `Count`.
+        counts : list of (3,) ndarray
+            Log odds of `Count`, for each photo.
         """
-        maps, levels = self.forward(channels)
+        maps, levels = self.forward(photos)
         features = []
-        for layer in levels[-COARSE:]:
-            values = layer.astype(np.float64)
-            features += [values.mean(axis=(0, 1)), values.max(axis=(0, 1))]
-        return maps[..., 0], self.predict_global(features)
+        for layers in levels[-COARSE:]:
+            values = layers.astype(np.float64)
+            features += [values.mean(axis=(1, 2)), values.max(axis=(1, 2))]
+        counts = [self.predict_global(list(own)) for own in zip(*features, strict=True)]
+        return maps[..., 0], counts
 
 
 @dataclass(frozen=True)
@@ -123,12 +124,12 @@ def predict_mask(
         The prediction for the mirrored photo is the mirror image.
     """
     network = network or MaskNetwork.shipped()
-    odds, counts = network(channels_of(light, frame, hints))
-    mirrored = network(channels_of(light[:, ::-1], frame[:, ::-1], hints[:, ::-1]))
-    odds = (odds + mirrored[0][:, ::-1]) / 2
-    counts = (counts + mirrored[1]) / 2
+    direct = channels_of(light, frame, hints)
+    mirrored = channels_of(light[:, ::-1], frame[:, ::-1], hints[:, ::-1])
+    both, counts = network(np.stack([direct, mirrored]))
+    odds = (both[0] + both[1][:, ::-1]) / 2
     cover = np.where(frame, 1 / (1 + np.exp(-np.clip(odds, -30, 30))), 0)
-    return MaskPrediction(cover.astype(np.float32), softmax(counts))
+    return MaskPrediction(cover.astype(np.float32), softmax((counts[0] + counts[1]) / 2))
 
 
 def channels_of(light: np.ndarray, frame: np.ndarray, hints: np.ndarray) -> np.ndarray:

@@ -126,21 +126,23 @@ class SceneNetwork(PhotoNetwork):
             and bool((self.temperatures > 0).all())
         )
 
-    def __call__(self, image: np.ndarray, mask: np.ndarray) -> RawPrediction:
-        """Predict maps and light.
+    def __call__(self, *frames: tuple[np.ndarray, np.ndarray]) -> list[RawPrediction]:
+        """Predict maps and light of photos together, which takes less time than one by one.
 
         Parameters
         ----------
-        image : (H, W, 3) ndarray
-        mask : (H, W) bool ndarray
-            Of a `NetworkFrame`.
+        *frames : tuple of ((H, W, 3) ndarray, (H, W) bool ndarray)
+            Image and mask of a `NetworkFrame`, all of one size.
 
         Returns
         -------
-        RawPrediction
+        list of RawPrediction
         """
-        maps, levels = self.forward(channels_of(image, mask))
-        return RawPrediction(maps, self._light(levels, mask))
+        found, levels = self.forward(np.stack([channels_of(*frame) for frame in frames]))
+        return [
+            RawPrediction(maps, self._light(list(own), mask))
+            for maps, *own, (_, mask) in zip(found, *levels, frames, strict=True)
+        ]
 
     def _light(self, skips: list[np.ndarray], mask: np.ndarray) -> np.ndarray:
         """The vector (GLOBAL,) of means and maxima of the coarse feature maps on the object."""
@@ -333,7 +335,7 @@ def _computed(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """What `_run` returns."""
     image, mask = frame.image, frame.mask
-    direct, mirrored = network(image, mask), network(image[:, ::-1], mask[:, ::-1])
+    direct, mirrored = network((image, mask), (image[:, ::-1], mask[:, ::-1]))
     maps = _activated(direct.maps), _activated(mirrored.maps[:, ::-1]) * _MIRRORED
     return 0.5 * (maps[0] + maps[1]), direct.vector, mirrored.vector
 

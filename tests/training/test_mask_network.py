@@ -35,9 +35,9 @@ def test_the_core_and_the_module_compute_the_same(tmp_path: Path) -> None:
     inputs = np.random.default_rng(0).normal(0, 1, (SIDE, SIDE, INPUTS)).astype(np.float32)
     with torch.no_grad():
         odds, counts = one(torch.from_numpy(inputs).permute(2, 0, 1)[None])
-    found = MaskNetwork.read(path)(inputs)
-    np.testing.assert_allclose(found[0], odds[0, 0].numpy(), atol=0.02)
-    np.testing.assert_allclose(found[1], counts[0].numpy(), atol=0.02)
+    found = MaskNetwork.read(path)(inputs[None])
+    np.testing.assert_allclose(found[0], odds[:, 0].numpy(), atol=0.02)
+    np.testing.assert_allclose(found[1][0], counts[0].numpy(), atol=0.02)
 
 
 def test_weights_are_restored_from_an_archive() -> None:

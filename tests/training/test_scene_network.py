@@ -115,7 +115,7 @@ def test_the_core_and_the_module_compute_the_same(tmp_path: Path) -> None:
         (maps, vector), (exact_maps, exact_vector) = rounded(inputs), one(inputs)
     assert maps.shape == (2, CHANNELS, SIDE, SIDE) and vector.shape == (2, GLOBAL)
     for k in range(2):
-        raw = network(photo[k], mask[k])
+        (raw,) = network((photo[k], mask[k]))
         # The biases of the file are rounded, those of the module follow from its normalisation.
         for found, both, tolerance in (
             (raw.maps, (maps, vector), 3e-3),

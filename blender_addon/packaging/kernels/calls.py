@@ -188,7 +188,7 @@ def _run_programs() -> None:
     nearest_pixels(mask)
     spline_coefficients(facing)
     integrate(x, y, mask)
-    convolved(diffuse[:7, :9], rng.normal(size=(9, 3, 5)), rng.normal(size=5))
+    convolved(diffuse[None, :7, :9], rng.normal(size=(9, 3, 5)), rng.normal(size=5))
     for single in (True, False):
         _recover_shape(diffuse, mask, single)
         kind = np.float32 if single else np.float64
