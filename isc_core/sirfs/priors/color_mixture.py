@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scale_mixture import exp_or_zero, refine_weights
+from .scale_mixture import exp_or_zero, refine_weights, summed_exponentials
 from .tabulated_potential import TabulatedPotential
 
 TABLE_NODES = 100_000
@@ -144,12 +144,13 @@ class ColorScaleMixture:
         ndarray
             Of the shape of `m`.
         """
-        return np.log(_densities(np.asarray(m, float), self.variances) @ self.weights)
+        factors = self.weights * _peaks(self.variances)
+        return np.log(summed_exponentials(np.asarray(m, float), self.variances, factors))
 
     def table(self) -> TabulatedPotential:
         """Return the cost -log(p(m) / p(0)) on 100000 nodes from 0 to `reach`."""
         nodes = np.linspace(0.0, self.reach, TABLE_NODES)
-        log_density = np.concatenate([self.log_density(part) for part in np.array_split(nodes, 16)])
+        log_density = self.log_density(nodes)
         return TabulatedPotential(0.0, self.reach / (TABLE_NODES - 1), log_density[0] - log_density)
 
 
@@ -208,4 +209,9 @@ def _unit_determinant(matrix: np.ndarray) -> np.ndarray:
 
 def _densities(m: np.ndarray, variances: np.ndarray) -> np.ndarray:
     """N(x; 0, v_k S) as a function of m, of shape (..., K)."""
-    return exp_or_zero(-m[..., None] / variances) * (2 * np.pi * variances) ** -1.5
+    return exp_or_zero(-m[..., None] / variances) * _peaks(variances)
+
+
+def _peaks(variances: np.ndarray) -> np.ndarray:
+    """N(0; 0, v_k S)."""
+    return np.asarray((2 * np.pi * variances) ** -1.5)

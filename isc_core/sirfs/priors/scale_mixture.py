@@ -124,7 +124,8 @@ class ScaleMixture:
         float64 ndarray
             At least -300, of the shape of `x`.
         """
-        density = _densities(np.asarray(x, float) ** 2, self.deviations) @ self.weights
+        factors = self.weights / (np.sqrt(2 * np.pi) * self.deviations)
+        density = summed_exponentials(np.asarray(x, float) ** 2, 2 * self.deviations**2, factors)
         return np.log(np.maximum(density, np.exp(LOG_DENSITY_FLOOR)))
 
     def table(self) -> TabulatedPotential:
@@ -205,6 +206,31 @@ def _densities(squares: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """N(x; 0, s_k^2) for `squares` x^2, of shape (..., K)."""
     exponent = -squares[..., None] / (2 * deviations**2)
     return exp_or_zero(exponent) / (np.sqrt(2 * np.pi) * deviations)
+
+
+def summed_exponentials(x: np.ndarray, scales: np.ndarray, factors: np.ndarray) -> np.ndarray:
+    """Return sum_k factors[k] exp(-x / scales[k]), without calling `exp` where it underflows.
+
+    Parameters
+    ----------
+    x : ndarray
+        Not negative.
+    scales, factors : (K,) ndarray
+
+    Returns
+    -------
+    float64 ndarray
+        Of the shape of `x`.
+    """
+    order = np.argsort(x, axis=None, kind="stable")  # takes no time if they are sorted
+    ascending = x.ravel()[order]
+    sums = np.zeros(x.size)
+    for scale, factor in zip(scales, factors, strict=True):
+        near = ascending[: np.searchsorted(ascending, -_UNDERFLOW * scale)]
+        sums[: len(near)] += factor * np.exp(near / -scale)
+    found = np.empty(x.shape)
+    found.ravel()[order] = sums
+    return found
 
 
 def exp_or_zero(exponent: np.ndarray) -> np.ndarray:
