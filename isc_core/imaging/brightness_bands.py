@@ -18,7 +18,8 @@ Limits: square openings are not isotropic. A ramp toward the mask's outline coun
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.extrema import window_maximum, window_minimum
 
 
 def brightness_bands(
@@ -47,6 +48,6 @@ def brightness_bands(
 
 def _opened(values: np.ndarray, mask: np.ndarray, side: int) -> np.ndarray:
     most, least = np.asarray([np.inf, -np.inf], values.dtype)
-    low = ndimage.minimum_filter(np.where(mask, values, most), side, mode="constant", cval=most)
-    high = ndimage.maximum_filter(np.where(mask, low, least), side, mode="constant", cval=least)
+    low = window_minimum(np.where(mask, values, most), side)
+    high = window_maximum(np.where(mask, low, least), side)
     return np.where(mask, high, 0)

@@ -12,7 +12,8 @@ doi:10.1109/TPAMI.2012.213.
 """
 
 import numpy as np
-from scipy import ndimage
+
+from ..filters.box import box_average
 
 _RADIUS = 2  # of the window, in pixels
 
@@ -72,8 +73,8 @@ def window_means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     (H, W, ...) ndarray
         0 where a window has no pixel of the mask.
     """
-    size = (2 * _RADIUS + 1,) * 2 + (1,) * (values.ndim - 2)
+    size = 2 * _RADIUS + 1
     inside = mask.reshape(mask.shape + (1,) * (values.ndim - 2)).astype(float)
-    weight = ndimage.uniform_filter(inside, size, mode="constant")
-    total = ndimage.uniform_filter(values * inside, size, mode="constant")
+    weight = box_average(inside, size)
+    total = box_average(values * inside, size)
     return np.where(weight > 1e-9, total / np.maximum(weight, 1e-9), 0)

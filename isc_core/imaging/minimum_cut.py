@@ -9,13 +9,15 @@ the cost of a cut is that of its labels, and the maximum flow gives the minimum 
 
 Citation: D. Greig, B. Porteous, A. Seheult, "Exact maximum a posteriori estimation for binary
 images", Journal of the Royal Statistical Society B 51 (1989),
-doi:10.1111/j.2517-6161.1989.tb01764.x; E. Dinic's algorithm, of SciPy.
+doi:10.1111/j.2517-6161.1989.tb01764.x; the flow: see `numerics.maximum_flow`.
 
 Limits: costs are rounded to multiples of 1 / `SCALE`. The time grows faster than the number of
 pixels: some 100,000 take seconds.
 """
 
 import numpy as np
+
+from ..numerics.maximum_flow import source_side
 
 SCALE = 32
 _LARGEST = 200.0  # of a cost difference
@@ -77,7 +79,7 @@ def minimum_cut(
         both = free[here] & free[there]
         ends.append((number[here][both], number[there][both], link[both]))
     first, second, weight = (np.concatenate(parts) for parts in zip(*ends, strict=True))
-    on_object = _source_side(_rounded(pull[free]), first, second, _rounded(weight))
+    on_object = source_side(_rounded(pull[free]), first, second, _rounded(weight))
     result = fixed.copy()
     result[free] = on_object
     return result
@@ -85,34 +87,3 @@ def minimum_cut(
 
 def _rounded(costs: np.ndarray) -> np.ndarray:
     return np.rint(SCALE * costs).astype(np.int32)
-
-
-def _source_side(
-    pull: np.ndarray, first: np.ndarray, second: np.ndarray, weight: np.ndarray
-) -> np.ndarray:
-    """Which of N nodes are on the side of the source, (N,) bool: those that it reaches in the
-    residual graph of the maximum flow.
-    """
-    # Imported only for a cut: every command imports this module.
-    from scipy import sparse
-    from scipy.sparse.csgraph import breadth_first_order, maximum_flow
-
-    count = len(pull)
-    source, sink = count, count + 1
-    nodes = np.arange(count)
-    to, away = np.maximum(pull, 0), np.maximum(-pull, 0)
-    rows = np.concatenate([first, second, np.full(count, source), nodes])
-    columns = np.concatenate([second, first, nodes, np.full(count, sink)])
-    values = np.concatenate([weight, weight, to, away])
-    kept = values > 0
-    graph = sparse.csr_array(
-        (values[kept], (rows[kept], columns[kept])), shape=(count + 2, count + 2)
-    )
-    flow = maximum_flow(graph, source, sink).flow
-    left = (graph - flow).tocsr()
-    left.data = np.maximum(left.data, 0)
-    left.eliminate_zeros()
-    reached = breadth_first_order(left, source, return_predecessors=False)
-    side = np.zeros(count + 2, bool)
-    side[reached] = True
-    return side[:count]

@@ -25,8 +25,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.morphology import dilated
 from ..imaging.bounding_box import mask_box
 from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_codes
@@ -93,7 +93,7 @@ def _shows_another(mask: np.ndarray, hinted: np.ndarray, hints: Hints) -> bool:
     points lies apart.
     """
     inside = any(mask[y, x] for x, y in hints.points)
-    return not inside and not (ndimage.binary_dilation(hinted, iterations=_RIM) & mask).any()
+    return not inside and not (dilated(hinted, _RIM) & mask).any()
 
 
 def agreement(mask: np.ndarray, hints: Hints) -> float:
@@ -123,7 +123,7 @@ def _without_components(found: FoundMask, points: tuple[Point, ...]) -> np.ndarr
     kept = [one for one in components if not any(one[y, x] for x, y in points)]
     near = np.any(kept, axis=0) if kept else np.zeros_like(found.mask)
     dropped = found.mask & ~near
-    near = ndimage.binary_dilation(near, iterations=_RIM) & ~dropped
+    near = dilated(near, _RIM) & ~dropped
     return np.where(near, found.cover, 0)
 
 

@@ -20,10 +20,16 @@ Limits: a border between like colours is where the distances are equal; half of 
 region at most is assumed to be wrong.
 """
 
-import numpy as np
-from scipy import ndimage, sparse
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ..filters.components import labelled
+from ..filters.distance import distance_to
 from ..imaging.minimum_cut import STEPS, shifted
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 _STEP = 0.01  # lambda: change of colour that is as far as one pixel
 _FAR = 0.5  # quantile of the distance from which pixels keep their label
@@ -61,7 +67,7 @@ def with_changed_regions(
 
 def _beyond_reach(mask: np.ndarray, points: Pixels) -> np.ndarray:
     """The pixels (H, W) too far from points outside a mask."""
-    to_mask = ndimage.distance_transform_edt(~mask) if mask.any() else np.full(mask.shape, np.inf)
+    to_mask = distance_to(mask) if mask.any() else np.full(mask.shape, np.inf)
     rows, columns = np.indices(mask.shape)
     return np.all(
         [np.hypot(rows - row, columns - column) > _REACH * to_mask[row, column]
@@ -70,7 +76,7 @@ def _beyond_reach(mask: np.ndarray, points: Pixels) -> np.ndarray:
 
 
 def _region(
-    graph: sparse.csr_matrix,
+    graph: "sparse.csr_matrix",
     candidates: np.ndarray,
     wrong: Pixels,
     opposite: Pixels,
@@ -85,7 +91,7 @@ def _region(
     seeds = np.concatenate([np.flatnonzero(kept), _at(candidates.shape, opposite)])
     if len(seeds):
         candidates = candidates & (distance < _distance(graph, candidates.shape, seeds))
-    labels, _ = ndimage.label(candidates)
+    labels, _ = labelled(candidates)
     reached = np.unique(labels[tuple(np.transpose(wrong))])
     return np.isin(labels, reached[reached > 0])
 
@@ -95,8 +101,11 @@ def _at(shape: tuple[int, ...], points: Pixels) -> np.ndarray:
     return np.array([row * shape[1] + column for row, column in points], np.int64)
 
 
-def _graph(codes: np.ndarray) -> sparse.csr_matrix:
+def _graph(codes: np.ndarray) -> "sparse.csr_matrix":
     """Distances of neighbours, each pair once."""
+    # Imported only for points: every command imports this module.
+    from scipy import sparse
+
     height, width = codes.shape[:2]
     number = np.arange(height * width).reshape(height, width)
     starts, ends, lengths = [], [], []
@@ -110,9 +119,8 @@ def _graph(codes: np.ndarray) -> sparse.csr_matrix:
     return sparse.csr_matrix((np.concatenate(lengths), pairs), (number.size, number.size))
 
 
-def _distance(graph: sparse.csr_matrix, shape: tuple[int, ...], seeds: np.ndarray) -> np.ndarray:
+def _distance(graph: "sparse.csr_matrix", shape: tuple[int, ...], seeds: np.ndarray) -> np.ndarray:
     """Geodesic distance (H, W) to the nearest seed."""
-    # Imported only for points: every command imports this module.
     from scipy.sparse.csgraph import dijkstra
 
     found = dijkstra(graph, directed=False, indices=np.unique(seeds), min_only=True)

@@ -14,8 +14,10 @@ Limits: solved at a length of at most `SIDE` pixels; a large photo's rim is upsa
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ..filters.distance import distance_to
+from ..filters.extrema import window_maximum
+from ..filters.morphology import dilated, eroded
 from ..imaging.guided_filter import affine_fit
 from ..imaging.resampling import resampled
 from ..imaging.srgb import srgb_codes
@@ -106,10 +108,9 @@ def trimap(cover: np.ndarray, known: np.ndarray) -> np.ndarray:
     inside = cover > 0.5
     labels = np.where(inside, Label.PROBABLY_OBJECT, Label.PROBABLY_BACKGROUND).astype(np.uint8)
     if inside.any() and not inside.all():
-        depth = ndimage.distance_transform_edt(inside)
-        distance = ndimage.distance_transform_edt(~inside)
+        depth, distance = distance_to(~inside), distance_to(inside)
         labels[(depth > band) & (cover > _CERTAIN)] = Label.OBJECT
-        axis = inside & (depth >= ndimage.maximum_filter(depth, _AXIS_WINDOW))
+        axis = inside & (depth >= window_maximum(depth, _AXIS_WINDOW))
         labels[axis & (cover > _AXIS_CERTAIN)] = Label.OBJECT
         labels[(distance > band) & (cover < 1 - _CERTAIN)] = Label.BACKGROUND
     labels[known > 0], labels[known < 0] = Label.OBJECT, Label.BACKGROUND
@@ -133,5 +134,5 @@ def feathered(codes: np.ndarray, mask: np.ndarray) -> np.ndarray:
         guide, mask[..., None].astype(np.float32), np.ones_like(mask), _EPSILON
     )
     soft = np.einsum("hwgc,hwg->hwc", slope, guide)[..., 0] + offset[..., 0]
-    rim = ndimage.binary_dilation(mask, iterations=2) & ~ndimage.binary_erosion(mask, iterations=2)
+    rim = dilated(mask, 2) & ~eroded(mask, 2)
     return np.where(rim, np.clip(soft, 0, 1), mask).astype(np.float32)

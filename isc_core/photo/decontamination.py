@@ -20,6 +20,7 @@ downscaled photo wide, is lost. A shadow that is wider than that stays.
 
 import numpy as np
 
+from ..filters.box import box_average
 from ..filters.extrema import window_maximum, window_minimum
 from ..filters.morphology import eroded
 from ..imaging.bounding_box import mask_slices
@@ -114,8 +115,5 @@ def _limit_outermost(image: np.ndarray, mask: np.ndarray) -> None:
 
 def _means(image: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Weighted means over windows."""
-    from scipy import ndimage  # few photos have a soft mask
-
-    size = (_WINDOW, _WINDOW, 1)
-    total = ndimage.uniform_filter(image * weight, size)
-    return np.asarray(total / np.maximum(ndimage.uniform_filter(weight, size), _LEAST))
+    total, share = (box_average(part, _WINDOW, mirrored=True) for part in (image * weight, weight))
+    return np.asarray(total / np.maximum(share, _LEAST))

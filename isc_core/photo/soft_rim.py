@@ -21,6 +21,7 @@ feathered over a few pixels, and is never soft.
 
 import numpy as np
 
+from ..filters.box import box_average
 from ..filters.components import labelled
 from ..filters.extrema import window_maximum
 from ..imaging.bounding_box import mask_slices
@@ -52,9 +53,7 @@ def soft_rim(share: np.ndarray, mask: np.ndarray, own: bool) -> np.ndarray | Non
     longest = max(mask[mask_slices(mask)].shape)
     window = 2 * _edge(longest, own) + 1
     partly = (share > _PARTLY[0]) & (share < _PARTLY[1])
-    from scipy import ndimage  # few photos have a soft mask
-
-    density = ndimage.uniform_filter(partly.astype(np.float32), window, mode="constant")
+    density = box_average(partly.astype(np.float32), window)
     dense = partly & (density >= _DENSE)
     if dense.sum() < longest:
         return None

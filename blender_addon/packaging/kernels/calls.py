@@ -1,9 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, a turned mesh, filters, a convolution,
-and, in both precisions, averages along paths and SIRFS on a ball of a few pixels call each version
-of each kernel. The first calls of each are kept, with what the arrays held before and after. They
-run on one thread: others would write to these arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, filters, a convolution, a
+minimum cut, and, in both precisions, averages along paths and SIRFS on a ball of a few pixels call
+each version of each kernel. The first calls of each are kept, with what the arrays held before and
+after. They run on one thread: others would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -27,6 +27,7 @@ from isc_core.numerics.jit import Kernel
 from isc_core.numerics.kernel_check import mix, outcome
 from isc_core.numerics.kernel_library import KernelLibrary, flattened
 from isc_core.numerics.lbfgs import LbfgsOptions
+from isc_core.numerics.maximum_flow import source_side
 from isc_core.prior_fitting.roughness import roughness
 from isc_core.result_files.turned_view import turned_view
 from isc_core.scene.normal_estimate import NormalEstimate
@@ -188,6 +189,9 @@ def _run_programs() -> None:
     nearest_pixels(mask)
     spline_coefficients(facing)
     integrate(x, y, mask)
+    ends = rng.integers(0, 30, 99)
+    pull, weight = (rng.integers(low, 9, n).astype(np.int32) for low, n in ((-9, 60), (0, 99)))
+    source_side(pull, ends, ends + rng.integers(1, 30, 99), weight)
     convolved(diffuse[None, :7, :9], rng.normal(size=(9, 3, 5)), rng.normal(size=5))
     for single in (True, False):
         _recover_shape(diffuse, mask, single)

@@ -11,8 +11,8 @@ noise, which an average of F over a few pixels reduces.
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.box import box_average
 from ...imaging.channels import smallest
 
 
@@ -39,7 +39,7 @@ def two_band_shares(
         np.where(valid, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band)
     ]
     if window > 1:
-        layers = [ndimage.uniform_filter(layer, window, mode="constant") for layer in layers]
+        layers = [box_average(layer, window) for layer in layers]
     valid = valid & (layers[2] > 0)
     over = np.where(valid, layers[2], 1)
     red, green = (np.where(valid, layer / over, 0) for layer in layers[:2])

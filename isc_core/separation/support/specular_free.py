@@ -28,8 +28,8 @@ linear, not negative, of any exposure.
 """
 
 import numpy as np
-from scipy import ndimage
 
+from ...filters.extrema import window_minimum
 from ...imaging.channels import largest, smallest
 
 
@@ -117,7 +117,7 @@ def dark_channel(low: np.ndarray, mask: np.ndarray, patch: int) -> np.ndarray:
     (H, W) ndarray
         Infinite where the patch has no pixel of the mask.
     """
-    return ndimage.minimum_filter(np.where(mask, low, np.inf), patch, mode="nearest")
+    return window_minimum(np.where(mask, low, np.inf), patch)
 
 
 def less_dark_channel(image: np.ndarray, mask: np.ndarray, patch: int = 7) -> np.ndarray:

@@ -5,6 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import ndimage
 
+from isc_core.filters.box import box_average
 from isc_core.filters.components import boxes, labelled, means
 from isc_core.filters.correlation import correlated
 from isc_core.filters.distance import distance_to, nearest_pixels
@@ -49,6 +50,23 @@ def test_gaussian_averages_read_any_layout() -> None:
 def test_gaussian_weights_have_the_sum_one() -> None:
     taps = gaussian_taps(2.3)
     assert taps[0] + 2 * taps[1:].sum() == pytest.approx(1, abs=1e-15)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [*SHAPES, (40, 31, 3), (9, 8, 2, 2)])
+def test_means_over_windows_are_those_of_scipy(shape: tuple[int, ...], dtype: type) -> None:
+    image: np.ndarray = np.random.default_rng(3).random(shape).astype(dtype)
+    for size in (1, 3, 5, 9, 23, 41):
+        for mode in ("reflect", "constant"):
+            ours = box_average(image, size, mirrored=mode == "reflect")
+            window = (size, size) + (1,) * (len(shape) - 2)
+            assert ours.dtype == dtype
+            assert_allclose(ours, ndimage.uniform_filter(image, window, mode=mode), rtol=2e-6)
+
+
+def test_the_mean_of_zeros_beside_other_values_is_zero() -> None:
+    image = np.where(np.arange(40) < 20, np.pi * 1e3, 0)[None].repeat(9, axis=0)
+    assert_array_equal(box_average(image, 5)[:, 22:], 0)
 
 
 @pytest.mark.parametrize("periodic", [False, True])
