@@ -1,17 +1,14 @@
-# mypy: disable-error-code="no-untyped-def"
 """Gaussian averages of an image.
 
 Equation: the convolution with g(y) g(x), g(k) = exp(-k^2 / (2 sigma^2)) / sum, cut off at a number
-of standard deviations. Beyond its border the image is mirrored, or zero. One pass over the rows
-averages a row down, rounds it to the image's type, and averages it across. Sums are in float64,
-from the outermost pair of pixels to the innermost.
+of standard deviations. Beyond its border the image is mirrored, or zero (see `separable`).
 
 Limits: the time of a pixel is proportional to sigma.
 """
 
 import numpy as np
 
-from ..numerics.jit import jit
+from .separable import separable_average
 
 _CUT = 4.0  # standard deviations
 
@@ -36,15 +33,7 @@ def gaussian_average(
     (H, W) ndarray
         Of the image's type.
     """
-    taps = gaussian_taps(sigma, cut)
-    rows, columns = (_places(n, len(taps) - 1, mirrored) for n in image.shape)
-    source = np.ascontiguousarray(image)
-    if not mirrored:
-        source = np.concatenate([source, np.zeros_like(source[:1])])
-    line = np.zeros(image.shape[1] + 2 * len(taps) - 1, image.dtype)  # the last value stays zero
-    result = np.empty(image.shape, image.dtype)
-    _average(source, rows, columns, taps, np.empty(image.shape[1]), line, result)
-    return result
+    return separable_average(image, gaussian_taps(sigma, cut), mirrored=mirrored)
 
 
 def gaussian_taps(sigma: float, cut: float = _CUT) -> np.ndarray:
@@ -66,49 +55,3 @@ def gaussian_taps(sigma: float, cut: float = _CUT) -> np.ndarray:
     offsets = np.arange(-radius, radius + 1)
     weights = np.exp(-0.5 / (sigma * sigma) * offsets**2)
     return np.asarray((weights / weights.sum())[radius:])
-
-
-def _places(size: int, radius: int, mirrored: bool) -> np.ndarray:
-    """Index of the pixel that each position from -radius to size + radius - 1 shows."""
-    at = np.arange(-radius, size + radius)
-    if not mirrored:
-        return np.where((at >= 0) & (at < size), at, size)
-    at = at % (2 * size)
-    return np.minimum(at, 2 * size - 1 - at)
-
-
-@jit(types="r[2] i8[1] i8[1] f8[1] f8[1] r[1] r[2]")
-def _average(image, rows, columns, taps, total, line, result):
-    """Average `image` down and across; `rows` and `columns` are the pixels from a radius before the
-    first to a radius beyond the last, `total` and `line` are memory for one row.
-    """
-    radius = len(taps) - 1
-    height, width = result.shape
-    beyond = len(line) - 1
-    inner = line[radius : radius + width]
-    for i in range(height):
-        centre, weight = image[rows[i + radius]], taps[0]
-        for j in range(width):
-            total[j] = centre[j] * weight
-        for k in range(radius, 0, -1):
-            above, below = image[rows[i + radius - k]], image[rows[i + radius + k]]
-            weight = taps[k]  # a local variable: the compiler uses vectors
-            for j in range(width):
-                total[j] += (np.float64(above[j]) + np.float64(below[j])) * weight
-        for j in range(width):
-            inner[j] = total[j]
-        for j in range(radius):
-            first, last = columns[j], columns[radius + width + j]
-            line[j] = line[radius + first if first < width else beyond]
-            line[radius + width + j] = line[radius + last if last < width else beyond]
-        weight = taps[0]
-        for j in range(width):
-            total[j] = inner[j] * weight
-        for k in range(radius, 0, -1):
-            left, right = line[radius - k :], line[radius + k :]
-            weight = taps[k]
-            for j in range(width):
-                total[j] += (np.float64(left[j]) + np.float64(right[j])) * weight
-        row = result[i]
-        for j in range(width):
-            row[j] = total[j]

@@ -9,12 +9,14 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from isc_core.cli.commands import build_parser
 from isc_core.cli.commands.registry import CORE, all_commands
 from isc_core.cli.interface.parser import actions_of
-from tests.core.command_line import ROOT, ball_photo, isc_command
+from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command
 
 NUMERICAL = {"numpy", "scipy", "numba", "cv2", "OpenEXR", "trimesh", "PIL", "mitsuba", "matplotlib"}
 _INTERRUPTS = 15  # over a run
@@ -69,6 +71,19 @@ def test_a_plain_photo_loads_nothing_that_other_photos_need(tmp_path: Path) -> N
     assert not {name.rpartition(".")[2] for name in decoders} & {"jpeg", "tiff", "exr", "avif"}
     packages = {name.split(".")[1] for name in modules if name.startswith("isc_core.")}
     assert not packages & {"batch", "datasets", "editing", "evaluation", "refinement"}
+
+
+def test_a_photo_whose_mask_is_searched_loads_no_scipy(tmp_path: Path) -> None:
+    codes = (ball_codes() >> 8).astype(np.uint8)
+    y, x = np.indices(codes.shape[:2])
+    table = np.stack([90 + y, 80 + x, 140 - y], axis=2).astype(np.uint8)
+    Image.fromarray(np.where(codes.any(axis=2)[..., None], codes, table)).save(
+        tmp_path / "ball.jpg"
+    )
+    given = str(tmp_path / "ball.jpg"), "--box", "3,3,46,46"
+    modules = loaded("decompose", *given, "-o", str(tmp_path / "result"), "--quiet")
+    assert {"isc_core.masking.search", "isc_core.numerics.maximum_flow"} <= modules
+    assert "scipy" not in modules
 
 
 def test_a_command_of_the_core_does_not_search_other_packages() -> None:
