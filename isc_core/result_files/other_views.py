@@ -20,7 +20,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..filters.morphology import opened_by_blocks
+from ..filters.distance import distances, nearest_pixels
+from ..filters.morphology import eroded, opened_by_blocks
 from ..imaging.luminance import luminance
 from ..photo.camera import Camera
 from ..scene.decomposition import Decomposition
@@ -40,6 +41,7 @@ from .turned_view import turned_view
 
 ANGLE = 30.0  # degrees
 _STEP = 2  # pixels of the panel between vertices of the turned mesh
+_RIM = 3  # pixels of the panel, whose colours are not those of the surface
 _KEY, _FILL = 0.85, 0.15  # shares of the new light
 _NARROWEST = 0.03  # alpha: narrower highlights are smaller than a panel's pixel
 
@@ -70,16 +72,31 @@ def turned_panels(
         empty = np.zeros((SIDE, SIDE))
         return [Panel(np.zeros((SIDE, SIDE, 3)), empty, name, "too thin") for name in names]
     body, vertices = found
+    diffuse = _without_rim(small["diffuse"], frame.coverage > 0.5)
     places = (body.texture + 0.5) * _STEP - 0.5
 
     def panel(name: str, yaw: float) -> Panel:
-        texture = small["diffuse"] + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
+        texture = diffuse + _highlights(d.brdf, frame, small, VIEW @ turn(yaw), None)
         room = 1 - 2 * MARGIN
         view = turned_view(vertices, body.faces, places, yaw, SIDE, 1.0, room, True, texture)
         return Panel(gain * view.values, view.coverage, name, f"{ANGLE:.0f}°, sides are a guess")
 
     with ThreadPoolExecutor(2) as pool:
         return list(pool.map(panel, names, (ANGLE, -ANGLE)))
+
+
+def _without_rim(image: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """An image (N, N, C) whose outermost pixels have the colours next to them.
+
+    The triangles that join front and sides alternate between the outline and the pixels near it: a
+    rim of another colour, such as a mixture with the background, would look like a comb.
+    """
+    inner = eroded(inside, _RIM)
+    if not inner.any():
+        return image
+    nearest = nearest_pixels(inner)
+    near = distances(*nearest) <= 2 * _RIM  # thin parts keep their own colours
+    return np.where((near & ~inner)[..., None], image[nearest], image)
 
 
 def _coarse_body(

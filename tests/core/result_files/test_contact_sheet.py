@@ -145,6 +145,21 @@ def test_from_the_left_the_left_side_is_seen() -> None:
     assert columns["from the right"] < columns["input"] < columns["from the left"]
 
 
+def test_a_rim_of_another_colour_does_not_line_the_sides(scene: Decomposition) -> None:
+    """Pixels at the outline mix with the background; a thin part keeps its colour."""
+    row, column = np.indices(scene.mask.shape)
+    radius = np.hypot(row - 300, column - 320)
+    green = scene.shading * np.array([0.2, 0.8, 0.2])
+    diffuse = np.where((radius > 247)[..., None], np.array([1.0, 0, 0]), green)
+    thin = (np.abs(row - 300) < 7) & (np.abs(column - 320) < 310) & (radius > 250)
+    diffuse[thin] = 0, 0, 1
+    sheet = contact_sheet(replace(scene, diffuse=diffuse, mask=scene.mask | thin))
+    turned = panels(sheet)["from the left"]
+    light = turned.sum(axis=2)
+    assert not (turned[..., 0] > 0.5 * light)[light > 0.2].any()
+    assert (turned[..., 2] > 0.6 * light)[light > 0.2].sum() > 50
+
+
 def test_the_new_light_comes_from_the_other_side(
     shown: dict[str, np.ndarray], scene: Decomposition
 ) -> None:
