@@ -11,8 +11,8 @@ Citation: D. Greig, B. Porteous, A. Seheult, "Exact maximum a posteriori estimat
 images", Journal of the Royal Statistical Society B 51 (1989),
 doi:10.1111/j.2517-6161.1989.tb01764.x; the flow: see `numerics.maximum_flow`.
 
-Limits: costs are rounded to multiples of 1 / `SCALE`. The time grows faster than the number of
-pixels: some 100,000 take seconds.
+Limits: costs are rounded to multiples of 1 / `SCALE`. The time grows with the noise of the costs,
+and somewhat faster than the number of pixels: some 100,000 take a quarter of a second.
 """
 
 import numpy as np

@@ -140,7 +140,7 @@ class SceneNetwork(PhotoNetwork):
         """
         found, levels = self.forward(np.stack([channels_of(*frame) for frame in frames]))
         return [
-            RawPrediction(maps, self._light(list(own), mask))
+            RawPrediction(maps, self._light(own, mask))
             for maps, *own, (_, mask) in zip(found, *levels, frames, strict=True)
         ]
 

@@ -96,7 +96,7 @@ def _without_rim(image: np.ndarray, inside: np.ndarray) -> np.ndarray:
         return image
     nearest = nearest_pixels(inner)
     near = distances(*nearest) <= 2 * _RIM  # thin parts keep their own colours
-    return np.where((near & ~inner)[..., None], image[nearest], image)
+    return np.where(near[..., None], image[nearest], image)
 
 
 def _coarse_body(
