@@ -401,6 +401,21 @@ def test_public_dataclasses_document_their_fields() -> None:
     assert not silent, "\n".join(silent)
 
 
+def test_dataclasses_with_arrays_compare_by_identity() -> None:
+    """The generated `==` raises for arrays, and takes time at each start."""
+    compared = []
+    for path in sources(*PACKAGES):
+        for node in ast.walk(parsed(path)):
+            if not isinstance(node, ast.ClassDef):
+                continue
+            made = [ast.unparse(one) for one in node.decorator_list]
+            fields = [one.annotation for one in node.body if isinstance(one, ast.AnnAssign)]
+            holds = any(re.search(r"ndarray|torch\.Tensor", ast.unparse(one)) for one in fields)
+            if holds and any("dataclass" in one and "eq=False" not in one for one in made):
+                compared.append(f"{where(path, node)} {node.name}")
+    assert not compared, "\n".join(compared)
+
+
 def test_lines_have_at_most_100_columns() -> None:
     """Ruff checks the length of every line (E501), also of docstrings and comments."""
     ruff = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["ruff"]

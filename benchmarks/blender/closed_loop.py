@@ -121,7 +121,7 @@ class RelitRow:
     gain: float
 
 
-@dataclass
+@dataclass(eq=False)
 class Renders:
     """The renders of one result, made on demand and kept in a file.
 

@@ -49,7 +49,7 @@ _SKY_ROWS = 32
 _PARTS = ("sky", "sun_direction", "sun_irradiance", "image", "diffuse")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RelitTruth:
     """A rendered scene under a new light.
 

@@ -19,7 +19,7 @@ ROUND, REACH = 1.0, 8
 _BELOW = 0.5  # pixels between the part in front and what goes on under it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Steps:
     """Where the depth jumps.
 

@@ -37,7 +37,7 @@ _PATTERNS, _SEED, _NOISE, _BRIGHT = 60, 5, 0.004, 0.85
 _HALF = views.SIDE / 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SeenBody:
     """A body, its photo and what is found in it.
 

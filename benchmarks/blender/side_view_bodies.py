@@ -33,7 +33,7 @@ _FILL = 0.25
 _SIDE, _ROOM = 120, 0.8  # pixels of the photo, and the share of it that the body may fill
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """A body in the pixels of its photo.
 

@@ -50,7 +50,7 @@ _GREY = 0.2
 _SHEET = (880, 528)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Drawn:
     """A mesh with colours, in the pixels of the photo.
 

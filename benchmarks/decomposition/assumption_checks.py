@@ -36,7 +36,7 @@ _LAMPS = ("no lamp", "one lamp", "several lamps")
 _SIZE = 32  # photos of a batch
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LitTruth:
     """What is known of a lit body.
 
@@ -54,7 +54,7 @@ class LitTruth:
     toward: np.ndarray | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CheckedPhoto:
     """A photo to check.
 

@@ -44,7 +44,7 @@ _CLIPPED = 254.5 / 255
 _ROUNDS = 30  # of weighted least squares
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Truth:
     """A photo and what is true of it.
 
@@ -65,7 +65,7 @@ class Truth:
     log_reflectance: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solved:
     """Evidence and errors of one photo's N pixels.
 

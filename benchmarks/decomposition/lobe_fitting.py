@@ -53,7 +53,7 @@ _LEVEL = 0.6
 CALIBRATED = 123  # scenes before this one were used to calibrate `brdf.fitting.recovered`
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LobeScene:
     """A rendered scene.
 

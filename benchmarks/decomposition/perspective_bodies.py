@@ -30,7 +30,7 @@ _GLOSS = 80.0  # Blinn-Phong exponent
 Field = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """A photo and what it shows.
 

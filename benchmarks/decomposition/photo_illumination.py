@@ -54,7 +54,7 @@ _BALANCE_ERROR = 0.12  # deviation of each channel's log
 BALANCES = ("card", "camera")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """A photo of a held-out body, and its truth.
 

@@ -55,7 +55,7 @@ _FOURTH = np.sqrt(1 / np.pi) * np.array(
 _COSINE = np.repeat([np.pi, 2 * np.pi / 3, np.pi / 4, -np.pi / 24], [1, 3, 5, 9])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lamp:
     """A distant lamp.
 
@@ -74,7 +74,7 @@ class Lamp:
     radius: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Room:
     """Light from all around and lamps.
 
@@ -108,7 +108,7 @@ class Gloss:
     alpha: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReachingLight:
     """The light that reaches the places of a coarse grid.
 

@@ -60,7 +60,7 @@ class Part(NamedTuple):
     tilt: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PartMap:
     """A surface that tiles, one pixel of the photo a pixel.
 

@@ -37,7 +37,7 @@ _SIGMA = 4.0  # pixels: fine changes are shorter
 _DARK = 1e-3  # of the mean reflectance
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crop:
     """The part of a result that a sheet shows.
 

@@ -41,7 +41,7 @@ class ReliefKind(StrEnum):
     CELLS = "cells"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReliefMap:
     """A height map that tiles, one pixel of the photo a pixel.
 

@@ -52,7 +52,7 @@ class SetKind(StrEnum):
     DRAWN = "drawn"  # print of parts on a smooth body
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DetailScene:
     """A photo with its truth.
 
@@ -78,7 +78,7 @@ class DetailScene:
     facts: dict[str, object]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Plan:
     """All that is drawn for one photo."""
 

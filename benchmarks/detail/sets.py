@@ -44,7 +44,7 @@ class Part(StrEnum):
 _SEEDS = {Part.VALIDATION: 0, Part.LIGHTS: 0, Part.TEST: 1}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Truth:
     """What is known of a photo.
 

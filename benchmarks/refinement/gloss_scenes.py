@@ -42,7 +42,7 @@ _MATT = 8
 _LEVEL, _UNCLIPPED, _DISTANCE = 0.6, 0.985, 12.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GlossScene:
     """A rendered scene.
 

@@ -56,7 +56,7 @@ _BLUR, _POINTS = 12.0, 2500
 _MAPS = ("diffuse", "reflectance", "shading", "normal", "height", "mask", "environment")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Step:
     """A step of the ladder.
 

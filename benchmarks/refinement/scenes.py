@@ -39,7 +39,7 @@ _MAPS = ("image", "reflectance", "shading", "mask")
 _SAMPLES, _LEVEL, _BEAM = 64, 0.6, 12.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RefinementScene:
     """A rendered scene.
 

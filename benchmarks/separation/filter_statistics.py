@@ -50,7 +50,7 @@ _PRIOR_COUNT = 2.0  # pixels added to every bin, per thousand
 _TESTS = ("test_objects", "test_materials", "test_lights", "test")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample:
     """Filter outputs of a scene.
 

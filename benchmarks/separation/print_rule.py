@@ -39,7 +39,7 @@ _RIDGE = 0.01
 _FOLDS = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Regions:
     """The regions of light taken off one photo, K of them.
 

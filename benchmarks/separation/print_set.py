@@ -82,7 +82,7 @@ class Part(StrEnum):
 _SEED_WORDS = {Part.TRAINING: "fit", Part.VALIDATION: "choice", Part.TEST: "report"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PrintScene:
     """A photo of a painted body.
 

@@ -52,7 +52,7 @@ _LEAST_PIXELS = 1500
 METRICS = ("normals", "shading", "shading, colour aside")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lit:
     """A photo of a held-out body.
 

@@ -38,7 +38,7 @@ from training.tabletops.scenes import OBJECT, ONE_OBJECT, TabletopScene, Tableto
 from training.tabletops.sources import TabletopSources
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TabletopPhoto:
     """A photo and its ground truth.
 

@@ -18,7 +18,7 @@ from ..files.result_arrays import ResultArrays
 UV, NORMAL, CONFIDENCE = "UVMap", "custom_normal", "confidence"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshGeometry:
     """A mesh in Blender's axes.
 
@@ -46,7 +46,7 @@ class MeshGeometry:
     normals: np.ndarray | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshArrays:
     """A mesh in the layout of Blender's attributes, so that it is filled in milliseconds.
 

@@ -45,7 +45,7 @@ _UNSUPPORTED_SOURCES = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ImageSource:
     """How an image leaves Blender.
 

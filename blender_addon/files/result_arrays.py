@@ -80,7 +80,7 @@ _MAX_LAMPS = 3
 _FORMER_NAMES = {"environment_map": "sky"}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResultArrays:
     """One decomposition. Arrays are float32 unless stated otherwise.
 

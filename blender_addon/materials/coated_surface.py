@@ -29,7 +29,7 @@ from ..files.result_arrays import ResultArrays
 _COEFFICIENTS = 27  # of the illumination
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RecoveredLight:
     """The part of the recovered light that a specular layer needs.
 

@@ -65,7 +65,7 @@ class ColorEdit:
         return bool(np.abs(np.subtract(self.values, (0.5, 1.0, 1.0))).max() <= UNCHANGED)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColorSource:
     """The colours of an image, for another thread.
 

@@ -13,7 +13,7 @@ from .light_fit import fit_light
 Solver = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BaselineEstimate:
     """A shape and a light, from which the pipeline derives normals, shading and reflectance so
     that its identities hold.

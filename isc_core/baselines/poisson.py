@@ -30,7 +30,7 @@ _MAX_STEPS = 200
 _RIDGE = 1e-9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Level:
     """One grid: its operator, the inverse of its diagonal, the interpolation from the next coarser
     grid, and its adjoint.
@@ -42,7 +42,7 @@ class _Level:
     down: Ellpack
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Multigrid:
     levels: list[_Level]
     coarsest_inverse: np.ndarray

@@ -23,7 +23,7 @@ _IMAGE_SUFFIXES = (".exr", ".png", ".bmp", ".tif", ".tiff")
 _MULTILAYER = ("maps.exr", "truth.exr")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SeparationTruth:
     """A photo with its true layers.
 

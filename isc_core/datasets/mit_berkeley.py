@@ -30,7 +30,7 @@ _FOLDERS = {
 _WHITE = 65535.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MitBerkeleyObject:
     """One object under one illumination, on the evaluation crop (h, w); row 0 at the top, float64.
 

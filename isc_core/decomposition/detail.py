@@ -79,7 +79,7 @@ _SIGMA = 0.2829  # of the low pass over the period of which it keeps half
 _DARK = 0.01  # of the object's mean light
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Level:
     """One level of a photo.
 
@@ -109,7 +109,7 @@ class Level:
         return Level(image, mask)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Smooth:
     """Smooth maps of a level, interpolated on demand.
 
@@ -221,7 +221,7 @@ def fine_relief(
     return pyramid.relief(finest, monitor, tile, added)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pyramid:
     """The levels of a photo with what is known of its smooth surface.
 

@@ -69,7 +69,7 @@ class Calibration:
 CALIBRATION = Calibration(7.337, 0.723, 0.780, 0.660, 1.015)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Quantities that predict the errors, at N pixels.
 

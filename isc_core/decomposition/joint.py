@@ -111,7 +111,7 @@ class JointOptions:
     odds: float = HIGHLIGHT_ODDS
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualHighlights:
     """Highlights that a separation by colour has left.
 
@@ -151,7 +151,7 @@ class SupportedLayers:
         return self.split.diffuse if self.residual is None else self.residual.diffuse
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class JointStep:
     """Shape and light of D_1, and the diffuse image after the step.
 

@@ -46,7 +46,7 @@ _DESATURATION = 0.1  # chosen on held-out objects; docs/methods/light_colour.md
 _LEAST_WEIGHT = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Shape:
     """Recovered shape and light.
 

@@ -100,7 +100,7 @@ class SolveOptions:
     light_colour_weight: LightColourWeight = BALANCED_LIGHT
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DecompositionTask:
     """One photo to be decomposed.
 
@@ -161,7 +161,7 @@ class DecompositionTask:
         return self.maps is self.working
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SceneEstimate:
     """What a model recovers from a photo.
 

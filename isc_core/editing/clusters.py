@@ -30,7 +30,7 @@ _REGULARISATION = 1e-3  # of the white's square: contrasts of the reflectance be
 _SOFT_RANGE = 0.7  # width of the soft range: shares within 15 % of 0 and 1 become 0 and 1
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Clusters:
     """Clusters of reflectance.
 

@@ -39,7 +39,7 @@ _BOX_TOLERANCE = 3.0  # pixels of the maps: tolerance between the two boxes
 _BORDER = 5  # pixels of the maps around the object: beyond the tolerance and interpolation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EditedPart:
     """The part of a photo with its object, after an edit.
 

@@ -171,7 +171,7 @@ def save_edit(
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Picture:
     """An edited picture: the part with the object, in linear light, and the stored values of all of
     it.

@@ -23,7 +23,7 @@ MOST_GAIN = 1e6  # largest gain of a layer
 _MOST_LIGHT = 1e30  # far below the range of single precision
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Edited:
     """The layers of an edited scene.
 

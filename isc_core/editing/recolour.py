@@ -25,7 +25,7 @@ from .chroma import from_oklab, to_oklab
 from .edited import Edited, edited, light_color
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColourEdit:
     """A change of colour. Raises `InputError` outside these ranges.
 

@@ -47,7 +47,7 @@ _LOBE_ROWS = 16  # of environment maps for lobes, where each sample is expensive
 _FADE = 10.0  # degrees of a light's rotation over which highlights change from kept to rendered
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NewLight:
     """A light of exactly one of three kinds; raises `InputError` otherwise.
 

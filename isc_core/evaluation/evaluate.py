@@ -42,7 +42,7 @@ _HEADINGS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """A method's estimate for one object, on the object's crop.
 

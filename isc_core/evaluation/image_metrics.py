@@ -114,7 +114,7 @@ def highlight_region(specular: np.ndarray, mask: np.ndarray) -> np.ndarray:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sparsification:
     """The remaining error as the least confident pixels are removed.
 

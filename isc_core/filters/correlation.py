@@ -27,12 +27,26 @@ def correlated(
     float64 ndarray
         Of the array's shape.
     """
-    radius, count = len(taps) // 2, values.shape[axis]
+    radius = len(taps) // 2
     sign = 1.0 if np.array_equal(taps, taps[::-1]) else -1.0
-    width = [(radius, radius) if k == axis % values.ndim else (0, 0) for k in range(values.ndim)]
-    padded = np.moveaxis(np.pad(values, width, mode="wrap" if periodic else "constant"), axis, 0)
-    total = taps[radius] * padded[radius : radius + count].astype(float)
+    lines = np.moveaxis(values, axis, 0)
+    total = np.multiply(lines, taps[radius], dtype=float)
+    pair = np.empty_like(total)
     for k in range(radius, 0, -1):
-        before, beyond = padded[radius - k :][:count], padded[radius + k :][:count]
-        total += taps[radius - k] * (before + sign * beyond)
+        _write_pair_sums(pair, lines, k, sign, periodic)
+        pair *= taps[radius - k]
+        total += pair
     return np.moveaxis(total, 0, axis)
+
+
+def _write_pair_sums(
+    pair: np.ndarray, lines: np.ndarray, k: int, sign: float, periodic: bool
+) -> None:
+    """Write x[i - k] + sign x[i + k] to `pair`; no copy of the array is padded."""
+    inside = max(len(lines) - k, 0)
+    add = np.add if sign > 0 else np.subtract
+    pair[k:] = lines[:inside]
+    pair[:k] = lines[inside:] if periodic else 0
+    add(pair[:inside], lines[k:], out=pair[:inside])
+    if periodic:
+        add(pair[inside:], lines[:k], out=pair[inside:])

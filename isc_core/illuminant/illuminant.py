@@ -72,7 +72,7 @@ class IlluminantOptions:
     min_confidence: float = 0.5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Illuminant:
     """The estimated colour of the light.
 
@@ -96,7 +96,7 @@ class Illuminant:
         return self.outcome == IlluminantOutcome.DETERMINED
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Changes:
     """`colour` and `change` (N, 3) in units of the bright pixels' intensity, the change upward;
     `block` (N,).

@@ -16,7 +16,7 @@ from ..numerics.ellpack import Ellpack
 from .bounding_box import mask_slices
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AreaFilter:
     """Integrate an (H, W) array over square pixels of side 1 / factor, exactly.
 

@@ -26,7 +26,7 @@ _REACH = 2.5  # standard deviations
 _TINY = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pass:
     """Averaging along one axis."""
 

@@ -65,7 +65,7 @@ class CshOptions:
     threads: int = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Patches:
     """Patches of one image, by their upper left corners in raster order.
 
@@ -87,7 +87,7 @@ class Patches:
         return len(self.rows)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Matches:
     """The matches of target patches.
 

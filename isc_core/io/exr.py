@@ -30,7 +30,7 @@ _LARGE = 1 << 20  # pixels
 _MOST_THREADS = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WindowedChannels:
     """The channels of a file that stores a part of its frame.
 

@@ -45,7 +45,7 @@ _MIN_EXPLAINED = 0.25
 _MIN_PEAK_PIXELS = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Candidate:
     """An alpha with its strength (mean of the channels), loss, residual and weights (N,)."""
 

@@ -26,7 +26,7 @@ _RINGS, _SPOKES = 7, 9
 _GRID = 81  # table of normals on a disc
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SplitEnvironment:
     """A split environment map.
 

@@ -46,7 +46,7 @@ _TYPICAL_NEARNESS, _NEARNESS_WEIGHT = (
 )  # weak prior of q, for images that do not determine it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lamps:
     """K lights and a lobe.
 
@@ -120,7 +120,7 @@ class Problem:
         return -np.ones((1, len(normal))) if self.thresholded else mirrored_basis(normal)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fitted:
     """A minimum.
 

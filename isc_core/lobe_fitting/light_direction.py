@@ -78,7 +78,7 @@ class DirectionEstimate:
         return self.explained >= _MIN_SHARE and self.cone <= _MAX_CONE
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Samples:
     """Pixels of the object: `normal`, `values` (N, 3), the `block` (N,) of each, and `scale`, the
     error above which the loss is linear.

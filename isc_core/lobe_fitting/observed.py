@@ -12,7 +12,7 @@ from ..scene.light_estimate import LightEstimate
 from ..shading.brdf.directions import unit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PixelData:
     """Optional data for the pixels of a specular image.
 
@@ -31,7 +31,7 @@ class PixelData:
     height: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GivenLight:
     """Known light: at most one of the two attributes.
 
@@ -47,7 +47,7 @@ class GivenLight:
     environment: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RecoveredScene:
     """Quantities recovered from the same photo as the specular image, see `recovered`.
 
@@ -66,7 +66,7 @@ class RecoveredScene:
     light_estimate: LightEstimate | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SurfacePositions:
     """Surface positions of the pixels, in radii of the object (half of the longer side of the
     mask's bounding box) from the centre of that box.
@@ -103,7 +103,7 @@ class SurfacePositions:
         return np.stack([column - middle_column, middle_row - row, depth], axis=1) / self.radius
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Observed:
     """A validated specular image.
 

@@ -20,7 +20,7 @@ _BRIGHT, _DARK = 0.03, 1e-3  # of the peak
 _PEAK_PIXELS = 5  # the peak is their mean: a single hot pixel is not a highlight
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pixels:
     """N pixels.
 

@@ -22,7 +22,7 @@ from ..shading.brdf.ggx import F0, density
 _MIN_COSINE = 1e-6  # smaller cosines are below the horizon
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Response:
     """The response of a lobe, with derivatives.
 

@@ -57,7 +57,7 @@ class _Layer:
         return np.asarray(facets * _fresnel(cosine, self.f0))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpecularLayer:
     """Light that the specular layer of an object removes and adds, for the photo's light and view.
 
@@ -122,7 +122,7 @@ class SpecularLayer:
         return _under(colors, enlarged(self.effect, colors.shape[:2], factor, (first, 0)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoatedSurface:
     """A surface with a specular layer, in the recovered light.
 

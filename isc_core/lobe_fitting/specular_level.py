@@ -72,7 +72,7 @@ class SpecularSource(StrEnum):
     GIVEN = "given"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SpecularFit:
     """Specular parameters of a renderer; None where unknown.
 

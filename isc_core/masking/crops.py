@@ -87,7 +87,7 @@ def cut_to_box(cover: np.ndarray, box: Box) -> np.ndarray:
     return cut
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CropPrediction:
     """The network's prediction for a crop of a photo.
 

@@ -25,7 +25,7 @@ from .loader import Network, Parameters
 BLOCK = 4  # side of a block, pixels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EncoderDecoder(Network):
     """A network that predicts maps from a photo. Raises `InputError` if the parts do not match.
 
@@ -126,7 +126,7 @@ class EncoderDecoder(Network):
         return depth_to_space(convolved(layers, *next(steps)), BLOCK), levels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhotoNetwork(EncoderDecoder):
     """A network that also makes a global prediction for the photo.
 

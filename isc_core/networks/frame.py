@@ -14,7 +14,7 @@ from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarge_inside
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NetworkFrame:
     """The input of a network.
 

@@ -50,7 +50,7 @@ class HighlightNetwork(EncoderDecoder):
     inputs, outputs = INPUTS, len(REACHES)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HighlightPrediction:
     """The network's prediction of a photo's highlights.
 

@@ -20,7 +20,7 @@ from .layers import weights_in
 AnyNetwork = TypeVar("AnyNetwork", bound="Network")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parameters:
     """The content of an archive.
 

@@ -86,7 +86,7 @@ class MaskNetwork(PhotoNetwork):
         return maps[..., 0], counts
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MaskPrediction:
     """The network's prediction for a photo.
 

@@ -88,7 +88,7 @@ class Kind(StrEnum):
 TEMPERATURES = ("normal", "ratio", "shading", "light")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RawPrediction:
     """Output of the network in its own frame.
 
@@ -176,7 +176,7 @@ def channels_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.concatenate([inputs_of(image, mask), place], axis=2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LayerPrediction:
     """The network's prediction of a photo's layers.
 
@@ -194,7 +194,7 @@ class LayerPrediction:
     log_shading: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScenePrediction:
     """The network's prediction for a photo.
 

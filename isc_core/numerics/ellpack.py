@@ -16,7 +16,7 @@ import numpy as np
 from .jit import jit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ellpack:
     """A matrix (n, m) with at most K entries in each row.
 

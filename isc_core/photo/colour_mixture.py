@@ -20,7 +20,7 @@ _NOISE = 0.1  # added to the variances of codes, so that uniform colours have so
 _TINY = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColourMixture:
     """A mixture of K Gaussians.
 

@@ -8,7 +8,7 @@ import numpy as np
 FOUND = ("automatic", "hints", "each")  # their values of `PhotoSource.mask_from`
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FoundMask:
     """A mask that was found.
 

@@ -52,7 +52,7 @@ class PhotoSource:
     confidence: float | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Photo:
     """One photo of an object.
 

@@ -18,7 +18,7 @@ from ..sirfs.silhouette import silhouette_coordinates
 BINS = 16
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SilhouetteMoments:
     """Moments of one object.
 

@@ -16,7 +16,7 @@ from .pairs import pair_differences
 from .silhouette import SilhouetteMoments
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TrainingObject:
     """An object whose intrinsic characteristics are known.
 
@@ -44,7 +44,7 @@ class TrainingObject:
     laboratory_light: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObjectStatistics:
     """One object's contribution to every prior.
 

@@ -47,7 +47,7 @@ _MIN_DISTANCE = 3  # pixels
 _LAMP_UNKNOWNS = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GlossProblem:
     """The data of the fit of a gloss.
 
@@ -160,7 +160,7 @@ def bumps_of(work: WorkingScale, step: int = 1) -> HeightBumps:
     return HeightBumps.spaced((height, width), spacings, _SLOPES, step)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Minimiser:
     """Minimises F, or takes the minimum from an earlier run.
 

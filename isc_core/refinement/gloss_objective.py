@@ -44,7 +44,7 @@ _ALPHAS = (0.02, 0.9)
 _LOG_STRENGTHS = (-60.0, 30.0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GlossData:
     """The data to which the gloss is fitted, at a working scale.
 
@@ -89,7 +89,7 @@ class GlossData:
         return float(np.log(_LEVEL * self.peak))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Gloss:
     """Lamps, lobe and shape change.
 

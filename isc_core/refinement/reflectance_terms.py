@@ -22,7 +22,7 @@ _DARKEST = 1e-4  # of the diffuse image, where white is 1
 _ILLUMINATIONS = ("photo", "natural", "laboratory")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReflectanceTerms:
     """The terms g of a diffuse image.
 

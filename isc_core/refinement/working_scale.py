@@ -20,7 +20,7 @@ _CLIPPED = 0.995  # of the brightest value
 _MIN_Z = 1e-3  # of a normal's z
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class WorkingScale:
     """The maps of a result over the bounding box of its object, downsampled.
 

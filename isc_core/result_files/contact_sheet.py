@@ -251,7 +251,7 @@ def comparison_sheet(
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MapPanel:
     """A map of the object on a sheet.
 

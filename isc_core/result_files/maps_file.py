@@ -133,7 +133,7 @@ def write_environment(radiance: np.ndarray, folder: Path) -> None:
     write_channels(folder / ENVIRONMENT, _planes(radiance, list("RGB")))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StoredMaps:
     """The channels of a file `maps.exr`.
 

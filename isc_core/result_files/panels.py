@@ -13,7 +13,7 @@ SIDE = 320  # pixels
 MARGIN = 0.06  # room around the object, of the panel's side
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Panel:
     """One picture of a sheet.
 
@@ -35,7 +35,7 @@ class Panel:
     keys: tuple[tuple[str, tuple[int, int, int]], ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Frame:
     """Placement of a map in a panel: the object's bounding box, scaled and centred.
 

@@ -32,7 +32,7 @@ _EDGE = -1e-9  # tolerance of the barycentric coordinates of a pixel centre insi
 _FEWEST = 1e-12  # twice the smallest area of a visible triangle, subpixels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """Picture of a mesh.
 

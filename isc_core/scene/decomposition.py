@@ -20,7 +20,7 @@ from .expected_error import ExpectedError
 from .lobe_fit import LobeFit
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Separation:
     """One photo split into its layers: `image = diffuse + specular + residual` inside the mask.
 
@@ -105,7 +105,7 @@ class IdentityErrors:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Decomposition:
     """The intrinsic scene characteristics of one photo.
 

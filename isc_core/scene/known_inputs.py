@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KnownInputs:
     """Known quantities of a scene as a user supplies them, at the photo's full size.
 
@@ -30,7 +30,7 @@ class KnownInputs:
     depth_weight: float = 10.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DepthObservation:
     """Heights from another source, such as a depth sensor: a map with holes.
 
@@ -49,7 +49,7 @@ class DepthObservation:
     weight: float = 10.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SceneConstraints:
     """What SIRFS takes as given, each at the image's scale; read inside the mask only.
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightCoefficientsEstimate:
     """Predicted light of a photo.
 

@@ -33,7 +33,7 @@ def mirrored_places() -> np.ndarray:
     return np.argmax((PLACES * (-1, 1, 1)) @ PLACES.T, axis=1)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightEstimate:
     """Predicted lamps of a photo.
 

@@ -75,7 +75,7 @@ class LobeFitOptions:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Interval:
     """Interval that contains the truth with a probability of 68 %.
 
@@ -89,7 +89,7 @@ class Interval:
     high: float | np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LobeLight:
     """One light of a lobe fit.
 
@@ -113,7 +113,7 @@ class LobeLight:
     interval: Interval
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LobeFit:
     """A lobe and its lights.
 

@@ -114,7 +114,7 @@ VARIANTS: dict[str, SparseCodingOptions] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Invariants:
     """Highlight-invariant coordinates: `alpha` (H, W), the length of a pixel's component
     orthogonal to h, `hue` (H, W), its angle in turns, [0, 1). What highlights raise:
@@ -127,7 +127,7 @@ class _Invariants:
     mask: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Dictionary:
     """Tables by hue (k,).
 
@@ -145,7 +145,7 @@ class _Dictionary:
         return table[below % len(table)] * (1 - share) + table[(below + 1) % len(table)] * share
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stages:
     """Intermediate maps of the grouped code, (H, W) each, 0 outside the mask.
 
@@ -388,7 +388,7 @@ def _grouped(free: _Invariants, dictionary: _Dictionary, options: SparseCodingOp
     return result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _PixelCues:
     """Cues of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom;
     `spread`, the scatter of the atom's pixels, and `excess` above the atom, both as logarithms of

@@ -29,7 +29,7 @@ VIEW = np.array([0.0, 0.0, 1.0])
 _EXACT = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DirectionalLight:
     """One distant light with an ambient part.
 

@@ -20,7 +20,7 @@ from ..filters.extrema import window_maximum
 RADIUS = 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Contour:
     """Points of an occluding contour.
 

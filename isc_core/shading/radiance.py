@@ -28,7 +28,7 @@ from .spherical_harmonics import real_sh
 _MOST_VALUES = 1 << 16  # of the model at a time, unless one light has more
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DistantLights:
     """K distant lights.
 

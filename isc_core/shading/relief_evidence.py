@@ -63,7 +63,7 @@ _NOTHING, _ALL = 0.3, 0.6  # probabilities: up to the one nothing is added, from
 _TINY = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Evidence of blocks.
 

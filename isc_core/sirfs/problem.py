@@ -28,7 +28,7 @@ PAIR_OFFSETS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Problem:
     """A SIRFS problem.
 
@@ -99,7 +99,7 @@ class Terms:
         return sum(self.__dict__.values())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evaluation:
     """Terms of the objective, and the gradients of their sum.
 

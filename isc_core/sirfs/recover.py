@@ -72,7 +72,7 @@ class RecoverOptions:
     solver: SolverOptions = field(default_factory=SolverOptions)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recovered:
     """Shape and light of an image, at the image's scale.
 

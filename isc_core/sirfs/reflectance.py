@@ -79,7 +79,7 @@ def smoothness_cost(
     return scale * total, (gradient @ priors.smoothness_whiten.T.astype(gradient.dtype)) * t(scale)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Splat:
     """Multilinear weights of n samples on the occupied part of a grid.
 

@@ -27,7 +27,7 @@ from .precision import scaled_precision
 _MIN_DEVIATION = 0.03  # of log shading: predictions are not more accurate; bounds 1 / s^2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExpectedShading:
     """Expected log shading.
 

@@ -34,7 +34,7 @@ _MAX_IN_PLANE = 0.99  # largest in-plane part of a normal
 _SMOOTHING = 0.05
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExpectedNormals:
     """Expected normals, each (H, W); 0 outside the mask.
 
@@ -51,7 +51,7 @@ class ExpectedNormals:
     precision: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SilhouetteNormals(ExpectedNormals):
     """Normals expected from a silhouette, and the height map that they integrate to.
 

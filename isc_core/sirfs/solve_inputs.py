@@ -15,7 +15,7 @@ from ..scene.normal_estimate import NormalEstimate
 from ..scene.shading_estimate import ShadingEstimate
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SolveInputs:
     """The input maps of a problem, all at one scale.
 

@@ -69,7 +69,7 @@ class SolverOptions:
     lbfgs: LbfgsOptions = field(default_factory=lambda: LbfgsOptions(loss_tolerance=1e-4))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SirfsResult:
     """Solution of a problem.
 

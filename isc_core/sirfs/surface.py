@@ -30,7 +30,7 @@ CONTOUR_FACTOR = 60.0
 CONTOUR_CLOSE = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Geometry:
     """Local geometry of a height map, each (H, W).
 

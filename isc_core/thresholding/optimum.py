@@ -8,7 +8,7 @@ import numpy as np
 from ..errors import InputError
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Optimum:
     """The best thresholds found.
 

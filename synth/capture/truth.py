@@ -35,7 +35,7 @@ _RIDGE = 1e-4  # of the mean curvature, on all coefficients but the constant one
 _DARKEST = 1e-6  # of the mean shading
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GroundTruth:
     """Maps of the whole frame, float32, row 0 at the top; outside the mask they are 0 and the
     normal is (0, 0, 1).

@@ -39,7 +39,7 @@ _ENVIRONMENT_ROWS = 32
 _PROBES = 4096  # number of pixels that measure the environment's misfit, about
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Layers:
     """An object under one light.
 
@@ -68,7 +68,7 @@ class Layers:
     panel: PanelLight | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Part:
     """The contribution of one light: `shading`, `gloss` (N, 3), and the `variance` (N, 3) of the
     latter.

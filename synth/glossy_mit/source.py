@@ -18,7 +18,7 @@ from isc_core.photo import read_raster
 from isc_core.shading.spherical_harmonics import light_from_reference
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Source:
     """An object of the set.
 

@@ -27,7 +27,7 @@ from ..scene.variant import load_mitsuba
 _PACKAGE = Path(__file__).resolve().parents[1]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class KeptLight:
     """Results of the stages of a refinement.
 

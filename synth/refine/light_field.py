@@ -19,7 +19,7 @@ _BUMPS, _CONCENTRATION = 40, 6.0
 _SPREAD, _TINT = 1.0, 0.1  # standard deviations of log radiance, and of the overall colour
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightField:
     """Environments near a given one.
 

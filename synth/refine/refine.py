@@ -151,7 +151,7 @@ def refine(
     return Refinement(_noted(result, note), improves, fit.before, fit.after)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnvironmentFit:
     """An environment that was fitted to a result.
 

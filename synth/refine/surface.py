@@ -24,7 +24,7 @@ from ..scene.tracing import Tracer
 _LIFT = 1.0  # pixels of the scale of the points
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SurfacePoints:
     """N points that receive light.
 

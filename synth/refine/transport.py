@@ -28,7 +28,7 @@ from .surface import Surface, SurfacePoints
 _AT_ONCE = 16  # directions traced at a time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Transport:
     """The transport to N points from J = 2 rows^2 pixels of an environment.
 

@@ -58,7 +58,7 @@ class RenderOptions:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lit:
     """Radiance of N points toward the camera, with the variance of its estimate.
 

@@ -92,7 +92,7 @@ class Sums:
                 noise[chunk, channel] += variance
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Paths:
     """M samples that carry light unless they are blocked.
 
@@ -197,7 +197,7 @@ def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
     return ~tracer.blocked(points.lifted()[paths.point], paths.direction, paths.reach)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Unshadowed:
     """The diffuse lobe of N points without shadows, in closed form.
 

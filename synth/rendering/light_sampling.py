@@ -23,7 +23,7 @@ from isc_core.shading.environment_map import solid_angles
 from ..scene.lights import EnvironmentLight, Light, PanelLight
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Seen:
     """Intersections of M rays with one light.
 

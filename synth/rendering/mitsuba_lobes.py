@@ -231,7 +231,7 @@ def _gather(
     return gathered
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Moments:
     """Moments of `count` samples of (plain, more, specular), see `one_sample`: (N, 3) each.
 

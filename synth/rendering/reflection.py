@@ -28,7 +28,7 @@ from ..scene.tracing import LIFT
 from .rough_plastic import RoughPlastic
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Points:
     """N points of a surface, each seen from one direction.
 

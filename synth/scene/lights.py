@@ -23,7 +23,7 @@ from isc_core.errors import InputError
 from isc_core.shading.environment_map import directions, resampled, solid_angles
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DirectionalLight:
     """A distant light.
 
@@ -43,7 +43,7 @@ class DirectionalLight:
         _check("irradiance", self.irradiance, (3,), light=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PointLight:
     """A point light.
 
@@ -63,7 +63,7 @@ class PointLight:
         _check("intensity", self.intensity, (3,), light=True)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PanelLight:
     """A rectangular area light.
 
@@ -103,7 +103,7 @@ class PanelLight:
         return 4 * float(np.linalg.norm(np.cross(self.right, self.up)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class EnvironmentLight:
     """An infinitely distant environment.
 

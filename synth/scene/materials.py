@@ -33,7 +33,7 @@ DIFFUSE_MODELS: tuple[str, ...] = ("lambert", "oren_nayar")
 _RANGES = {"blinn_phong": (1.0, 10000.0), "ggx": (0.01, 1.0), "roughplastic": (0.01, 1.0)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SurfaceReflectance:
     """A material at N points.
 
@@ -50,7 +50,7 @@ class SurfaceReflectance:
     gloss: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Material:
     """A material with its textures.
 

@@ -21,7 +21,7 @@ _FOOTPRINT = 3  # rays per side of a pixel, for its reflectance
 _SAME_PLACE = 3.0  # pixels: farther from the centre's hit, a ray of the footprint does not count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """The N visible points, in row order of `mask`.
 

@@ -23,7 +23,7 @@ LIFT = 2e-4
 _VECTOR = 64  # bytes
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Hits:
     """The nearest hit of each of M rays. All values are 0 for rays that miss.
 

@@ -25,7 +25,7 @@ from .texture_coordinates import from_directions
 _STEPS = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Blobs:
     """A sum of ellipsoidal blobs.
 

@@ -84,7 +84,7 @@ _LETTERS = {
 _MIDDLE = {"L": (-0.65, -0.65), "T": (0, 0.6), "Y": (0, 0.05), "arrow": (0.25, 0)}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Extrusion:
     """A prism with rounded corners and edges.
 

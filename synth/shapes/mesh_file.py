@@ -74,7 +74,7 @@ _ERRORS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshFile:
     """A mesh with its texture.
 
@@ -90,7 +90,7 @@ class MeshFile:
     albedo: np.ndarray | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Part:
     """One part of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as in `Mesh` or None,
     `texture` (h, w, 3) or None, `colours` (N, 3) or None; linear.

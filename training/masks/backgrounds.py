@@ -25,7 +25,7 @@ _PATTERN_PIXEL = 0.3  # standard deviation of a pattern's blur, pixels at the fr
 _STRIDE = 3  # the exposure of a crop is computed from every third row and column
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Crops(TensorBatch):
     """Perspective crops of panoramas.
 
@@ -54,7 +54,7 @@ class Crops(TensorBatch):
     exposure: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Backdrops(TensorBatch):
     """Plain walls and cloths.
 
@@ -79,7 +79,7 @@ class Backdrops(TensorBatch):
     width: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tables(TensorBatch):
     """Tables before backgrounds.
 
@@ -116,7 +116,7 @@ class Tables(TensorBatch):
     gradient: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BackgroundDraws(TensorBatch):
     """Random variables of the backgrounds of a batch.
 

@@ -22,7 +22,7 @@ from .scenes import PastedObjects
 _MOST = 12.0  # factor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bands(TensorBatch):
     """Random variables of the bands of a batch's objects.
 

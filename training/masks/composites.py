@@ -44,7 +44,7 @@ from .variation import (
 _GREY = 0.04  # share of monochrome photos
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Composite(TensorBatch):
     """A batch of photos with their masks.
 
@@ -69,7 +69,7 @@ class Composite(TensorBatch):
     count: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cameras(TensorBatch):
     """White balance, and the attributes of `CameraDraw`, one for each photo.
 
@@ -205,7 +205,7 @@ def draw_cameras(rng: np.random.Generator, number: int) -> Cameras:
     return Cameras.of(arrays)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PastedScenes:
     """Objects on backgrounds, before the camera.
 

@@ -26,7 +26,7 @@ _EVERYWHERE = 0.5  # share of photos with one radius
 _LAMPS, _STRONGEST = 0.5, 12.0  # share of photos with brighter highlights; largest s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Defocus(TensorBatch):
     """Random variables of the blur of a batch.
 

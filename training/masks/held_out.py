@@ -37,7 +37,7 @@ _LEAST = 200  # pixels of a target
 PARTS = ("A", "B")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HeldOut:
     """A composite with its ground truth.
 

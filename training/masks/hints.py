@@ -22,7 +22,7 @@ _BACKGROUND, _SAME = 0.06, 0.6  # shares of hints on the background; on the targ
 _MIN_PIXELS = 40  # visible pixels of an object that hints may select
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HintDraws(TensorBatch):
     """Random variables of the hints of a batch.
 

@@ -31,7 +31,7 @@ _BORDER = 15  # pixels: about two blocks of JPEG
 _DROPPED = 4  # bits of the mantissa
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Ingredients:
     """Ingredients of composites.
 

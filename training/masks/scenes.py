@@ -32,7 +32,7 @@ _SAME_LIGHT = 0.5  # share of compound objects whose parts are about equally bri
 _GRIDS = np.array([(2, 1), (3, 1), (2, 2), (1, 2), (2, 1)])  # columns, rows
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scenes(TensorBatch):
     """Random variables of the scenes of a batch.
 
@@ -51,7 +51,7 @@ class Scenes(TensorBatch):
     count: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PastedObjects(TensorBatch):
     """The pasted objects of a batch: by photo, from the back to the front.
 
@@ -114,7 +114,7 @@ class PastedObjects(TensorBatch):
         return torch.cat([turn, -turn @ self.place[..., None]], 2)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Places:
     """Objects of each photo: arrays (B, MAX_OBJECTS); `place` has a last axis of 2."""
 

@@ -25,7 +25,7 @@ _SECOND_SIDE = 0.3  # share of objects that are cut by two sides
 _KINDS = (0.3, 0.25, 0.25, 0.2)  # shares of stacks, heads, limbs and patches
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parts:
     """Parts of compound objects, from the back to the front.
 

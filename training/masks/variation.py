@@ -31,7 +31,7 @@ _MAX_TINT = 3.0  # factor of a channel, relative to grey
 _EPSILON = 1e-4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObjectVariation(TensorBatch):
     """Random variables of `matched_colours`.
 
@@ -47,7 +47,7 @@ class ObjectVariation(TensorBatch):
     noise: torch.Tensor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BackgroundVariation(TensorBatch):
     """Random variables of `varied_backgrounds`.
 

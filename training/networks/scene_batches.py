@@ -35,7 +35,7 @@ _GPU_POOL, _GPU_EVERY = 4096, 4
 _ALIKE = 400  # views lit together are so near in size: less is filled up
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SceneDraws:
     """Draws batches of photos.
 
@@ -152,7 +152,7 @@ class SceneBatches:
         return self._renderer(drawn.to(self._device), self._views)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class World:
     """The data from which photos are drawn.
 

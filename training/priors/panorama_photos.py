@@ -39,7 +39,7 @@ _NORMALS = 300
 _FLOOR = 0.03  # of the mean shading: added before the logarithm of what no light reaches
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PanoramaPhoto:
     """What a camera in a panorama sees.
 

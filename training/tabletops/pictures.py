@@ -38,7 +38,7 @@ _UNSEEN = 5e-4  # the same, of an object outside the picture
 _SAME = 1e-3  # difference of equal depths, of the depth
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TabletopPicture:
     """A picture and its ground truth.
 

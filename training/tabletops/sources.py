@@ -14,7 +14,7 @@ from ..world.files import Split, read_patterns, split_of
 from ..world.patterns import Atlas
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TabletopSources:
     """Objects, panoramas and patterns.
 

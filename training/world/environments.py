@@ -44,7 +44,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _LEAST_SHADING = 1e-3  # of the brightest: where no light comes from, the logarithm has no value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Panorama:
     """A photographed environment.
 

@@ -48,7 +48,7 @@ _FLOOR = 0.03  # of the mean shading: added before the logarithm of what no ligh
 _NORMALS = 128
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Material(TensorBatch):
     """The surfaces of B views.
 
@@ -89,7 +89,7 @@ class Material(TensorBatch):
         return replace(self, albedo=self.albedo * (~chosen)[:, None, None])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Lights(TensorBatch):
     """The light on B views.
 
@@ -143,7 +143,7 @@ class Lights(TensorBatch):
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LitViews:
     """What the camera would see.
 

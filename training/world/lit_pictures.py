@@ -15,7 +15,7 @@ _BRIGHTEST = 6e4
 _LEAST_LIT = 0.02  # of the surroundings' light: below, a lamp does not count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LitPictures(TensorBatch):
     """Pictures of B lit views, before any camera.
 

@@ -30,7 +30,7 @@ _MOST = 0.95
 _HORIZON = 0.5  # of a level's roughness: how far a table's edge is smoothed
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Bank(TensorBatch):
     """Surroundings and patterns, ready to be looked up.
 

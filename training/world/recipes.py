@@ -99,7 +99,7 @@ class Shares:
     stretch: float = 0.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Recipe:
     """Paint, gloss and light of one picture.
 

@@ -42,7 +42,7 @@ Alteration = Callable[[LitPictures], LitPictures]
 """A change of pictures before they are photographed; it returns new ones."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Placement:
     """How a picture is placed in the network's frame.
 
@@ -73,7 +73,7 @@ class Placement:
     mask_shift: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Draw:
     """All that is drawn for one batch.
 
@@ -138,7 +138,7 @@ def _from_arrays(*parts: Any) -> Draw:
     return Draw(*map(tensors, parts))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Sample(TensorBatch):
     """A batch of photos with their truth.
 

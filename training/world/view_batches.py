@@ -18,7 +18,7 @@ from .tensor_batch import TensorBatch
 from .views import DIRECTIONS, SIDE, View
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PreparedView:
     """A view as the lighting needs it, N pixels.
 
@@ -71,7 +71,7 @@ def prepared(view: View) -> PreparedView:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ViewBatch(TensorBatch):
     """B views, their pixels in rows of equal length P; shorter ones are filled up.
 

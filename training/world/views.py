@@ -33,7 +33,7 @@ _LEAST_COVER = 0.04  # of the picture: a body seen edge-on is drawn again
 _TRIES = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
     """A body as a camera sees it, N pixels.
 

@@ -27,7 +27,7 @@ COLOURS = (
 )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Panel:
     """One labelled picture.
 

@@ -9,7 +9,7 @@ from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 QUICK_SIZE = 96  # longest side in a quick run, pixels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """One image and what is known of it.
 

@@ -38,7 +38,7 @@ _NAMES = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ShadedObject:
     """An object of known shape.
 
@@ -138,7 +138,7 @@ def shaded_objects(context: Context) -> tuple[ShadedObject, ...]:
     return tuple(found)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RecoveredShape:
     """Result of a method.
 

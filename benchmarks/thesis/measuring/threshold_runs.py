@@ -42,7 +42,7 @@ _QUICK_IMAGES = 3
 _SURE = 1.959964  # standard deviations, of 95 %
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ThresholdRuns:
     """The n runs of one optimiser on one image.
 

@@ -15,7 +15,7 @@ MAX_ASPECT = 100
 MIN_SIDE = 8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Raster:
     """The stored values of an image file, upright (its orientation applied), before any transfer
     curve.

@@ -91,7 +91,7 @@ def _box(mask: np.ndarray, margin: int) -> tuple[slice, slice]:
     return rows, columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Grids:
     """The relation of a part of the photo to the maps.
 

@@ -157,7 +157,7 @@ def known_roughness(built: MeshResult) -> tuple[float, str]:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Layers:
     """The textures as codes, computed on demand."""
 

@@ -134,7 +134,7 @@ def build_mesh(
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Shape:
     """A mesh in pixels.
 

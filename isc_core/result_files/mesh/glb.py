@@ -27,7 +27,7 @@ _VERTICES, _INDICES = 34962, 34963  # target of a buffer view
 _ALIGNMENT = 4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class TexturedMesh:
     """A triangle mesh with texture coordinates.
 
@@ -53,7 +53,7 @@ class TexturedMesh:
     tangents: np.ndarray | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExtraPrimitive:
     """A second primitive: a part of a mesh with another material.
 

@@ -36,7 +36,7 @@ _NEAR = 2  # pixels
 _SOME = 0.02  # of a pixel: less is ignored
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObjectCover:
     """The object's coverage of the maps' pixels.
 

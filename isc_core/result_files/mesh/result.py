@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _SPECULAR = "KHR_materials_specular"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MeshResult:
     """A mesh with its material and its relation to the maps.
 

@@ -40,7 +40,7 @@ _SURE, _DEEP = 0.87, 0.97  # v up to which s is taken from the coverage alone, a
 _FACTOR = 2.0  # largest change of u
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CrossSection:
     """Ellipses across the outline, for blocks of 2 x 2 pixels.
 

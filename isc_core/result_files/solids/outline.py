@@ -28,7 +28,7 @@ _ALL = 1 << 40  # more triangles than any mesh has
 _RING = ((0, 0), (1, 0), (1, 1), (0, 1))  # row, column of a cell's corners, counter-clockwise
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Outlined:
     """Triangles in the plane of the pixels.
 

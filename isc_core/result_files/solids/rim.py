@@ -22,7 +22,7 @@ _WHOLE = 0.95
 _LEAST = 0.04
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Rim:
     """The rim of the object.
 

@@ -55,7 +55,7 @@ _SIDES = (-1, 0, 1)
 _STEP = 1e3  # pixels of height between core and sheet, for small triangles there
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SolidMesh:
     """Front, rim and back of an object, as a mesh over the pixels.
 

@@ -19,7 +19,7 @@ from .rim import Rim
 from .solid_mesh import SolidMesh, continued, make_solid_mesh
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Solid:
     """A mesh and its normals.
 

@@ -42,7 +42,7 @@ _LEAST_COSINE = 0.05
 _MOST_PIXELS = 1 << 17  # approximate number processed at a time
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Triangulation:
     """Triangles over a grid of vertices.
 
@@ -59,7 +59,7 @@ class Triangulation:
     faces: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Patch:
     """Triangles of one size and orientation, and the pixels that they cover.
 

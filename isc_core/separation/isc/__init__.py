@@ -84,7 +84,7 @@ _MAX_SIDE = 640
 _MIN_PEAK = 1 / 512
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Candidates:
     """Candidates for s by hue and by place, with their gains in [0, 1].
 

@@ -23,7 +23,7 @@ from .options import IscOptions
 _BINS, _CHROMA_BINS = 100, 64
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DiffuseRatios:
     """Diffuse statistics by hue, as tables over a grid.
 

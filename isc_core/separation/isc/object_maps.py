@@ -24,7 +24,7 @@ SMOOTH_REACH = 3  # pixels, at least, of the smoothing
 _SIGMA = 0.7  # of the smoothing, pixels
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ObjectMaps:
     """The object at one scale.
 

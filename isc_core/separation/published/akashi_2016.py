@@ -117,7 +117,7 @@ VARIANTS: dict[str, Akashi2016Options] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Colours and codes of a factorisation.
 

@@ -118,7 +118,7 @@ _OVER_RELAXATION = 1.2
 _SMALLEST = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Scene:
     """What is constant during the search for s.
 

@@ -75,7 +75,7 @@ VARIANTS: dict[str, Shen2013Options] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pixels:
     """The pixels of the mask, or of the frame, as a list: `colours` (n, 3); `high`, `low` (n,)
     largest and smallest channel; `base` is u, the mean of `low`; `usable` (n,)which pixels are

@@ -120,7 +120,7 @@ _FREE = 0.6
 _DIFFUSE, _DARK, _ROW, _COLUMN, _EDGE, _UNIFORM = 0, 1, 2, 3, 4, 5
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Pixels:
     """State of the sweeps; all (H, W) but `colours` (H, W, 3). Each sweep changes `colours`, then,
     where `stale`, `total`, their sum, `peak`, c, and unless `by_colour` the shares `red` and

@@ -89,7 +89,7 @@ _GREY = 1 / 3 + 1e-6
 _MARGIN = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BilateralGrid:
     """A grid of one cell per sigma over row, column and guide.
 

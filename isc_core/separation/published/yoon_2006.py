@@ -117,7 +117,7 @@ _BRIGHT_QUANTILE = 0.999
 _GREY = 1e-6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _TwoBand:
     """Per pixel (H, W): `ratio` t = sum I / f, 0 where it is not `valid`; `band` f; `red`, `green`,
     the shares of F; `valid`, whether the pixel has a colour; `first`, whether

@@ -24,7 +24,7 @@ from ...numerics.jit import compiled_available, jit
 _PASSES = 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Paths:
     """Distances between neighbouring pixels.
 

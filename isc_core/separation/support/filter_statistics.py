@@ -54,7 +54,7 @@ _MARGIN = 0.02  # distance that probabilities keep from 0 and 1
 _ARRAYS = ("spread", "without", "highlight", "temperature")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FilterTable:
     """Histograms of filter outputs. F = len(FILTERS).
 

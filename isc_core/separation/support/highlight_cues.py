@@ -64,7 +64,7 @@ def noise_level(image: np.ndarray, mask: np.ndarray) -> float:
     return float(1.4826 * np.median(np.abs(change[mask]), axis=0).mean())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Steps:
     """Differences of a photo between neighbouring pixels, in units of an edge.
 

@@ -54,7 +54,7 @@ _CLEAR = 0.25  # of a region's flanks: with fewer unclipped pixels the slope is 
 WEIGHTS = (-2.545, 0.706, 2.099, 4.585)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Evidence:
     """Evidence of each of the K regions of removed light.
 
@@ -180,7 +180,7 @@ def _saturation(image: np.ndarray, dark: float) -> np.ndarray:
     return np.asarray((high - smallest(image)) / (high + dark))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ClassifiedHighlights:
     """Where removed light was a highlight.
 

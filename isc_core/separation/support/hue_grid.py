@@ -127,7 +127,7 @@ class HueGrid:
         return Places(first, (at - first).astype(np.float32), self.shape)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Places:
     """Positions of n pixels in a grid.
 

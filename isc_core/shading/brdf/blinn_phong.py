@@ -30,7 +30,7 @@ from .model import Parameter, check_range, log_above_zero, power
 Scale = Literal["plain", "normalised", "conserving"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class BlinnPhongGradient:
     """Derivatives of f_r by the parameters, each (...).
 

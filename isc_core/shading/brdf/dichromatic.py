@@ -28,7 +28,7 @@ from .model import Lobe, check_range
 Gradient = TypeVar("Gradient")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DichromaticGradient:
     """Derivatives of f_r by the parameters.
 
@@ -48,7 +48,7 @@ class DichromaticGradient:
     specular: object
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Dichromatic:
     """The dichromatic model.
 

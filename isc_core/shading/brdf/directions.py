@@ -11,7 +11,7 @@ HORIZON = 1e-9
 _UNIT_TOLERANCE = 1e-3
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cosines:
     """Cosines between directions, each (...).
 

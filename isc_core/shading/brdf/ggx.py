@@ -32,7 +32,7 @@ F0 = 0.04
 SMALLEST_ALPHA = 1e-4
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GgxGradient:
     """Derivatives of f_r by the parameters, each (...).
 

@@ -19,7 +19,7 @@ from .directions import cosines
 from .model import Parameter, check_range
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LambertGradient:
     """Derivative of f_r by the parameter.
 

@@ -26,7 +26,7 @@ from .directions import Cosines, cosines
 from .model import Parameter, check_range
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class OrenNayarGradient:
     """Derivatives of f_r by the parameters, each (...).
 

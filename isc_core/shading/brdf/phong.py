@@ -26,7 +26,7 @@ from .directions import Cosines, cosines
 from .model import Parameter, check_range, log_above_zero, power
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PhongGradient:
     """Derivatives of f_r by the parameters, each (...).
 

@@ -18,7 +18,7 @@ from .priors import AbsoluteTable
 LOW, HIGH = -7.0, 4.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class CoarseTable:
     """A table as the upsampling of `base + coarse`, minus its minimum.
 

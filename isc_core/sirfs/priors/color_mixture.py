@@ -26,7 +26,7 @@ _PER_DECADE = 40
 _PER_DECADE_OF_M = 300
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColorCells:
     """Cells of colour differences.
 
@@ -105,7 +105,7 @@ def _cell_index(x: np.ndarray) -> np.ndarray:
     return index * lengths + np.clip(length, 0, lengths - 1).astype(np.int64)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ColorScaleMixture:
     """A fitted mixture.
 

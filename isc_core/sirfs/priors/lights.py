@@ -27,7 +27,7 @@ COEFFICIENTS = 9
 _MIRROR = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GaussianLight:
     """A Gaussian over stacked coefficients.
 

@@ -68,7 +68,7 @@ class FitRecord:
     options: dict[str, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PriorSet:
     """All priors, compact.
 

@@ -14,7 +14,7 @@ from ...numerics.linear import solve_linear
 from .tabulated_potential import TabulatedPotential
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class AbsoluteTable:
     """Cost of a whitened log colour, on a uniform grid.
 
@@ -31,7 +31,7 @@ class AbsoluteTable:
     values: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LightPrior:
     """A Gaussian over the stacked light coefficients l (9 C numbers).
 
@@ -60,7 +60,7 @@ class LightPrior:
         return (inverse + inverse.T) / 2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SilhouetteProfile:
     """Outward in-plane part of normals at relative depth u = (k + 0.5) / K from the silhouette.
 
@@ -90,7 +90,7 @@ class SilhouetteProfile:
         return np.interp(u, nodes, self.mean), np.interp(u, nodes, self.spread)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Priors:
     """Everything the SIRFS objective needs besides its weights.
 

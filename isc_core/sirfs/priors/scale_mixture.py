@@ -25,7 +25,7 @@ _DECADES = (-9, 3)
 _PER_DECADE = 300
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Magnitudes:
     """A histogram of |x|.
 
@@ -96,7 +96,7 @@ class Magnitudes:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ScaleMixture:
     """A fitted mixture.
 

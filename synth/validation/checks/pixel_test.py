@@ -75,7 +75,7 @@ class PixelTestOptions:
             )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class PixelTestResult:
     """Result of a pixel test.
 

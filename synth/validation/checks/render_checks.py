@@ -33,7 +33,7 @@ _BLOCK = 4  # pixels a side
 _OTHER_SEED = 0x5EED
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class RenderCheck:
     """One check of one scene.
 

@@ -26,7 +26,7 @@ from .types import Metric, Stage, StageInputs, StageOptions, StagePicture
 _NO_GLOSS = 0.01  # of the image's light: less specular light counts as none
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FittedLobe:
     """The fitted lobe, and the specular layer (H, W, 3) that it was fitted to."""
 

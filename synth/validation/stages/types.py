@@ -64,7 +64,7 @@ class StageOptions:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StageInputs:
     """The inputs of a stage.
 
@@ -124,7 +124,7 @@ class Metric:
     given_by: tuple[Truth, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class StagePicture:
     """One map of the report: a caption, and colours (H, W, 3) in sRGB encoding, [0, 1]."""
 
@@ -136,7 +136,7 @@ Answer = TypeVar("Answer")
 Scored = TypeVar("Scored")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Stage(Generic[Answer, Scored]):
     """One step from photo to scene, with its error measures.
 

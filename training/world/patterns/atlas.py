@@ -48,7 +48,7 @@ class PatternKind(IntEnum):
     STROKES = 13
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Atlas:
     """Surface patterns.
 

@@ -10,7 +10,7 @@ import numpy as np
 _AHEAD = np.array([1, 2, 0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SharedEdges:
     """The edges of exactly two faces.
 

@@ -17,7 +17,7 @@ _NO_AREA = 1e-12  # relative to the longest side squared
 _DECIMALS = 6
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Surface:
     """Triangles.
 
