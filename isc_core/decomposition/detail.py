@@ -41,6 +41,7 @@ import numpy as np
 from ..filters.distance import nearest_pixels
 from ..imaging.blocks import block_means, means_inside
 from ..imaging.bounding_box import mask_slices
+from ..imaging.channels import mean_channel
 from ..imaging.cross_bilateral import CrossBilateral
 from ..imaging.doubling import doubled_at
 from ..imaging.row_blocks import row_blocks
@@ -428,7 +429,7 @@ def _features(image: np.ndarray, mean: np.float32) -> np.ndarray:
     """Features (3, H, W) of log light over the object's mean, I of the module."""
     over = image / mean + np.float32(_DARK)
     red, green, blue = np.log(over).transpose(2, 0, 1)
-    return np.stack([np.log(over.mean(axis=2)), red - green, blue - green])
+    return np.stack([np.log(mean_channel(over)), red - green, blue - green])
 
 
 def _low_frequencies(values: np.ndarray, mask: np.ndarray, length: float) -> np.ndarray:

@@ -44,13 +44,13 @@ def total(image: np.ndarray) -> np.ndarray:
 
     Parameters
     ----------
-    image : (..., 3) ndarray
+    image : (..., C) ndarray
 
     Returns
     -------
     (...) ndarray
     """
-    return np.asarray(image[..., 0] + image[..., 1] + image[..., 2])
+    return functools.reduce(np.add, np.moveaxis(image, -1, 0))
 
 
 def length(vectors: np.ndarray) -> np.ndarray:

@@ -22,6 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .channels import total
+
 _REACH = 2.5  # standard deviations
 _TINY = 1e-6
 
@@ -102,7 +104,7 @@ def _weights(
     inside = _shifted(mask.astype(np.float32), axis, reach)
     weights = np.empty((len(offsets), *mask.shape), np.float32)
     for k, other in enumerate(_shifted(guide, axis, reach)):
-        unlike = np.square(other - guide).sum(axis=2) / np.float32(2 * tolerance**2)
+        unlike = total(np.square(other - guide)) / np.float32(2 * tolerance**2)
         weights[k] = np.exp(-unlike - np.float32(offsets[k] ** 2 / (2 * sigma**2))) * inside[k]
     weights /= np.maximum(weights.sum(axis=0), np.float32(_TINY))
     return weights

@@ -74,7 +74,7 @@ def contact_sheet(decomposition: Decomposition, part: FramePart | None = None) -
     ]
     panels.append(
         Panel(
-            srgb_to_linear(0.5 + 0.5 * small["normal"]),
+            _decoded(0.5 + 0.5 * small["normal"], frame),
             frame.coverage,
             "Normals",
             "x right, y up, z to viewer",
@@ -101,12 +101,19 @@ def _light_panel(d: Decomposition, gain: float) -> Panel:
 def _error_panel(d: Decomposition, frame: Frame) -> Panel:
     """The expected error of the normals, or the confidence if it is unknown."""
     if d.expected_error is None:
-        grey = srgb_to_linear(np.clip(frame.scaled(d.confidence), 0, 1))
+        grey = _decoded(np.clip(frame.scaled(d.confidence), 0, 1), frame)
         color = np.repeat(grey[..., None], 3, axis=2)
         return Panel(color, frame.coverage, "Confidence", "white is 1")
-    color = srgb_to_linear(error_colors(frame.scaled(d.expected_error.normal)))
+    color = _decoded(error_colors(frame.scaled(d.expected_error.normal)), frame)
     keys = tuple((f"{step}°", code) for step, code in SCALE)
     return Panel(color, frame.coverage, "Normals off by", "", keys)
+
+
+def _decoded(coded: np.ndarray, frame: Frame) -> np.ndarray:
+    """Linear light of sRGB values (N, N) or (N, N, 3) on the object; 0 elsewhere."""
+    found, covered = np.zeros(coded.shape, np.float32), frame.coverage > 0
+    found[covered] = srgb_to_linear(coded[covered].astype(np.float32))
+    return found
 
 
 def thumbnail(sheet: Path, target: Path) -> None:

@@ -26,6 +26,7 @@ grain of wood, looks uniform; so does paint under light of a colour that hides i
 import numpy as np
 
 from ..filters.extrema import window_maximum, window_minimum
+from ..imaging.channels import total
 from ..imaging.smoothing import masked_gaussian
 
 ONE_PAINT = 0.1  # deviation of g within one paint
@@ -95,5 +96,5 @@ def uniformity(guide: np.ndarray, mask: np.ndarray) -> np.ndarray:
     far, inside = np.float32(1e3), mask[..., None]
     highest = window_maximum(np.where(inside, guide, -far), 3)
     lowest = window_minimum(np.where(inside, guide, far), 3)
-    ranges = np.square(np.where(inside, highest - lowest, 0)).sum(axis=2)
+    ranges = total(np.square(np.where(inside, highest - lowest, 0)))
     return np.asarray(np.exp(-ranges / np.float32(2 * _EDGE**2)))

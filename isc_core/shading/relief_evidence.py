@@ -49,6 +49,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.blocks import block_means, means_inside
+from ..imaging.channels import mean_channel
 from ..imaging.smoothing import masked_gaussian
 
 BLOCK = 8  # pixels
@@ -140,7 +141,7 @@ def fine_change(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     (H, W) ndarray
         0 outside of the mask.
     """
-    luminance = np.log(np.where(mask, image.mean(axis=2), 1) + _DARK)
+    luminance = np.log(np.where(mask, mean_channel(image), 1) + _DARK)
     return np.where(mask, luminance - masked_gaussian(luminance, mask, _SMOOTH), 0)
 
 

@@ -21,6 +21,8 @@ covered.
 
 import numpy as np
 
+from ...imaging.channels import largest, smallest, total
+
 _MIN_SHARE = 1e-3  # of a pixel's largest channel, and of each channel: least diffuse value
 
 
@@ -43,11 +45,11 @@ def limit_tint(image: np.ndarray, diffuse: np.ndarray, tint: float) -> np.ndarra
     """
     removed = np.maximum(image - diffuse, 0)
     weight = 1 / np.square(
-        np.maximum(diffuse, _MIN_SHARE * np.maximum(image.max(axis=2, keepdims=True), 1e-9))
+        np.maximum(diffuse, _MIN_SHARE * np.maximum(largest(image)[..., None], 1e-9))
     )
-    level = (weight * removed).sum(axis=2, keepdims=True) / weight.sum(axis=2, keepdims=True)
+    level = (total(weight * removed) / total(weight))[..., None]
     near = np.minimum(
         np.clip(removed, level / np.sqrt(tint), level * np.sqrt(tint)), (1 - _MIN_SHARE) * image
     )
-    light = np.minimum(near, tint * near.min(axis=2, keepdims=True))
+    light = np.minimum(near, tint * smallest(near)[..., None])
     return (image - light).astype(np.float32)
