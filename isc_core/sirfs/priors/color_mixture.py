@@ -15,7 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .scale_mixture import exp_or_zero, refine_weights, summed_exponentials
+from .scale_mixture import (
+    exp_or_zero,
+    refine_weights,
+    summed_exponentials,
+    summed_exponentials_of_nodes,
+)
 from .tabulated_potential import TabulatedPotential
 
 TABLE_NODES = 100_000
@@ -149,9 +154,11 @@ class ColorScaleMixture:
 
     def table(self) -> TabulatedPotential:
         """Return the cost -log(p(m) / p(0)) on 100000 nodes from 0 to `reach`."""
-        nodes = np.linspace(0.0, self.reach, TABLE_NODES)
-        log_density = self.log_density(nodes)
-        return TabulatedPotential(0.0, self.reach / (TABLE_NODES - 1), log_density[0] - log_density)
+        step = self.reach / (TABLE_NODES - 1)
+        factors = self.weights * _peaks(self.variances)
+        density = summed_exponentials_of_nodes(step, TABLE_NODES, self.variances, factors)
+        log_density = np.log(density)
+        return TabulatedPotential(0.0, step, log_density[0] - log_density)
 
 
 def fit_color_mixture(

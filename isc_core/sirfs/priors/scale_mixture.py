@@ -10,6 +10,7 @@ Citation: A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161
 use for shape and reflectance: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -231,6 +232,37 @@ def summed_exponentials(x: np.ndarray, scales: np.ndarray, factors: np.ndarray) 
     found = np.empty(x.shape)
     found.ravel()[order] = sums
     return found
+
+
+def summed_exponentials_of_nodes(
+    step: float, count: int, scales: np.ndarray, factors: np.ndarray
+) -> np.ndarray:
+    """Return `summed_exponentials` of the nodes 0, step, 2 step, ...
+
+    The exponential of a sum is a product: with nodes i m + j, of i, j < m, each component takes 2 m
+    exponentials instead of m^2.
+
+    Parameters
+    ----------
+    step : float
+    count : int
+        Number of nodes, at least 1.
+    scales, factors : (K,) ndarray
+
+    Returns
+    -------
+    (count,) float64 ndarray
+    """
+    side = math.isqrt(count - 1) + 1
+    fine = np.arange(side) * step
+    coarse = fine * side
+    sums = np.zeros((side, side))
+    for scale, factor in zip(scales, factors, strict=True):
+        near = coarse[: np.searchsorted(coarse, -_UNDERFLOW * scale)]
+        sums[: len(near)] += np.multiply.outer(
+            factor * np.exp(near / -scale), np.exp(fine / -scale)
+        )
+    return sums.ravel()[:count]
 
 
 def exp_or_zero(exponent: np.ndarray) -> np.ndarray:

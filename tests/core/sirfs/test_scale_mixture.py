@@ -1,8 +1,13 @@
 """Densities of the scale mixtures, which leave out what underflows."""
 
 import numpy as np
+import pytest
 
-from isc_core.sirfs.priors.scale_mixture import exp_or_zero, summed_exponentials
+from isc_core.sirfs.priors.scale_mixture import (
+    exp_or_zero,
+    summed_exponentials,
+    summed_exponentials_of_nodes,
+)
 
 
 def test_what_underflows_is_zero_as_in_the_exponential() -> None:
@@ -21,3 +26,11 @@ def test_a_sum_of_exponentials_does_not_depend_on_the_order() -> None:
     np.testing.assert_allclose(found, wanted, rtol=1e-13)
     np.testing.assert_array_equal(summed_exponentials(x.T, scales, factors), found.T)
     assert summed_exponentials(np.zeros((0, 2)), scales, factors).shape == (0, 2)
+
+
+@pytest.mark.parametrize("count", [1, 2, 9, 10, 999])
+def test_the_sum_at_nodes_is_that_of_their_values(count: int) -> None:
+    scales, factors = np.geomspace(1e-4, 30, 12), np.linspace(0.1, 1, 12)
+    found = summed_exponentials_of_nodes(0.05, count, scales, factors)
+    wanted = summed_exponentials(0.05 * np.arange(count), scales, factors)
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)
