@@ -5,10 +5,11 @@ import numpy as np
 from ..filters.components import labelled
 from ..imaging.bounding_box import mask_box
 
+_SMALL = 0.1  # of the largest component's area: smaller ones do not count
 _SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
 
 
-def connected_components(mask: np.ndarray, share: float = 0.1) -> list[np.ndarray]:
+def connected_components(mask: np.ndarray, share: float = _SMALL) -> list[np.ndarray]:
     """Return the connected components of a mask (8 neighbours), without small ones.
 
     Parameters
@@ -22,9 +23,7 @@ def connected_components(mask: np.ndarray, share: float = 0.1) -> list[np.ndarra
     list of (H, W) bool ndarray
         From left to right.
     """
-    labels, _ = labelled(mask, corners=True)
-    areas = np.bincount(labels.ravel())
-    areas[0] = 0
+    labels, areas = _labels_and_areas(mask)
     chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))
     components = [labels == number for number in chosen]
     return sorted(components, key=lambda component: mask_box(component)[:2])
@@ -41,7 +40,7 @@ def is_one_piece(mask: np.ndarray) -> bool:
     -------
     bool
     """
-    return bool(mask.any()) and len(connected_components(mask)) == 1
+    return _count(mask, _SMALL) == 1
 
 
 def shows_several(mask: np.ndarray) -> bool:
@@ -57,4 +56,16 @@ def shows_several(mask: np.ndarray) -> bool:
     bool
         Whether a second component is about as large as the first.
     """
-    return len(connected_components(mask, _SEVERAL)) > 1
+    return _count(mask, _SEVERAL) > 1
+
+
+def _count(mask: np.ndarray, share: float) -> int:
+    """The number of `connected_components`."""
+    _, areas = _labels_and_areas(mask)
+    return int((areas >= max(share * areas.max(), 1)).sum())
+
+
+def _labels_and_areas(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (H, W), 0 outside the mask, and the area of each label, 0 for label 0."""
+    labels, count = labelled(mask, corners=True)
+    return labels, np.bincount(labels[mask], minlength=count + 1)

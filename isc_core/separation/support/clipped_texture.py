@@ -32,8 +32,9 @@ from ...filters.components import boxes, labelled
 from ...filters.extrema import window_maximum
 from ...filters.morphology import dilated
 from ...imaging.bounding_box import mask_slices
+from ...imaging.channels import total
 from ...imaging.tiles import Place
-from ...inpainting.pull_push import fill
+from ...inpainting.pull_push import fill_at
 
 _RING = 4  # pixels held out around a hole, half a patch
 _BETTER = 0.8  # of the smooth fill's error on the ring, to be undercut by patches
@@ -75,7 +76,7 @@ def inpaint_clipped(
         shading = np.where(mask[place][..., None], log_shading[place], 0).astype(np.float32)
         given = np.asarray(diffuse[place], np.float32)
         there = _continued(given, known[place], holes[place], shading, dark)
-        filled[place][own] = np.clip(there[own], 0, image[place][own])
+        filled[place][own] = np.clip(there[own[holes[place]]], 0, image[place][own])
     return filled
 
 
@@ -117,10 +118,10 @@ def _moved(part: slice, by: int) -> slice:
 def _continued(
     diffuse: np.ndarray, known: np.ndarray, holes: np.ndarray, shading: np.ndarray, dark: float
 ) -> np.ndarray:
-    """`diffuse` (h, w, 3) with each hole filled by the better of the two fills."""
+    """The pixels (n, 3) of `holes`, each hole filled by the better of the two fills."""
     albedo = np.log(np.maximum(diffuse, dark)) - shading
     ring = dilated(holes, _RING, square=True) & known
-    smooth = fill(diffuse, known)
+    smooth = fill_at(diffuse, known, holes)
     rest = known & ~ring
     if not ring.any() or not rest.any():
         return smooth
@@ -128,13 +129,13 @@ def _continued(
 
     with ThreadPoolExecutor(1) as aside:
         tried = aside.submit(fill_patches, albedo, rest, holes | ring)
-        copied = np.exp(fill_patches(albedo, known, holes) + shading)
-        both = np.log(np.maximum(fill(diffuse, rest), dark)), tried.result() + shading
-    truth = albedo + shading
-    errors = [np.square(one - truth).sum(axis=2) for one in both]
+        copied = np.exp((fill_patches(albedo, known, holes) + shading)[holes])
+        smooth_ring = np.log(np.maximum(fill_at(diffuse, rest, ring), dark))
+        both = smooth_ring, (tried.result() + shading)[ring]
+    truth = (albedo + shading)[ring]
+    errors = [total(np.square(one - truth)) for one in both]
     labels, count = labelled(holes, corners=True)
-    near = np.where(ring, window_maximum(labels, 2 * _RING + 1), 0)
-    of_smooth, of_copied = (np.bincount(near.ravel(), one.ravel(), count + 1) for one in errors)
+    near = window_maximum(labels, 2 * _RING + 1)[ring]
+    of_smooth, of_copied = (np.bincount(near, one, count + 1) for one in errors)
     better = of_copied < _BETTER * of_smooth
-    better[0] = False
-    return np.where(better[labels][..., None], copied, smooth)
+    return np.where(better[labels[holes]][:, None], copied, smooth)
