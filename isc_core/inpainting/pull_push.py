@@ -13,7 +13,10 @@ Limits: the fill is smooth, without texture.
 
 import numpy as np
 
+from ..imaging.doubling import doubled
 from ..imaging.row_blocks import row_blocks
+
+_FEW = 0.2  # of the pixels: so few are looked up one by one
 
 
 def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -108,10 +111,15 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     -------
     (H, W, C) ndarray
     """
-    at = np.nonzero(~known)
-    filled = values.copy()
-    filled[at] = _pushed(coarse, at)
-    return filled
+    height, width = known.shape
+    if np.count_nonzero(~known) < _FEW * known.size:
+        at = np.nonzero(~known)
+        filled = values.copy()
+        filled[at] = _pushed(coarse, at)
+        return filled
+    # across first, as in `_pushed`: the last digits are the same
+    upsampled = doubled(coarse.swapaxes(0, 1)).swapaxes(0, 1)[:height, :width]
+    return np.where(known[..., None], values, upsampled)
 
 
 def _pushed(coarse: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:

@@ -179,7 +179,7 @@ def _resized(codes: np.ndarray, scale: float, part: FramePart) -> np.ndarray:
     """The coverage (h, w) float32 of a part at a scale, unchanged from 1; 0 beyond the photo."""
     if scale < 1:
         area = AreaFilter.of(codes.shape, scale)
-        cover = area(codes.astype(np.float32) / 255) / np.maximum(area.full, 1e-6)
+        cover = area(codes) / np.maximum(255 * area.full, 1e-6)
         cover = part.cut(np.clip(cover, 0, 1))
     else:
         cover = part.cut(codes).astype(np.float32) / 255

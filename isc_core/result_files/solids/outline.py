@@ -126,10 +126,15 @@ def _cut_cells(corners: np.ndarray, width: int, size: int) -> np.ndarray:
     A pixel is its flat index, the point between it and its right neighbour the index plus `size`,
     and between it and its lower neighbour the index plus 2 `size`.
     """
-    code = corners.T @ (1, 2, 4, 8)
+    code = np.zeros(corners.shape[1:], np.uint8)
+    for k, full in enumerate(corners):
+        code |= full.astype(np.uint8) << k
+    columns, rows = np.nonzero(((code > 0) & (code < 15)).T)
+    cases = code[rows, columns]
     found = [np.zeros((0, 3), np.int64)]
     for case in range(1, 15):
-        column, row = np.nonzero(code == case)
+        at = np.flatnonzero(cases == case)
+        row, column = rows[at], columns[at]
         corner = [(row + r) * width + column + c for r, c in _RING]
         left, upper = corner[0], corner[0]
         point = [left + 2 * size, corner[1] + size, corner[3] + 2 * size, upper + size]
