@@ -173,8 +173,9 @@ class CshSearch:
         self._chosen = strongest(
             source.image, source.rows, source.columns, self.options.projections
         )
+        self._workers = ThreadPool(self.options.threads)
         self._projected = project(
-            source.image, source.rows, source.columns, self._chosen, self.options.threads
+            source.image, source.rows, source.columns, self._chosen, self._workers
         )
         self._width = _bin_width(self._projected, self.options)
 
@@ -201,9 +202,7 @@ class CshSearch:
             If the user cancels.
         """
         rng = np.random.default_rng(self.options.seed)
-        projected = project(
-            target.image, target.rows, target.columns, self._chosen, self.options.threads
-        )
+        projected = project(target.image, target.rows, target.columns, self._chosen, self._workers)
         best = rng.integers(len(self.source), size=len(target)) if start is None else start
         matches = Matches(best.astype(np.int32), np.full(len(target), np.inf, np.float32))
         for table in range(self.options.tables):
@@ -248,13 +247,12 @@ class CshSearch:
             forward,
         )
         ends = np.linspace(0, len(target), _PARTS + 1).astype(int)
-        with ThreadPool(self.options.threads) as workers:
-            workers.run(
-                [
-                    partial(_sweep, *common, int(a), int(b))
-                    for a, b in zip(ends[:-1], ends[1:], strict=True)
-                ]
-            )
+        self._workers.run(
+            [
+                partial(_sweep, *common, int(a), int(b))
+                for a, b in zip(ends[:-1], ends[1:], strict=True)
+            ]
+        )
 
 
 class _Hashed(NamedTuple):

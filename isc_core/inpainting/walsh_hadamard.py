@@ -71,7 +71,11 @@ def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: i
 
 
 def project(
-    image: np.ndarray, rows: np.ndarray, columns: np.ndarray, chosen: np.ndarray, threads: int = 1
+    image: np.ndarray,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    chosen: np.ndarray,
+    workers: ThreadPool | None = None,
 ) -> np.ndarray:
     """Project patches.
 
@@ -85,7 +89,8 @@ def project(
         Upper left corners.
     chosen : (k,) ndarray
         Coefficients.
-    threads : int
+    workers : ThreadPool, optional
+        By default, one thread.
 
     Returns
     -------
@@ -93,14 +98,14 @@ def project(
         The last column is the norm of the rest.
     """
     out = np.empty((len(rows), len(chosen) + 1), np.float32)
-    ends = np.linspace(0, len(rows), 4 * threads + 1).astype(int)
-    with ThreadPool(threads) as workers:
-        workers.run(
-            [
-                partial(_project, image, rows[a:b], columns[a:b], chosen, out[a:b])
-                for a, b in zip(ends[:-1], ends[1:], strict=True)
-            ]
-        )
+    workers = workers or ThreadPool(1)
+    ends = np.linspace(0, len(rows), 4 * workers.threads + 1).astype(int)
+    workers.run(
+        [
+            partial(_project, image, rows[a:b], columns[a:b], chosen, out[a:b])
+            for a, b in zip(ends[:-1], ends[1:], strict=True)
+        ]
+    )
     return out
 
 

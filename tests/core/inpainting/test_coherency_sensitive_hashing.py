@@ -15,6 +15,7 @@ from isc_core.inpainting.coherency_sensitive_hashing import (
     patches_touching,
     patches_within,
 )
+from isc_core.numerics.thread_pool import ThreadPool
 
 
 def texture(height: int, width: int, seed: int) -> np.ndarray:
@@ -134,7 +135,7 @@ def test_projections_keep_distances_and_bound_them() -> None:
     assert (part <= true * (1 + 1e-4)).all() and part.sum() > 0.6 * true.sum()
     mixed = np.random.default_rng(0).permutation(len(patches))
     again = walsh_hadamard.project(
-        patches.image, patches.rows[mixed], patches.columns[mixed], chosen, threads=3
+        patches.image, patches.rows[mixed], patches.columns[mixed], chosen, ThreadPool(3)
     )
     assert np.array_equal(again, bound[mixed])
 
