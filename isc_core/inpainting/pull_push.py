@@ -111,15 +111,16 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     -------
     (H, W, C) ndarray
     """
-    height, width = known.shape
-    if np.count_nonzero(~known) < _FEW * known.size:
-        at = np.nonzero(~known)
+    missing = ~known
+    if np.count_nonzero(missing) < _FEW * known.size:
+        at = np.nonzero(missing)
         filled = values.copy()
         filled[at] = _pushed(coarse, at)
         return filled
     # across first, as in `_pushed`: the last digits are the same
-    upsampled = doubled(coarse.swapaxes(0, 1)).swapaxes(0, 1)[:height, :width]
-    return np.where(known[..., None], values, upsampled)
+    upsampled = doubled(coarse.swapaxes(0, 1)).swapaxes(0, 1)
+    height, width = known.shape
+    return np.where(missing[..., None], upsampled[:height, :width], values)
 
 
 def _pushed(coarse: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:

@@ -23,8 +23,7 @@ def connected_components(mask: np.ndarray, share: float = _SMALL) -> list[np.nda
     list of (H, W) bool ndarray
         From left to right.
     """
-    labels, areas = _labels_and_areas(mask)
-    chosen = np.flatnonzero(areas >= max(share * areas.max(), 1))
+    labels, chosen = _chosen_labels(mask, share)
     components = [labels == number for number in chosen]
     return sorted(components, key=lambda component: mask_box(component)[:2])
 
@@ -40,7 +39,7 @@ def is_one_piece(mask: np.ndarray) -> bool:
     -------
     bool
     """
-    return _count(mask, _SMALL) == 1
+    return len(_chosen_labels(mask, _SMALL)[1]) == 1
 
 
 def shows_several(mask: np.ndarray) -> bool:
@@ -56,16 +55,11 @@ def shows_several(mask: np.ndarray) -> bool:
     bool
         Whether a second component is about as large as the first.
     """
-    return _count(mask, _SEVERAL) > 1
+    return len(_chosen_labels(mask, _SEVERAL)[1]) > 1
 
 
-def _count(mask: np.ndarray, share: float) -> int:
-    """The number of `connected_components`."""
-    _, areas = _labels_and_areas(mask)
-    return int((areas >= max(share * areas.max(), 1)).sum())
-
-
-def _labels_and_areas(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (H, W), 0 outside the mask, and the area of each label, 0 for label 0."""
+def _chosen_labels(mask: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
+    """The labels (H, W) of the components, and those of the components that are not small."""
     labels, count = labelled(mask, corners=True)
-    return labels, np.bincount(labels[mask], minlength=count + 1)
+    areas = np.bincount(labels[mask], minlength=count + 1)
+    return labels, np.flatnonzero(areas >= max(share * areas.max(), 1))

@@ -18,7 +18,7 @@ Result = TypeVar("Result")
 class ThreadPool:
     """Run lists of tasks on several threads, the calling one included.
 
-    Use it as a context manager, or call `close`.
+    Use it as a context manager, or call `close`; else the threads end with the last reference.
 
     Parameters
     ----------

@@ -149,16 +149,20 @@ class ColorScaleMixture:
         ndarray
             Of the shape of `m`.
         """
-        factors = self.weights * _peaks(self.variances)
-        return np.log(summed_exponentials(np.asarray(m, float), self.variances, factors))
+        return np.log(summed_exponentials(np.asarray(m, float), self.variances, self._factors))
 
     def table(self) -> TabulatedPotential:
         """Return the cost -log(p(m) / p(0)) on 100000 nodes from 0 to `reach`."""
         step = self.reach / (TABLE_NODES - 1)
-        factors = self.weights * _peaks(self.variances)
-        density = summed_exponentials_of_nodes(step, TABLE_NODES, self.variances, factors)
-        log_density = np.log(density)
+        log_density = np.log(
+            summed_exponentials_of_nodes(step, TABLE_NODES, self.variances, self._factors)
+        )
         return TabulatedPotential(0.0, step, log_density[0] - log_density)
+
+    @property
+    def _factors(self) -> np.ndarray:
+        """The density of each component at m = 0, weighted."""
+        return self.weights * _peaks(self.variances)
 
 
 def fit_color_mixture(

@@ -2,6 +2,8 @@
 sources that are allowed.
 """
 
+import threading
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -104,6 +106,18 @@ def test_sources_lie_in_their_mask_and_targets_touch_theirs() -> None:
     assert len(source) == sum(
         usable[r : r + 8, c : c + 8].all() for r in range(53) for c in range(73)
     )
+
+
+def test_the_threads_of_a_search_end_with_it() -> None:
+    before = set(threading.enumerate())
+    search = CshSearch(everywhere(texture(60, 70, 1)), CshOptions(tables=2, threads=3))
+    search.match(everywhere(texture(60, 70, 2)))
+    started = set(threading.enumerate()) - before
+    assert started
+    del search
+    for thread in started:
+        thread.join(10)
+        assert not thread.is_alive()
 
 
 def test_same_seed_same_matches_and_no_worse_than_the_start() -> None:
