@@ -467,19 +467,21 @@ def test_a_missing_core_is_reported(tmp_path: Path) -> None:
 
 
 @posix
+@pytest.mark.parametrize("end", ["worker.kill()", "atexit.register(worker.kill)"])
 def test_a_program_that_kills_and_exits_at_once_leaves_nothing(
-    tmp_path: Path, fake_core: Maker
+    end: str, tmp_path: Path, fake_core: Maker
 ) -> None:
+    """Also if the kill is part of the exit, when Python waits for no thread any more."""
     environment = fake_core(STUBBORN)
     program = (
-        "import sys, time\nfrom pathlib import Path\n"
+        "import atexit, sys, time\nfrom pathlib import Path\n"
         "from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment\n"
         "from blender_addon.worker.commands import start_decompose\n"
         "search, cache, output = map(Path, sys.argv[1:])\n"
         "environment = WorkerEnvironment(Path(sys.executable), (search,), cache)\n"
         "worker = start_decompose(DecomposeJob(output, output, None, '', '', '', 0), environment)\n"
         "while worker.poll().stage != 'asleep': time.sleep(0.01)\n"
-        "worker.kill()\n"
+        f"{end}\n"
     )
     command = [
         sys.executable,
