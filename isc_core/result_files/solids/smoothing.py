@@ -1,15 +1,18 @@
 """Smoothing of maps by the binomial filter, restricted to the pixels of a region.
 
 Equation: sum w v / sum w, with w the filter's weights over the pixels of the region (normalised
-convolution).
+convolution). A filter (1, 2, 1) / 4 applied n times is a row of Pascal's triangle over 4^n.
 
 Citation: H. Knutsson and C.-F. Westin, "Normalized and differential convolution", CVPR 1993,
 doi:10.1109/CVPR.1993.341081.
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
+
+from ...filters.separable import separable_average
 
 
 def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
@@ -26,22 +29,8 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
     -------
     (H, W) float64 ndarray
     """
-    smooth = np.pad(plane.astype(np.float64), 1)
-    other = np.empty_like(smooth)
-    for _ in range(passes):
-        _filter_down(smooth, other)
-        _filter_down(other.T, smooth.T)
-    return smooth[1:-1, 1:-1]
-
-
-def _filter_down(plane: np.ndarray, out: np.ndarray) -> None:
-    """Filter a map down its columns, with periodic boundaries."""
-    np.multiply(plane, 2, out=out)
-    out[1:] += plane[:-1]
-    out[0] += plane[-1]
-    out[:-1] += plane[1:]
-    out[-1] += plane[0]
-    out /= 4
+    row = [math.comb(2 * passes, k) / 4**passes for k in range(passes, 2 * passes + 1)]
+    return separable_average(plane.astype(np.float64), np.array(row), mirrored=False)
 
 
 def surrounded(inside: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...imaging.channels import length, total
 from ...photo.camera import Camera
 from ...shading.perspective import lifted_points, object_axis
 from ..triangulation.vertex_normals import interpolated_normals
@@ -99,7 +100,7 @@ def make_solid(
     InputError
         If no block of 2 x 2 pixels lies inside.
     """
-    mesh = make_solid_mesh(height, (normal * view).sum(-1), mask, rim, back, triangles)
+    mesh = make_solid_mesh(height, total(normal * view), mask, rim, back, triangles)
     smooth, detail = interpolated_normals(
         mesh.visible, _continued_normals(normal, mask, mesh.pixels), view
     )
@@ -174,8 +175,11 @@ def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray)
     inside = mask.copy()
     inside[pixels[:, 0], pixels[:, 1]] = True
     found = continued(np.where(mask[..., None], normal, 0), mask, inside)
-    length = np.linalg.norm(found, axis=-1, keepdims=True)
-    return np.where(length > 0, found / np.maximum(length, 1e-9), (0.0, 0.0, 1.0))
+    row, column = np.nonzero(~mask)
+    beyond = found[row, column]
+    size = length(beyond)[:, None]
+    found[row, column] = np.where(size > 0, beyond / np.maximum(size, 1e-9), (0.0, 0.0, 1.0))
+    return found
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -197,4 +201,4 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
     sums = np.stack(
         [np.bincount(faces.ravel(), part.repeat(3), len(vertices)) for part in across.T], -1
     )
-    return np.asarray(sums / np.maximum(np.linalg.norm(sums, axis=-1, keepdims=True), 1e-30))
+    return np.asarray(sums / np.maximum(length(sums)[:, None], 1e-30))
