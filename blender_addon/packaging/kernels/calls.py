@@ -1,10 +1,9 @@
 """Calls of every kernel, recorded from small programs, to be repeated elsewhere.
 
-Separation by every method, a filled hole, a bending table, a turned mesh, a membrane, a reduced
-photo, filters, a convolution, a minimum cut, and, in both precisions, averages along paths and
-SIRFS on a ball of a few pixels call each version of each kernel. The first calls of each are kept,
-with what the arrays held before and after. They run on one thread: others would write to these
-arrays meanwhile.
+Separation by every method, a filled hole, a bending table, a turned mesh, a reduced photo, filters,
+a convolution, a minimum cut, and, in both precisions, averages along paths and SIRFS on a ball of a
+few pixels call each version of each kernel. The first calls of each are kept, with what the arrays
+held before and after. They run on one thread: others would write to these arrays meanwhile.
 """
 
 from collections import Counter
@@ -31,7 +30,6 @@ from isc_core.numerics.kernel_library import KernelLibrary, flattened
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.numerics.maximum_flow import source_side
 from isc_core.prior_fitting.roughness import roughness
-from isc_core.result_files.solids.membrane import membrane
 from isc_core.result_files.turned_view import turned_view
 from isc_core.scene.normal_estimate import NormalEstimate
 from isc_core.scene.shading_estimate import ShadingEstimate
@@ -189,7 +187,6 @@ def _run_programs() -> None:
     turned_view(corners, faces, corners, 20.0, _SIDE, 2.0)
     turned_view(corners, faces, places, 20.0, _SIDE, 2.0, texture=rng.random((9, 8, 3)))
     averaged(diffuse.astype(np.float32), mask, 0.6)
-    membrane(facing > 0.5, mask & (facing <= 0.5), facing, 4.0)
     labelled(mask)
     nearest_pixels(mask)
     spline_coefficients(facing)

@@ -12,13 +12,9 @@ Numerische Mathematik 75 (1996), doi:10.1007/s002110050234.
 Limits: a fixed number of sweeps: a sphere of 2,200 pixels is 1.1 % of its radius off.
 """
 
-# mypy: disable-error-code="no-untyped-def"
-# (the compiler infers the types of every call)
-
 import numpy as np
 
 from ...imaging.upsampling import enlarged
-from ...numerics.jit import jit
 
 _SWEEPS, _OVER = 40, 1.8
 # Levels longer than `_LONG` pixels have fewer sweeps, inversely to their length, down to `_FEWEST`.
@@ -76,21 +72,25 @@ def block_sums(plane: np.ndarray) -> np.ndarray:
 
 
 def _relaxed(found: np.ndarray, inside: np.ndarray, load: float) -> np.ndarray:
+    width = found.shape[1]
+    pixels = np.flatnonzero(inside)
+    row, column = np.divmod(pixels, width)
+    colors = [pixels[(row + column) % 2 == parity] for parity in (0, 1)]
+    flat, length = found.reshape(-1), max(found.shape)
     sweeps, over = _SWEEPS, _OVER
-    if max(found.shape) > _LONG:
-        sweeps, over = max(_SWEEPS * _LONG // max(found.shape), _FEWEST), _OVER_LONG
-    _relax(found, inside, load, sweeps, over)
+    if length > _LONG:
+        sweeps, over = max(_SWEEPS * _LONG // length, _FEWEST), _OVER_LONG
+    around = [(at - 1, at + 1, at - width, at + width) for at in colors]
+    kept = [flat.take(at) for at in colors]
+    for _ in range(sweeps):
+        for at, sides, values in zip(colors, around, kept, strict=True):
+            change = flat.take(sides[0])
+            for side in sides[1:]:
+                change += flat.take(side)
+            change += load
+            change /= 4
+            change -= values
+            change *= over
+            values += change
+            flat[at] = values
     return found
-
-
-@jit(types="f8[2] b1[2] f8 i8 f8")
-def _relax(found, inside, load, sweeps, over):
-    """Sweep `found` in place: pixels of one colour of a chessboard, then those of the other."""
-    height, width = found.shape
-    for half_sweep in range(2 * sweeps):
-        for i in range(1, height - 1):
-            above, row, below, here = found[i - 1], found[i], found[i + 1], inside[i]
-            for j in range(1 + (i + 1 + half_sweep) % 2, width - 1, 2):
-                if here[j]:
-                    change = row[j - 1] + row[j + 1] + above[j] + below[j] + load
-                    row[j] += over * (change / 4 - row[j])

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...filters.separable import separable_average
+_ROWS = 128
 
 
 def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
@@ -29,8 +29,28 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
     -------
     (H, W) float64 ndarray
     """
-    row = [math.comb(2 * passes, k) / 4**passes for k in range(passes, 2 * passes + 1)]
-    return separable_average(plane.astype(np.float64), np.array(row), mirrored=False)
+    taps = [math.comb(2 * passes, k) / 4**passes for k in range(passes, 2 * passes + 1)]
+    height, width = plane.shape
+    padded = np.pad(plane.astype(np.float64), passes)
+    smooth = np.empty((height, width))
+    for start in range(0, height, _ROWS):  # few enough rows to stay in the cache
+        rows = padded[start : min(start + _ROWS, height) + 2 * passes]
+        down = _weighted(rows, taps)
+        smooth[start : start + _ROWS] = _weighted(down.T, taps).T
+    return smooth
+
+
+def _weighted(rows: np.ndarray, taps: Sequence[float]) -> np.ndarray:
+    """Weighted sums of rows (h + 2 r, w) down to (h, w), with even weights from the centre out."""
+    reach = len(taps) - 1
+    count = len(rows) - 2 * reach
+    total = taps[0] * rows[reach : reach + count]
+    pair = np.empty_like(total)
+    for k in range(1, reach + 1):
+        np.add(rows[reach - k :][:count], rows[reach + k :][:count], out=pair)
+        pair *= taps[k]
+        total += pair
+    return total
 
 
 def surrounded(inside: np.ndarray) -> np.ndarray:

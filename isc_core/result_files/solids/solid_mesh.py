@@ -122,7 +122,7 @@ def make_solid_mesh(
     smooth, thin = smooth_cover(rim.outline), rim.sheet
     inside = smooth > 0.5
     core = inside & ~thin
-    known = continued(np.where(mask, height, 0.0), mask, inside)
+    known = continued(np.where(mask, height, 0.0).astype(np.float64), mask, inside)
     sheet = outlined(smooth, known + _STEP * thin, cosine, triangles)
     # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
     around = _grown(core) & ~core
@@ -187,11 +187,11 @@ def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.nd
 
     Returns
     -------
-    float64 ndarray
-        Of the shape of `height`.
+    ndarray
+        Of the shape and type of `height`.
     """
     padded, more = (mask.shape[0] + 2, mask.shape[1] + 2), height.shape[2:]
-    found, known = np.zeros((*padded, *more)), np.pad(mask, 1)
+    found, known = np.zeros((*padded, *more), height.dtype), np.pad(mask, 1)
     found[1:-1, 1:-1] = height
     frame, missing = np.pad(np.ones_like(mask), 1), np.pad(inside & ~mask, 1)
     ring, left = np.flatnonzero(np.pad(_grown(mask) & ~mask, 1)), np.count_nonzero(missing)

@@ -175,10 +175,12 @@ def _continued_normals(normal: np.ndarray, mask: np.ndarray, pixels: np.ndarray)
     inside = mask.copy()
     inside[pixels[:, 0], pixels[:, 1]] = True
     found = continued(np.where(mask[..., None], normal, 0), mask, inside)
-    row, column = np.nonzero(~mask)
+    x, y, z = np.moveaxis(found, -1, 0)
+    known = (x != 0) | (y != 0) | (z != 0)
+    np.copyto(z, 1.0, where=~known)
+    row, column = np.nonzero(known & ~mask)
     beyond = found[row, column]
-    size = length(beyond)[:, None]
-    found[row, column] = np.where(size > 0, beyond / np.maximum(size, 1e-9), (0.0, 0.0, 1.0))
+    found[row, column] = beyond / length(beyond)[:, None]
     return found
 
 

@@ -67,15 +67,37 @@ class Patch:
     ----------
     faces : (T, 3) int64 ndarray
         Vertices of each triangle.
-    pixels : (T, P, 2) int64 ndarray
-        Row and column of the pixels in each triangle, including those on its sides.
+    first : (T, 2) int64 ndarray
+        Row and column of the first vertex.
+    offsets : (P, 2) int64 ndarray
+        From there to each pixel in the triangle, including those on its sides.
     weights : (P, 3) float64 ndarray
         Barycentric coordinates of the pixels.
     """
 
     faces: np.ndarray
-    pixels: np.ndarray
+    first: np.ndarray
+    offsets: np.ndarray
     weights: np.ndarray
+
+    @property
+    def pixels(self) -> np.ndarray:
+        """Row and column of the pixels (T, P, 2)."""
+        return self.first[:, None] + self.offsets
+
+    def flat_pixels(self, width: int) -> np.ndarray:
+        """Return the indices of the pixels in a flattened map.
+
+        Parameters
+        ----------
+        width : int
+            Of the map.
+
+        Returns
+        -------
+        (P, T) int64 ndarray
+        """
+        return np.add.outer(self.offsets @ (width, 1), self.first @ (width, 1))
 
 
 def adaptive_triangles(
@@ -127,12 +149,14 @@ def covered_pixels(mesh: Triangulation, stride: int = 1) -> Iterator[Patch]:
     """
     corners = mesh.vertices[mesh.faces] * stride
     sides = (corners[:, 1:] - corners[:, :1]).reshape(-1, 4)
-    order = np.lexsort(sides.T[::-1])
-    ends = np.flatnonzero(np.diff(sides[order], axis=0).any(axis=1)) + 1
+    count = 2 * int(np.abs(sides).max(initial=0)) + 1
+    kinds = sides @ (count**3, count**2, count, 1)
+    order = np.argsort(kinds, kind="stable")
+    ends = np.flatnonzero(np.diff(kinds[order])) + 1
     for group in np.split(order, ends):
         offsets, weights = _lattice(sides[group[0]].reshape(2, 2))
         for part in np.array_split(group, -(-len(group) * len(offsets) // _MOST_PIXELS)):
-            yield Patch(mesh.faces[part], corners[part, :1] + offsets, weights)
+            yield Patch(mesh.faces[part], corners[part, 0], offsets, weights)
 
 
 def _lattice(sides: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -71,12 +71,13 @@ def mean_normals(
         Unit vectors.
     """
     sums = np.zeros((len(grid.vertices), 3))
+    seen = np.ascontiguousarray(normal).reshape(-1, 3)
     for patch in covered_pixels(grid, stride):
-        row, column = patch.pixels.T
-        part = np.einsum("pk,ptc->ktc", patch.weights, normal[row, column])
-        part = part.swapaxes(0, 1).reshape(-1, 3)
+        there = seen.take(patch.flat_pixels(normal.shape[1]), axis=0)
+        part = patch.weights.T.astype(seen.dtype) @ there.reshape(len(there), -1)
+        corners = patch.faces.T.ravel()
         for axis in range(3):
-            sums[:, axis] += np.bincount(patch.faces.reshape(-1), part[:, axis], len(sums))
+            sums[:, axis] += np.bincount(corners, part[:, axis::3].ravel(), len(sums))
     return facing(sums.astype(np.float32), directions_at(view, *(grid.vertices * stride).T))
 
 
@@ -104,9 +105,11 @@ def detail_normals(
         Of the vertices.
     """
     detail = np.full((*normal.shape[:2], 3), np.nan, np.float32)
+    flat = detail.reshape(-1, 3)
     for patch in covered_pixels(grid, stride):
-        base = np.einsum("pk,ktc->tpc", patch.weights.astype(np.float32), smooth[patch.faces.T])
-        detail[patch.pixels[..., 0], patch.pixels[..., 1]] = base
+        corners = smooth.take(patch.faces.T, axis=0).reshape(3, -1)
+        base = patch.weights.astype(np.float32) @ corners
+        flat[patch.flat_pixels(normal.shape[1])] = base.reshape(len(base), -1, 3)
     for block in row_blocks(detail.shape):  # each pixel once: triangles share those on their sides
         rows = detail[block.rows]
         covered = ~np.isnan(rows[..., 0])
