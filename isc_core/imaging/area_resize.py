@@ -17,7 +17,7 @@ import numpy as np
 from ..filters.interpolation import resampled_plane
 from ..numerics.ellpack import Ellpack
 from ..numerics.jit import jit
-from .bounding_box import mask_slices
+from .bounding_box import FramePart, mask_slices
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +60,27 @@ class AreaFilter:
     def __call__(self, values: np.ndarray) -> np.ndarray:
         return resampled_plane(values, self.rows, self.columns)
 
+    def means(self, values: np.ndarray, part: FramePart) -> np.ndarray:
+        """Average over the pixels of a part of the new frame.
+
+        Parameters
+        ----------
+        values : (H, W) ndarray
+        part : FramePart
+
+        Returns
+        -------
+        (h, w) float32 ndarray
+            As large as the part, or smaller where that extends past the frame.
+        """
+        place = part.rows, part.columns
+        old = tuple(
+            _used(matrix, new) for matrix, new in zip((self.rows, self.columns), place, strict=True)
+        )
+        down, across = self.rows.part(part.rows, old[0]), self.columns.part(part.columns, old[1])
+        sums = resampled_plane(values[old], down, across)
+        return np.asarray(sums / np.maximum(self.full[place], 1e-6))
+
 
 def reduced_count(count: int, factor: float) -> int:
     """Return the number of new pixels along an axis.
@@ -77,6 +98,12 @@ def reduced_count(count: int, factor: float) -> int:
         The last may extend past the old ones.
     """
     return max(1, int(np.ceil(count * factor - 1e-6)))
+
+
+def _used(matrix: Ellpack, new: slice) -> slice:
+    """The old pixels that some new ones cover."""
+    used = matrix.columns[new][matrix.weights[new] != 0]
+    return slice(int(used.min()), int(used.max()) + 1)
 
 
 def _overlaps(count: int, factor: float) -> Ellpack:

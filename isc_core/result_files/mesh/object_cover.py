@@ -143,7 +143,8 @@ def object_cover(stored: ResultPart, given: np.ndarray | None) -> ObjectCover | 
         return None  # it is of another photo
     own = source.get("mask_from") == "alpha"
     if scale < 1:
-        share = _resized(codes, scale, FramePart.whole(stored.part.shape))
+        seen = _reduced_part(codes, scale, stored.part.shape)
+        share = seen.placed(_resized(codes, scale, seen))
         place = FramePart.around(mask | (share > 0), rim_reach(mask, own))
         share = place.cut(share)
     else:
@@ -162,6 +163,16 @@ def _codes(cover: np.ndarray) -> np.ndarray:
     return codes
 
 
+def _reduced_part(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> FramePart:
+    """The part of the reduced frame that the covered pixels, of which there are some, touch."""
+    boxes = (np.flatnonzero(codes.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (
+        slice(int(at[0] * scale), min(int(np.ceil((at[-1] + 1) * scale)), size))
+        for at, size in zip(boxes, shape, strict=True)
+    )
+    return FramePart(rows, columns, shape)
+
+
 def _near(share: np.ndarray, mask: np.ndarray, own: bool) -> tuple[np.ndarray, np.ndarray | None]:
     """The coverage of the object alone, and where its rim is soft."""
     near = dilated(mask, _NEAR)
@@ -178,9 +189,7 @@ def _near(share: np.ndarray, mask: np.ndarray, own: bool) -> tuple[np.ndarray, n
 def _resized(codes: np.ndarray, scale: float, part: FramePart) -> np.ndarray:
     """The coverage (h, w) float32 of a part at a scale, unchanged from 1; 0 beyond the photo."""
     if scale < 1:
-        area = AreaFilter.of(codes.shape, scale)
-        cover = area(codes) / np.maximum(255 * area.full, 1e-6)
-        cover = part.cut(np.clip(cover, 0, 1))
+        cover = np.clip(AreaFilter.of(codes.shape, scale).means(codes, part) / 255, 0, 1)
     else:
         cover = part.cut(codes).astype(np.float32) / 255
     found = np.zeros(part.size, np.float32)
