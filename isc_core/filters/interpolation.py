@@ -1,8 +1,13 @@
 """Resampling of a plane, along one axis and then along the other."""
 
+import math
+from collections.abc import Iterator
+
 import numpy as np
 
 from ..numerics.ellpack import Ellpack
+
+_VALUES = 1 << 18  # that a block reads, approximately
 
 
 def linear_interpolation(places: np.ndarray, size: int, dtype: type = np.float64) -> Ellpack:
@@ -43,4 +48,34 @@ def resampled_plane(plane: np.ndarray, down: Ellpack, across: Ellpack) -> np.nda
     (h, w) ndarray
         Of the type of the matrices.
     """
-    return np.asarray((across @ (down @ plane).T).T)
+    result = np.empty((len(down.columns), len(across.columns)), down.weights.dtype)
+    for rows, block in banded_products(down, plane):
+        result[rows] = (across @ block.T).T
+    return result
+
+
+def banded_products(matrix: Ellpack, values: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Apply a banded matrix to the first axis of some values, a block of its rows at a time.
+
+    Values of another type or layout are converted by blocks, too.
+
+    Parameters
+    ----------
+    matrix : Ellpack
+        (n, m), whose neighbouring rows have nearly the same columns.
+    values : (m, ...) ndarray
+
+    Yields
+    ------
+    rows : slice
+        Of the matrix.
+    products : (rows, ...) ndarray
+    """
+    count = len(matrix.columns)
+    size = max(math.prod(values.shape[1:]) * max(len(values) // max(count, 1), 1), 1)
+    step = max(_VALUES // size, 1)
+    for first in range(0, count, step):
+        rows = slice(first, min(first + step, count))
+        used = matrix.columns[rows][matrix.weights[rows] != 0]
+        band = slice(int(used.min(initial=len(values) - 1)), int(used.max(initial=0)) + 1)
+        yield rows, matrix.part(rows, band) @ values[band]

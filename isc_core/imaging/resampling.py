@@ -7,7 +7,7 @@ object, so that no background bleeds in.
 
 import numpy as np
 
-from ..filters.interpolation import linear_interpolation, resampled_plane
+from ..filters.interpolation import banded_products, linear_interpolation, resampled_plane
 from ..filters.splines import spline_coefficients, spline_values
 from ..numerics.ellpack import Ellpack
 
@@ -101,10 +101,11 @@ def resampled(values: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
     down, right = (
         _weights(old, new, np.float32) for old, new in zip((rows, columns), shape, strict=True)
     )
-    planes = (down @ values).reshape(shape[0], columns, -1)
+    planes = values.reshape(rows, columns, -1)
     result = np.empty((*shape, planes.shape[2]), np.float32)
-    for c in range(planes.shape[2]):
-        result[..., c] = (right @ planes[..., c].T).T
+    for some, block in banded_products(down, planes):
+        for c in range(block.shape[2]):
+            result[some, :, c] = (right @ block[..., c].T).T
     return result.reshape(*shape, *values.shape[2:])
 
 

@@ -163,7 +163,7 @@ def _whole(light: np.ndarray) -> Crop:
 
 def _upsampled(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
     cover = resampled(found.cover, (shape[0], shape[1]))
-    return replace(found, cover=np.clip(cover, 0, 1))
+    return replace(found, cover=np.clip(cover, 0, 1, out=cover))
 
 
 def _second_pass(

@@ -33,7 +33,9 @@ _POWER = 8
 _LEAST = 1e-6
 
 
-def estimate_foreground(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
+def estimate_foreground(
+    image: np.ndarray, cover: np.ndarray, *, in_place: bool = False
+) -> np.ndarray:
     """Replace the colours at the rim of an object by foreground colours.
 
     Parameters
@@ -42,6 +44,8 @@ def estimate_foreground(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
         Linear.
     cover : (H, W) float32 ndarray
         0 to 1.
+    in_place : bool, optional
+        Whether to change `image` instead of a copy.
 
     Returns
     -------
@@ -49,9 +53,12 @@ def estimate_foreground(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
         The image, changed where the coverage is at least half, but below 1, and at the outermost
         pixels of those of at least half. The same array if no pixel is partly covered.
     """
-    result = unmixed(image, cover)
-    if result is not image:
-        _limit_outermost(result, cover >= 0.5)
+    rim = _rim(cover)
+    if not rim.any():
+        return image
+    result = image if in_place else image.copy()
+    _unmix(result, cover, rim)
+    _limit_outermost(result, cover >= 0.5)
     return result
 
 
@@ -70,9 +77,20 @@ def unmixed(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
         The image, changed where the coverage is at least half, but below 1; the same array if there
         is no such pixel.
     """
-    rim = (cover >= 0.5) & (cover < 1)
+    rim = _rim(cover)
     if not rim.any():
         return image
+    result = image.copy()
+    _unmix(result, cover, rim)
+    return result
+
+
+def _rim(cover: np.ndarray) -> np.ndarray:
+    return np.asarray((cover >= 0.5) & (cover < 1))
+
+
+def _unmix(image: np.ndarray, cover: np.ndarray, rim: np.ndarray) -> None:
+    """Take the background out of the pixels of the rim, which is not empty, in place."""
     place = mask_slices(cover > 0)
     part, share = image[place], cover[place]
     size = _downscaled(share.shape, _SOLVED)
@@ -82,9 +100,7 @@ def unmixed(image: np.ndarray, cover: np.ndarray) -> np.ndarray:
     at = (rows * size[0]) // share.shape[0], (columns * size[1]) // share.shape[1]
     a, seen = share[rows, columns][:, None], part[rows, columns]
     colours = front[at] + a * (seen - a * front[at] - (1 - a) * back[at])
-    result = image.copy()
-    result[place][rows, columns] = np.maximum(colours, 0)
-    return result
+    part[rows, columns] = np.maximum(colours, 0)
 
 
 def _downscaled(shape: tuple[int, ...], side: int) -> tuple[int, int]:

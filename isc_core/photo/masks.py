@@ -105,33 +105,47 @@ def find_mask(
         opaque = raster.transparency >= 0.5
         if float((~opaque).mean()) >= _LEFT_OUT:
             return opaque, "alpha"
-    light = finite_or_zero(largest(linear))
-    if not (light > 0).any():
+    border = np.concatenate([linear[0], linear[-1], linear[:, 0], linear[:, -1]])
+    if not _is_light(border) and not _is_light(linear):
         raise InputError(
             f"{name}: the image is black: there is nothing to recover; use another photo"
         )
-    # A float file has no peak value: use its 99th percentile as white.
-    white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
+    white = 1.0 if raster.peak is not None else _white(linear)
     if finder is not None and finder.always:
         found = finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "hints"
-    bright = light > white * float(srgb_to_linear(BLACK))
-    if bright[0].any() or bright[-1].any() or bright[:, 0].any() or bright[:, -1].any():
+    if _bright(border, white).any():
         found = None if finder is None else finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "automatic"
         if whole_frame:
-            return np.ones_like(bright), "whole frame"
+            return np.ones(linear.shape[:2], bool), "whole frame"
         raise InputError(
             f"{name}: there is no mask, no transparency and no black border: "
             "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask"
         )
+    bright = _bright(linear, white)
     if not bright.any():
         raise InputError(
             f"{name}: the image is almost black: there is nothing to recover; use another photo"
         )
     return tidy_mask(bright), "black border"
+
+
+def _is_light(linear: np.ndarray) -> bool:
+    return bool((finite_or_zero(largest(linear)) > 0).any())
+
+
+def _white(linear: np.ndarray) -> float:
+    """The white of a float file, which has no peak value: the 99th percentile of its light."""
+    light = finite_or_zero(largest(linear))
+    return float(np.percentile(light[light > 0], 99.0))
+
+
+def _bright(linear: np.ndarray, white: float) -> np.ndarray:
+    """Which pixels are not black."""
+    return np.asarray(finite_or_zero(largest(linear)) > white * float(srgb_to_linear(BLACK)))
 
 
 def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:

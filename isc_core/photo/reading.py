@@ -165,10 +165,15 @@ def _photo(
     lens = raster.focal_length
     cropped = lens is not None and lens.cropped
     light = as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name))
+    code_value = _code_value(raster, used, linear, mask)
+    notes = tuple(_notes(raster, used, linear, mask))
+    if mixed and cover is not None:
+        # The light of a float file may be the raster itself.
+        light = estimate_foreground(light, cover, in_place=raster.peak is not None)
     return Photo(
-        image=estimate_foreground(light, cover) if mixed and cover is not None else light,
+        image=light,
         mask=mask,
-        code_value=_code_value(raster, used, linear, mask),
+        code_value=code_value,
         clipped=_clipped(raster),
         original=PhotoSource(
             raster.sha256,
@@ -177,7 +182,7 @@ def _photo(
             used,
             mask_from,
             "" if raster.space is None else raster.space.name,
-            tuple(_notes(raster, used, linear, mask)),
+            notes,
             cropped,
             None if found is None else found.confidence,
         ),

@@ -210,15 +210,11 @@ def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.nd
     return found[1:-1, 1:-1]
 
 
-def _sums(plane: np.ndarray) -> np.ndarray:
-    """Sums over the 3 x 3 pixels around each."""
-    padded = np.pad(plane, 1)
-    rows = padded[:-2] + padded[1:-1] + padded[2:]
-    return np.asarray(rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:])
-
-
 def _grown(plane: np.ndarray) -> np.ndarray:
-    return np.asarray(_sums(plane.astype(np.float64)) > 0.5)
+    """The pixels of a mask and their eight neighbours."""
+    padded = np.pad(plane, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
 def _core_faces(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
