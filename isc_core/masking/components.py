@@ -3,7 +3,8 @@
 import numpy as np
 
 from ..filters.components import labelled
-from ..imaging.bounding_box import mask_box
+from ..imaging.bounding_box import mask_box, mask_slices
+from ..imaging.row_blocks import row_blocks
 
 _SMALL = 0.1  # of the largest component's area: smaller ones do not count
 _SEVERAL = 0.3  # of the largest component's area: a second one as large is another object
@@ -39,7 +40,7 @@ def is_one_piece(mask: np.ndarray) -> bool:
     -------
     bool
     """
-    return len(_chosen_labels(mask, _SMALL)[1]) == 1
+    return bool(mask.any()) and len(_chosen_labels(mask[mask_slices(mask)], _SMALL)[1]) == 1
 
 
 def shows_several(mask: np.ndarray) -> bool:
@@ -55,11 +56,14 @@ def shows_several(mask: np.ndarray) -> bool:
     bool
         Whether a second component is about as large as the first.
     """
-    return len(_chosen_labels(mask, _SEVERAL)[1]) > 1
+    return len(_chosen_labels(mask[mask_slices(mask)], _SEVERAL)[1]) > 1
 
 
 def _chosen_labels(mask: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:
     """The labels (H, W) of the components, and those of the components that are not small."""
     labels, count = labelled(mask, corners=True)
-    areas = np.bincount(labels[mask], minlength=count + 1)
+    areas = np.zeros(count + 1, np.int64)
+    for block in row_blocks(mask.shape):
+        areas += np.bincount(labels[block.rows].ravel(), minlength=count + 1)
+    areas[0] = 0
     return labels, np.flatnonzero(areas >= max(share * areas.max(), 1))
