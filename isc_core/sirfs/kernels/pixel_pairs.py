@@ -113,9 +113,9 @@ def smoothness_block(first, last, block, whitened, photo, pairs, out):
                 for k in range(n):
                     s[k] = half * (d0[k] * d0[k] + d1[k] * d1[k] + d2[k] * d2[k])
                 for k in range(n):
-                    f[k] = np.sqrt(s[k] * s[k] + soft)
-                for k in range(n):
-                    s[k] = w[k] * s[k] / f[k]
+                    root = np.sqrt(s[k] * s[k] + soft)
+                    f[k] = root
+                    s[k] = w[k] * s[k] / root
                 part = _tabulated(f[:n], w, pairs, cells, s)
                 for k in range(n):
                     d0[k] *= s[k]
@@ -173,9 +173,9 @@ def curvature_block(first, last, block, geometry, photo, pairs, out):
             _multiply(valid[i, a:b], valid[q, a + right : b + right], w)
             _subtract(geometry[i, 8, a:b], geometry[q, 8, a + right : b + right], d)
             for k in range(n):
-                f[k] = np.sqrt(d[k] * d[k] + soft)
-            for k in range(n):
-                d[k] = w[k] * d[k] / f[k]
+                root = np.sqrt(d[k] * d[k] + soft)
+                f[k] = root
+                d[k] = w[k] * d[k] / root
             cost += _tabulated(f[:n], w, pairs, cells, d)
             if q < last:
                 lower = gradient[q, a + right : b + right]
@@ -214,13 +214,12 @@ def _tabulated(f, weight, pairs, cells, slope):
     inv, low, last_cell = t(pairs.inverse_step), t(pairs.low), t(len(table) - 2)
     count, cost = len(f), t(0)
     for k in range(count):
-        f[k] = (f[k] - low) * inv
-    for k in range(count):
-        cells[k] = np.int32(min(f[k], last_cell))
-    for k in range(count):
-        f[k] -= t(cells[k])
+        position = (f[k] - low) * inv
+        cell = np.int32(min(position, last_cell))
+        cells[k] = cell
+        f[k] = position - t(cell)
     for k in range(count):  # the table look-up keeps this loop from being vectorised
-        cell = cells[k]
+        cell = np.uint32(cells[k])  # without a sign: no test for an index from the end
         rise = rises[cell]
         cost += weight[k] * (table[cell] + f[k] * rise)
         slope[k] *= rise
