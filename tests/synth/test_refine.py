@@ -162,7 +162,7 @@ def contrasted(d: Decomposition) -> Decomposition:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("size", [96, 480])
+@pytest.mark.parametrize("size", [96, 240])
 def test_a_refined_result_keeps_every_identity_and_its_files(
     tmp_path: Path, size: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -189,7 +189,7 @@ def test_a_refined_result_keeps_every_identity_and_its_files(
 
 @pytest.mark.slow
 def test_the_start_is_kept_if_it_is_optimal(tmp_path: Path) -> None:
-    start = dome(96)
+    start = dome(64)
     done = refine(start)
     assert not done.kept
     assert np.array_equal(done.result.shading, start.shading)
