@@ -122,25 +122,27 @@ def splat_color(photo, cells, counts):
     """
     weight, spans = photo.weight, photo.spans
     cell, side = cells.node, cells.side
-    right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
+    # Indices without a sign need no test for an index from the end.
+    right, down = np.uint64(counts.shape[2]), np.uint64(counts.shape[1] * counts.shape[2])
+    one = np.uint64(1)
     flat = counts.reshape(counts.size)
     for i in range(weight.shape[0]):
         for j in range(spans[i, 0], spans[i, 1]):
             if weight[i, j] == 0:
                 continue
-            k = cell[i, j]
+            k = np.uint64(cell[i, j])
             x, y, z = float(side[i, 0, j]), float(side[i, 1, j]), float(side[i, 2, j])
             share = float(weight[i, j])
             x0, y0, x = share * (1 - x), 1 - y, share * x
             p00, p01, p10, p11 = x0 * y0, x0 * y, x * y0, x * y
             flat[k] += p00 * (1 - z)
-            flat[k + 1] += p00 * z
+            flat[k + one] += p00 * z
             flat[k + right] += p01 * (1 - z)
-            flat[k + right + 1] += p01 * z
+            flat[k + right + one] += p01 * z
             flat[k + down] += p10 * (1 - z)
-            flat[k + down + 1] += p10 * z
+            flat[k + down + one] += p10 * z
             flat[k + down + right] += p11 * (1 - z)
-            flat[k + down + right + 1] += p11 * z
+            flat[k + down + right + one] += p11 * z
 
 
 @jit(types=f"r[3] {arrays.PHOTO} {_GRID} {_CELLS} r[3] r[3]", math=REASSOCIATED)
@@ -163,18 +165,20 @@ def gather_color(palette, photo, grid, cells, node_gradient, gradient):
     cell, side = cells.node, cells.side
     t = gradient.dtype.type
     inv = t(grid.inverse_step)
-    right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]
+    right = np.uint64(node_gradient.shape[2])  # without a sign, as in `splat_color`
+    down = np.uint64(node_gradient.shape[1] * node_gradient.shape[2])
+    one = np.uint64(1)
     flat = node_gradient.reshape(node_gradient.size)
     for i in range(palette.shape[0]):
         gx_row, gy_row, gz_row = gradient[i, 0], gradient[i, 1], gradient[i, 2]
         for j in range(spans[i, 0], spans[i, 1]):
             if weight[i, j] == 0:
                 continue
-            k, share = cell[i, j], inv * weight[i, j]
+            k, share = np.uint64(cell[i, j]), inv * weight[i, j]
             x, y, z = side[i, 0, j], side[i, 1, j], side[i, 2, j]
-            g000, g001, g010, g011 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
+            g000, g001, g010, g011 = flat[k], flat[k + one], flat[k + right], flat[k + right + one]
             k += down
-            g100, g101, g110, g111 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
+            g100, g101, g110, g111 = flat[k], flat[k + one], flat[k + right], flat[k + right + one]
             d00, d01, d10, d11 = g001 - g000, g011 - g010, g101 - g100, g111 - g110
             e00, e01, e10, e11 = g000 + z * d00, g010 + z * d01, g100 + z * d10, g110 + z * d11
             f0, f1 = e01 - e00, e11 - e10
