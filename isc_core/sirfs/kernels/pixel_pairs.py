@@ -219,9 +219,9 @@ def _tabulated(f, weight, pairs, cells, slope):
         cells[k] = cell
         f[k] = position - t(cell)
     for k in range(count):  # the table look-up keeps this loop from being vectorised
-        cell = np.uint32(cells[k])  # without a sign: no test for an index from the end
-        rise = rises[cell]
-        cost += weight[k] * (table[cell] + f[k] * rise)
+        place = np.uint32(cells[k])  # without a sign: no test for an index from the end
+        rise = rises[place]
+        cost += weight[k] * (table[place] + f[k] * rise)
         slope[k] *= rise
     return cost
 
