@@ -157,7 +157,7 @@ class WorkerProcess:
     def _end_in_thread(self, patience: float) -> None:
         """Not a daemon thread: Blender's exit waits for it, so that the files are removed."""
         if not threading.main_thread().is_alive():
-            # Python is exiting, and waits for no thread that starts now (from 3.12 none can).
+            # Python is exiting, and waits for no thread that starts now (in 3.12, none can).
             self._end(patience)
             return
         threading.Thread(
