@@ -36,6 +36,15 @@ def test_everything_else_stays_as_it_is() -> None:
     assert estimate_foreground(image, hard) is image
 
 
+def test_in_place_gives_the_same_in_the_image_itself() -> None:
+    image, cover, _ = composite()
+    kept = image.copy()
+    copied = estimate_foreground(image, cover)
+    assert np.array_equal(image, kept)
+    assert estimate_foreground(image, cover, in_place=True) is image
+    assert np.array_equal(image, copied)
+
+
 @pytest.mark.parametrize(("side", "scale"), [(100, 1), (800, 2)])
 @pytest.mark.parametrize("radius", [-0.5, 0.5, 1.0])
 def test_the_outermost_pixels_of_an_inexact_mask_stay_within_inner_colours(
