@@ -76,6 +76,5 @@ def banded_products(matrix: Ellpack, values: np.ndarray) -> Iterator[tuple[slice
     step = max(_VALUES // size, 1)
     for first in range(0, count, step):
         rows = slice(first, min(first + step, count))
-        used = matrix.columns[rows][matrix.weights[rows] != 0]
-        band = slice(int(used.min()), int(used.max()) + 1) if used.size else slice(0, 1)
-        yield rows, matrix.part(rows, band) @ values[band]
+        part, columns = matrix.band(rows)
+        yield rows, part @ values[columns]

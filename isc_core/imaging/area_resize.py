@@ -73,13 +73,10 @@ class AreaFilter:
         (h, w) float32 ndarray
             As large as the part, or smaller where that extends past the frame.
         """
-        place = part.rows, part.columns
-        old = tuple(
-            _used(matrix, new) for matrix, new in zip((self.rows, self.columns), place, strict=True)
-        )
-        down, across = self.rows.part(part.rows, old[0]), self.columns.part(part.columns, old[1])
-        sums = resampled_plane(values[old], down, across)
-        return np.asarray(sums / np.maximum(self.full[place], 1e-6))
+        down, old_rows = self.rows.band(part.rows)
+        across, old_columns = self.columns.band(part.columns)
+        sums = resampled_plane(values[old_rows, old_columns], down, across)
+        return np.asarray(sums / np.maximum(self.full[part.rows, part.columns], 1e-6))
 
 
 def reduced_count(count: int, factor: float) -> int:
@@ -98,12 +95,6 @@ def reduced_count(count: int, factor: float) -> int:
         The last may extend past the old ones.
     """
     return max(1, int(np.ceil(count * factor - 1e-6)))
-
-
-def _used(matrix: Ellpack, new: slice) -> slice:
-    """The old pixels that some new ones cover."""
-    used = matrix.columns[new][matrix.weights[new] != 0]
-    return slice(int(used.min()), int(used.max()) + 1)
 
 
 def _overlaps(count: int, factor: float) -> Ellpack:

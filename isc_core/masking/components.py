@@ -40,7 +40,7 @@ def is_one_piece(mask: np.ndarray) -> bool:
     -------
     bool
     """
-    return bool(mask.any()) and len(_chosen_labels(mask[mask_slices(mask)], _SMALL)[1]) == 1
+    return bool(mask.any()) and _count(mask, _SMALL) == 1
 
 
 def shows_several(mask: np.ndarray) -> bool:
@@ -56,7 +56,12 @@ def shows_several(mask: np.ndarray) -> bool:
     bool
         Whether a second component is about as large as the first.
     """
-    return len(_chosen_labels(mask[mask_slices(mask)], _SEVERAL)[1]) > 1
+    return _count(mask, _SEVERAL) > 1
+
+
+def _count(mask: np.ndarray, share: float) -> int:
+    """The number of components that are not small, of a mask that is not empty."""
+    return len(_chosen_labels(mask[mask_slices(mask)], share)[1])
 
 
 def _chosen_labels(mask: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray]:

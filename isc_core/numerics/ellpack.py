@@ -108,6 +108,23 @@ class Ellpack:
         shifted[outside] = weights[outside] = 0
         return Ellpack(shifted, weights, width)
 
+    def band(self, rows: slice) -> tuple["Ellpack", slice]:
+        """Return some rows with the columns that they use, for matrices with a narrow band.
+
+        Parameters
+        ----------
+        rows : slice
+
+        Returns
+        -------
+        part : Ellpack
+        columns : slice
+            From the first to the last one used; one column if none is.
+        """
+        used = self.columns[rows][self.weights[rows] != 0]
+        columns = slice(int(used.min()), int(used.max()) + 1) if used.size else slice(0, 1)
+        return self.part(rows, columns), columns
+
     def __matmul__(self, values: np.ndarray) -> np.ndarray:
         """Apply the matrix to the first axis of (m, ...) values, in the type of the weights."""
         count = math.prod(values.shape[1:])

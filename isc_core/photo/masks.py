@@ -105,17 +105,22 @@ def find_mask(
         opaque = raster.transparency >= 0.5
         if float((~opaque).mean()) >= _LEFT_OUT:
             return opaque, "alpha"
-    border = np.concatenate([linear[0], linear[-1], linear[:, 0], linear[:, -1]])
-    if not _is_light(border) and not _is_light(linear):
+    dark = float(srgb_to_linear(BLACK))
+    border = _brightest(np.concatenate([linear[0], linear[-1], linear[:, 0], linear[:, -1]]))
+    # Codes have a known white, so that behind a bright border their light is not needed.
+    enough = raster.peak is not None and (border > dark).any()
+    light = border if enough else _brightest(linear)
+    if not (light > 0).any():
         raise InputError(
             f"{name}: the image is black: there is nothing to recover; use another photo"
         )
-    white = 1.0 if raster.peak is not None else _white(linear)
+    # A float file has no peak value: use its 99th percentile as white.
+    white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
     if finder is not None and finder.always:
         found = finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "hints"
-    if _bright(border, white).any():
+    if (border > white * dark).any():
         found = None if finder is None else finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "automatic"
@@ -125,7 +130,7 @@ def find_mask(
             f"{name}: there is no mask, no transparency and no black border: "
             "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask"
         )
-    bright = _bright(linear, white)
+    bright = light > white * dark
     if not bright.any():
         raise InputError(
             f"{name}: the image is almost black: there is nothing to recover; use another photo"
@@ -133,19 +138,9 @@ def find_mask(
     return tidy_mask(bright), "black border"
 
 
-def _is_light(linear: np.ndarray) -> bool:
-    return bool((finite_or_zero(largest(linear)) > 0).any())
-
-
-def _white(linear: np.ndarray) -> float:
-    """The white of a float file, which has no peak value: the 99th percentile of its light."""
-    light = finite_or_zero(largest(linear))
-    return float(np.percentile(light[light > 0], 99.0))
-
-
-def _bright(linear: np.ndarray, white: float) -> np.ndarray:
-    """Which pixels are not black."""
-    return np.asarray(finite_or_zero(largest(linear)) > white * float(srgb_to_linear(BLACK)))
+def _brightest(values: np.ndarray) -> np.ndarray:
+    """The largest channel of each pixel, 0 where that is not finite."""
+    return finite_or_zero(largest(values))
 
 
 def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
@@ -229,7 +224,7 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
         )
     if raster.transparency is not None:
         return raster.transparency >= 0.5
-    values = finite_or_zero(largest(raster.values))
+    values = _brightest(raster.values)
     # Half of the largest value, not of the format's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)
 

@@ -24,7 +24,7 @@ import numpy as np
 from ...filters.components import labelled
 from ...filters.morphology import dilated
 from ...imaging.area_resize import AreaFilter, reduced_count
-from ...imaging.bounding_box import FramePart
+from ...imaging.bounding_box import FramePart, mask_slices
 from ...imaging.row_blocks import row_blocks
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
@@ -165,10 +165,9 @@ def _codes(cover: np.ndarray) -> np.ndarray:
 
 def _reduced_part(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> FramePart:
     """The part of the reduced frame that the covered pixels, of which there are some, touch."""
-    boxes = (np.flatnonzero(codes.any(axis=axis)) for axis in (1, 0))
     rows, columns = (
-        slice(int(at[0] * scale), min(int(np.ceil((at[-1] + 1) * scale)), size))
-        for at, size in zip(boxes, shape, strict=True)
+        slice(int(seen.start * scale), min(int(np.ceil(seen.stop * scale)), size))
+        for seen, size in zip(mask_slices(codes), shape, strict=True)
     )
     return FramePart(rows, columns, shape)
 

@@ -29,8 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...filters.morphology import eroded
 from .membrane import block_sums
-from .smoothing import binomial, surrounded
+from .smoothing import binomial
 
 _BALL, _BAR = 2.0, 4.0  # c
 _SMOOTH = 4  # passes over blocks of 2 x 2 pixels
@@ -113,7 +114,7 @@ def cross_section(u: np.ndarray) -> CrossSection:
         + 2 * down * right * twist
         + right**2 * (sides[2] + sides[3] - 2 * means) / 4
     )
-    weight = np.where(surrounded(block_sums(u > 0) == 4), means**2, 0)
+    weight = np.where(eroded(block_sums(u > 0) == 4), means**2, 0)
     total = binomial(weight, _SMOOTH)
     reached = total > 0
     total[~reached] = 1

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-_ROWS = 128
+from ...filters.correlation import correlated
+from ...imaging.row_blocks import row_blocks
 
 
 def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
@@ -29,44 +30,12 @@ def binomial(plane: np.ndarray, passes: int) -> np.ndarray:
     -------
     (H, W) float64 ndarray
     """
-    taps = [math.comb(2 * passes, k) / 4**passes for k in range(passes, 2 * passes + 1)]
-    height, width = plane.shape
-    padded = np.pad(plane.astype(np.float64), passes)
-    smooth = np.empty((height, width))
-    for start in range(0, height, _ROWS):  # few enough rows to stay in the cache
-        rows = padded[start : min(start + _ROWS, height) + 2 * passes]
-        down = _weighted(rows, taps)
-        smooth[start : start + _ROWS] = _weighted(down.T, taps).T
+    taps = np.array([math.comb(2 * passes, k) for k in range(2 * passes + 1)]) / 4**passes
+    smooth = np.empty(plane.shape)
+    for block in row_blocks(plane.shape, halo=passes):  # few enough rows to stay in the cache
+        down = correlated(plane[block.wide], taps, 0)[block.own]
+        smooth[block.rows] = correlated(down, taps, 1)
     return smooth
-
-
-def _weighted(rows: np.ndarray, taps: Sequence[float]) -> np.ndarray:
-    """Weighted sums of rows (h + 2 r, w) down to (h, w), with even weights from the centre out."""
-    reach = len(taps) - 1
-    count = len(rows) - 2 * reach
-    total = taps[0] * rows[reach : reach + count]
-    pair = np.empty_like(total)
-    for k in range(1, reach + 1):
-        np.add(rows[reach - k :][:count], rows[reach + k :][:count], out=pair)
-        pair *= taps[k]
-        total += pair
-    return total
-
-
-def surrounded(inside: np.ndarray) -> np.ndarray:
-    """Return the pixels whose four neighbours are inside, too.
-
-    Parameters
-    ----------
-    inside : (H, W) bool ndarray
-
-    Returns
-    -------
-    (H, W) bool ndarray
-    """
-    at = np.pad(inside, 1)
-    vertical, horizontal = at[:-2, 1:-1] & at[2:, 1:-1], at[1:-1, :-2] & at[1:-1, 2:]
-    return np.asarray(inside & vertical & horizontal)
 
 
 def smoothed_within(

@@ -37,6 +37,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...filters.morphology import dilated, eroded
 from ..triangulation.adaptive_triangles import Triangulation
 from ..triangulation.renumbering import renumbered
 from .back import Back
@@ -44,7 +45,7 @@ from .cross_section import cross_section, outline_weights, with_subpixel_outline
 from .membrane import membrane
 from .outline import Outlined, outlined, smooth_cover
 from .rim import Rim
-from .smoothing import smoothed_within, surrounded
+from .smoothing import smoothed_within
 from .texture_places import folded_positions
 
 ROUND, FULLNESS = 1.0, 1.0
@@ -125,7 +126,7 @@ def make_solid_mesh(
     known = continued(np.where(mask, height, 0.0).astype(np.float64), mask, inside)
     sheet = outlined(smooth, known + _STEP * thin, cosine, triangles)
     # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
-    around = _grown(core) & ~core
+    around = dilated(core, square=True) & ~core
     u = np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0)
     section = cross_section(u)
     u = with_subpixel_outline(u, smooth, section)
@@ -145,7 +146,7 @@ def make_solid_mesh(
     closed = _core_faces(sheet, thin)
     if back is Back.FLAT:
         return _used(_walled(sheet, closed, heights, front, mask))
-    edge = _grown(around) & core
+    edge = dilated(around, square=True) & core
     middle = membrane(core & ~edge, edge, last, 0.0)
     middle = np.where(edge, last, middle)
     depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
@@ -170,7 +171,7 @@ def _rolled_off(
     vary from pixel to pixel.
     """
     last = np.where(inside, known - ROUND * round_height, 0.0)
-    (last,) = smoothed_within((last,), surrounded(inside), _SMOOTH)
+    (last,) = smoothed_within((last,), eroded(inside), _SMOOTH)
     last[~inside] = 0.0
     return known + near * np.minimum(last + ROUND * round_height - known, 0), last
 
@@ -194,7 +195,10 @@ def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.nd
     found, known = np.zeros((*padded, *more), height.dtype), np.pad(mask, 1)
     found[1:-1, 1:-1] = height
     frame, missing = np.pad(np.ones_like(mask), 1), np.pad(inside & ~mask, 1)
-    ring, left = np.flatnonzero(np.pad(_grown(mask) & ~mask, 1)), np.count_nonzero(missing)
+    ring, left = (
+        np.flatnonzero(np.pad(dilated(mask, square=True) & ~mask, 1)),
+        np.count_nonzero(missing),
+    )
     values = found.reshape(-1, *more)
     known, frame, missing = known.ravel(), frame.ravel(), missing.ravel()
     around = np.add.outer(_SIDES, np.multiply(_SIDES, padded[1])).ravel()
@@ -208,13 +212,6 @@ def continued(height: np.ndarray, mask: np.ndarray, inside: np.ndarray) -> np.nd
         near = np.unique(beside)
         ring = near[frame[near] & ~known[near]]
     return found[1:-1, 1:-1]
-
-
-def _grown(plane: np.ndarray) -> np.ndarray:
-    """The pixels of a mask and their eight neighbours."""
-    padded = np.pad(plane, 1)
-    rows = padded[:-2] | padded[1:-1] | padded[2:]
-    return np.asarray(rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:])
 
 
 def _core_faces(sheet: Outlined, thin: np.ndarray) -> np.ndarray:

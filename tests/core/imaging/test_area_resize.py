@@ -7,6 +7,7 @@ from isc_core.filters import interpolation
 from isc_core.filters.interpolation import banded_products, linear_interpolation
 from isc_core.imaging.area_resize import AreaFilter, averaged, resize_separately
 from isc_core.imaging.bounding_box import FramePart
+from isc_core.numerics.ellpack import Ellpack
 
 SHAPE = (41, 57)
 
@@ -70,3 +71,11 @@ def test_blocks_of_a_product_are_those_of_the_whole(
     assert len(blocks) > 1
     assert [rows.start for rows, _ in blocks[1:]] == [rows.stop for rows, _ in blocks[:-1]]
     assert np.array_equal(np.concatenate([block for _, block in blocks]), matrix @ values)
+
+
+def test_rows_without_entries_give_zeros() -> None:
+    matrix = Ellpack.of(np.array([2]), np.array([5]), np.array([3.0]), (4, 9))
+    part, columns = matrix.band(slice(0, 2))
+    values = np.arange(9.0)[:, None]
+    assert not (part @ values[columns]).any()
+    assert (matrix.band(slice(1, 4))[0] @ values[5:6]).ravel().tolist() == [0, 15, 0]
