@@ -1,7 +1,8 @@
 """How good are masks that are found automatically? Measured on composites of held-out objects.
 
   python -m benchmarks.decomposition.automatic_mask WORLD --panoramas DIR [--photos DIR]
-  [--tabletops DIR] [--weights NPZ] [--count N] [--difficult N] [--sheet JPG] [--json FILE]
+  [--cut-photos DIR] [--tabletops DIR] [--weights NPZ] [--count N] [--difficult N] [--sheet JPG]
+  [--json FILE]
 
 WORLD is a folder of `isc world build`. Part B of `training.masks.held_out`: half of the photos of
 one object show bodies that no fit has seen, the other half the masked photos of real objects in
@@ -10,6 +11,7 @@ nothing, or several objects. Refusals are wrong where one object is shown, and m
 mask would have been right, with an overlap of .5; acceptances where none or several are shown.
 --tabletops adds rendered pictures of held-out objects that stand on tables and cast shadows, made
 by `python -m training.tabletops --held-out`; some show none or several.
+--cut-photos adds held-out photographs of animals, plants and things that somebody has cut out.
 --difficult adds photos of one object of each difficult kind, and defocused ones of none. Intervals
 are those of resampled photos.
 
@@ -39,6 +41,7 @@ from training.masks.difficulty import Difficulty
 from training.masks.held_out import (
     HeldOut,
     held_out_composites,
+    held_out_cut_photos,
     held_out_ingredients,
     held_out_tabletops,
 )
@@ -56,6 +59,7 @@ _KINDS = {
     "with bands": Difficulty(banded=1),
 }
 _NOTHING = "nothing, defocused"
+_CUT_PHOTOS = "cut-out photos"
 _TABLETOPS = {
     Count.ONE: "on tables",
     Count.NONE: "nothing on tables",
@@ -117,8 +121,8 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     Parameters
     ----------
     groups : dict of str to list of MaskScore
-        "bodies", "photos", the difficult kinds and "on tables" show one object each, the others
-        none or several.
+        "bodies", "photos", "cut-out photos", the difficult kinds and "on tables" show one object
+        each, the others none or several.
 
     Returns
     -------
@@ -130,7 +134,8 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     rows, figures = list[tuple[str, list[MaskScore]]](), dict[str, object]()
     rows += [(name, groups[name]) for name in single]
     rows.append(("all of one object", [one for name in single for one in groups[name]]))
-    rows += [(name, groups[name]) for name in (*_KINDS, _TABLETOPS[Count.ONE]) if name in groups]
+    kinds = (_CUT_PHOTOS, *_KINDS, _TABLETOPS[Count.ONE])
+    rows += [(name, groups[name]) for name in kinds if name in groups]
     lines = [
         "| shown | photos | IoU, median | 10th percentile | of those accepted "
         "| refused | refused of right ones |",
@@ -150,8 +155,7 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
             "confidence": [round(one.found.confidence, 4) for one in found],
         }
     lines += ["", "| shown | photos | accepted | of these, no whole piles |", "|---|---|---|---|"]
-    shown = (*single, *_KINDS, _TABLETOPS[Count.ONE])
-    others = [name for name in groups if name not in shown]
+    others = [name for name in groups if name not in (*single, *kinds)]
     whole = [(name, groups[name]) for name in others]
     apart = (_NOTHING, *_TABLETOPS.values())
     simple = [one for name in others if name not in apart for one in groups[name]]
@@ -254,6 +258,8 @@ def main() -> None:
     add("world", type=Path, metavar="WORLD", help="folder of isc world build")
     add("--panoramas", type=Path, required=True, metavar="DIR", help="panoramas")
     add("--photos", type=Path, metavar="DIR", help="masked photos of real objects")
+    add("--cut-photos", type=Path, metavar="DIR", help="photographs with transparent backgrounds")
+    add("--without", nargs="*", default=[], metavar="NAME", help="folders of these to leave out")
     add("--tabletops", type=Path, metavar="DIR", help="rendered pictures of objects on tables")
     add("--weights", type=Path, metavar="NPZ", help="mask network (default: the shipped one)")
     add("--count", type=int, default=200, help="photos of one object (default: %(default)s)")
@@ -264,10 +270,14 @@ def main() -> None:
     try:
         network = None if given.weights is None else MaskNetwork.read(given.weights)
         bodies = held_out_ingredients(given.world, given.panoramas, "B")
-        objects = {"bodies": bodies}
+        objects, photographed = {"bodies": bodies}, {}
         if given.photos is not None:
             objects["photos"] = held_out_ingredients(
                 given.world, given.panoramas, "B", given.photos
+            )
+        if given.cut_photos is not None:
+            photographed[_CUT_PHOTOS] = held_out_cut_photos(
+                bodies, given.cut_photos, "B", given.without
             )
         folder = given.tabletops
         tabletops = [] if folder is None else list(held_out_tabletops(folder, _SEED))
@@ -284,6 +294,9 @@ def main() -> None:
     }
     for name, count in (("nothing", Count.NONE), ("several", Count.SEVERAL)):
         photos = held_out_composites(bodies, count, given.count // 2, _SEED)
+        groups[name] = [score_mask(photo, network) for photo in photos]
+    for name, part in photographed.items():
+        photos = held_out_composites(part, Count.ONE, given.count // 2, _SEED)
         groups[name] = [score_mask(photo, network) for photo in photos]
     if given.difficult:
         groups |= score_difficult(bodies, given.difficult, network)

@@ -4,13 +4,14 @@ Problem: thresholds and errors of the mask network need photos with known masks,
 backgrounds that no training run has used.
 
 The objects and panoramas that every training run leaves out are halved: part A is for choosing
-thresholds, part B is the test set. Masked photos of real objects can replace the rendered objects.
+thresholds, part B is the test set. Masked photos of real objects, or photographs of cut-out things,
+can replace the rendered objects.
 
 Limits: objects are rendered at 160 pixels and panoramas have 512 columns: both are blurred.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,7 @@ from .composites import CompositeDraws, Composites, as_photographed, draw_camera
 from .difficulty import SIMPLE, Difficulty
 from .ingredients import cut_out, lit_cutouts
 from .packs import Ingredients
+from .photo_cutouts import Part, photo_cutouts, read_cut_photos
 
 SIDE = 320  # pixels of a composite's longer side
 _CUTOUT_SIDE = 256  # pixels
@@ -89,6 +91,33 @@ def held_out_ingredients(
         )
     kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
     return Ingredients(np.stack(cutouts), kept, found.atlas.maps)
+
+
+def held_out_cut_photos(
+    ingredients: Ingredients, folder: Path, part: str, without: Collection[str] = ()
+) -> Ingredients:
+    """Replace rendered objects by photographs of cut-out things that no training run has seen.
+
+    Parameters
+    ----------
+    ingredients : Ingredients
+    folder : Path
+        See `photo_cutouts`.
+    part : {"A", "B"}
+    without : collection of str
+        Names of folders to leave out.
+
+    Returns
+    -------
+    Ingredients
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be used.
+    """
+    cutouts = photo_cutouts(read_cut_photos(folder, without), Part(part), _CUTOUT_SIDE)
+    return replace(ingredients, cutouts=cutouts)
 
 
 def masked_cutout(path: Path) -> np.ndarray:

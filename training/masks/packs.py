@@ -49,6 +49,20 @@ class Ingredients:
     panoramas: np.ndarray
     patterns: np.ndarray
 
+    @classmethod
+    def of_cutouts(cls, cutouts: np.ndarray) -> "Ingredients":
+        """Make ingredients without backgrounds, to be read after others.
+
+        Parameters
+        ----------
+        cutouts : (N, 4, SIDE, SIDE) uint8 ndarray
+
+        Returns
+        -------
+        Ingredients
+        """
+        return cls(cutouts, np.zeros((0, 1, 2, 3), np.float16), np.zeros((0, 1, 1), np.uint8))
+
     def write(self, path: Path) -> int:
         """Write a file.
 
