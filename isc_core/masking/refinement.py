@@ -3,11 +3,11 @@
 Problem: the network sees at most 128 pixels; its outline is off by up to one of them.
 
 Equation: the network has learned from composites, and photos by people show larger objects of more
-parts. Its log odds of the object are therefore raised by `_PRIOR_SHIFT`, as for a larger prior.
-Pixels of which it is certain, and which lie away from the outline, are fixed. So is the medial axis
-of the object, so that thin parts are kept. GrabCut labels all other pixels by colour and contrast
-(`photo.grabcut`). The coverage a of the rim is the guided filter of the labels with the photo I as
-its guide: a = A I + b in windows of a few pixels.
+parts. Its log odds of the object are therefore raised, as for a larger prior. Pixels of which it is
+certain, and which lie away from the outline, are fixed. So is the medial axis of the object, so
+that thin parts are kept. GrabCut labels all other pixels by colour and contrast (`photo.grabcut`).
+The coverage a of the rim is the guided filter of the labels with the photo I as its guide: a = A I
++ b in windows of a few pixels.
 
 Citation: C. Rother et al. 2004, doi:10.1145/1015706.1015720; K. He, J. Sun, X. Tang 2013,
 doi:10.1109/TPAMI.2012.213 (section 4, feathering); another prior: M. Saerens, P. Latinne, C.
@@ -28,7 +28,6 @@ from ..photo.grabcut import Label, segmented
 from ..photo.masks import tidy_mask
 
 SIDE = 384  # pixels of the longer side
-_PRIOR_SHIFT = 0.5  # of the log odds; chosen on photos by people
 _CERTAIN = 0.97  # probability from which a pixel away from the outline is fixed
 _AXIS_CERTAIN = 0.8  # the same for the medial axis of the object
 _AXIS_WINDOW = 5  # pixels: the medial axis has maxima of the distance to the outline in it
@@ -37,7 +36,9 @@ _ITERATIONS = 1
 _EPSILON = 1e-3  # of the guided filter, for sRGB codes in [0, 1]
 
 
-def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarray:
+def refined(
+    light: np.ndarray, cover: np.ndarray, known: np.ndarray, shift: float = 0.0
+) -> np.ndarray:
     """Refine the network's mask.
 
     Parameters
@@ -48,6 +49,8 @@ def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarr
         The network's probabilities.
     known : (H, W) int8 ndarray
         1 where the user has marked the object, -1 the background, else 0.
+    shift : float
+        What the log odds of the object are raised by.
 
     Returns
     -------
@@ -58,25 +61,26 @@ def refined(light: np.ndarray, cover: np.ndarray, known: np.ndarray) -> np.ndarr
     factor = min(1.0, SIDE / max(width, height))
     small = round(height * factor), round(width * factor)
     codes = srgb_codes(resampled(light, small))
-    likelier = with_larger_prior(resampled(cover, small).clip(0, 1))
+    likelier = with_larger_prior(resampled(cover, small).clip(0, 1), shift)
     fine = segmented_cover(codes, likelier, _nearest(known, small))
     return resampled(fine, (height, width))
 
 
-def with_larger_prior(cover: np.ndarray) -> np.ndarray:
+def with_larger_prior(cover: np.ndarray, shift: float) -> np.ndarray:
     """Raise the log odds of the object.
 
     Parameters
     ----------
     cover : (H, W) float32 ndarray
         Probabilities, 0 to 1.
+    shift : float
 
     Returns
     -------
     (H, W) float32 ndarray
         Probabilities.
     """
-    raised = np.float32(np.exp(_PRIOR_SHIFT)) * cover
+    raised = np.float32(np.exp(shift)) * cover
     return np.asarray(raised / (raised + 1 - cover))
 
 

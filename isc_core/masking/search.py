@@ -40,6 +40,7 @@ from .refusal import refusal_reason
 
 WORKING = 768  # pixels of the longer side of the photo at the working size
 _SIDES = (96, 128)  # sides of the network's frame in the second pass, pixels
+_PRIOR_SHIFT = 0.5  # of the log odds; chosen on photos by people. A box gives the size
 _MIN_BOX_FILL = 0.75  # of the sides of a box: a smaller mask is not what the box was drawn around
 _MIN_PREDICTED = 0.5  # of a mask in a box: GrabCut alone spreads among similar colours
 _MAX_NO_OBJECT = 0.5  # probability of no object above which none is searched for
@@ -178,7 +179,9 @@ def _second_pass(
     crop = with_margin(mask_box(inside), light.shape)
     second = _mean_prediction([predict_crop(light, crop, hints, network, n) for n in _SIDES])
     cover = np.zeros_like(first.cover)
-    cover[crop.slices] = refined(light[crop.slices], second.cover, marked_pixels(hints, crop))
+    shift = _PRIOR_SHIFT if hints.box is None else 0.0
+    marked = marked_pixels(hints, crop)
+    cover[crop.slices] = refined(light[crop.slices], second.cover, marked, shift)
     if hints.box is not None:
         spread = (second.cover > 0.5).sum() < _MIN_PREDICTED * (cover >= 0.5).sum()
         cover = (
