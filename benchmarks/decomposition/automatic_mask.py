@@ -270,34 +270,29 @@ def main() -> None:
     try:
         network = None if given.weights is None else MaskNetwork.read(given.weights)
         bodies = held_out_ingredients(given.world, given.panoramas, "B")
-        objects, photographed = {"bodies": bodies}, {}
+        objects = {"bodies": bodies}
         if given.photos is not None:
             objects["photos"] = held_out_ingredients(
                 given.world, given.panoramas, "B", given.photos
             )
+        composed = [
+            (name, part, Count.ONE, given.count // len(objects), _SEED + k)
+            for k, (name, part) in enumerate(objects.items())
+        ]
+        half = given.count // 2
+        composed.append(("nothing", bodies, Count.NONE, half, _SEED))
+        composed.append(("several", bodies, Count.SEVERAL, half, _SEED))
         if given.cut_photos is not None:
-            photographed[_CUT_PHOTOS] = held_out_cut_photos(
-                bodies, given.cut_photos, "B", given.without
-            )
+            part = held_out_cut_photos(bodies, given.cut_photos, "B", given.without)
+            composed.append((_CUT_PHOTOS, part, Count.ONE, half, _SEED))
         folder = given.tabletops
         tabletops = [] if folder is None else list(held_out_tabletops(folder, _SEED))
     except InputError as error:
         parser.error(str(error))
     groups = {
-        name: [
-            score_mask(photo, network)
-            for photo in held_out_composites(
-                part, Count.ONE, given.count // len(objects), _SEED + k
-            )
-        ]
-        for k, (name, part) in enumerate(objects.items())
+        name: [score_mask(photo, network) for photo in held_out_composites(*rest)]
+        for name, *rest in composed
     }
-    for name, count in (("nothing", Count.NONE), ("several", Count.SEVERAL)):
-        photos = held_out_composites(bodies, count, given.count // 2, _SEED)
-        groups[name] = [score_mask(photo, network) for photo in photos]
-    for name, part in photographed.items():
-        photos = held_out_composites(part, Count.ONE, given.count // 2, _SEED)
-        groups[name] = [score_mask(photo, network) for photo in photos]
     if given.difficult:
         groups |= score_difficult(bodies, given.difficult, network)
     for photo in tabletops:

@@ -36,7 +36,7 @@ SIDE = 320  # pixels of a composite's longer side
 _CUTOUT_SIDE = 256  # pixels
 _BATCH = 8
 _LEAST = 200  # pixels of a target
-PARTS = ("A", "B")
+PARTS = (Part.CHOICE, Part.TEST)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,14 +2,14 @@
 
   python -m training.masks.photo_cutouts FOLDER -o POOL [--without NAME ...]
 
-Problem: rendered objects are no animals, plants or worn tools. Photographs of such things that
-somebody has cut out can be pasted like rendered objects (`ingredients`).
+Problem: rendered objects are no animals or plants. Photographs of such things that somebody has cut
+out can be pasted like rendered objects (`ingredients`).
 
 FOLDER contains PNG files, at any depth. Drawings among them would teach flat colours and black
 outlines. A file is taken for a photograph if at most .4 of the neighbouring opaque pixels have
 equal colours: sensors have noise. Files with an object of less than 64 pixels, and files of which
 more than a quarter is translucent, are left out, too, as are folders that --without names.
-POOL/learned.npz is for training, POOL/judged.npz has a third of the held-out ones.
+POOL/learned.npz is for training, POOL/judged.npz has part A of the held-out ones.
 
 Splits: a quarter of the photographs is held out, half of them for each part of `held_out`. A hash
 of the folder and the first word of the name decides, so that pictures of the same thing, such as a
@@ -29,9 +29,10 @@ from zlib import crc32
 
 import numpy as np
 import torch
-from PIL import Image, UnidentifiedImageError
+from PIL import Image
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.srgb import srgb_to_linear
 
 from .ingredients import SETS, SIDE, cut_out
@@ -81,9 +82,10 @@ class CutPhoto:
         (4, side, side) uint8 ndarray or None
             As `packs.Ingredients.cutouts`; None if the object covers hardly anything of its frame.
         """
-        planes = torch.from_numpy(self.codes.transpose(2, 0, 1) / 255).float()[None]
-        light = torch.from_numpy(srgb_to_linear(planes[:, :3].numpy())).float()
-        return next(cut_out(light, planes[:, 3:], side), None)
+        values = self.codes / np.float32(255)
+        layers = np.dstack([srgb_to_linear(values[..., :3]), values[..., 3]])
+        planes = torch.from_numpy(layers).float().permute(2, 0, 1)[None]
+        return next(cut_out(planes[:, :3], planes[:, 3:], side), None)
 
 
 def read_cut_photos(folder: Path, without: Collection[str] = ()) -> list[CutPhoto]:
@@ -121,7 +123,7 @@ def _codes(path: Path) -> np.ndarray:
     try:
         with Image.open(path) as image:
             return np.asarray(image.convert("RGBA"))
-    except (OSError, UnidentifiedImageError) as error:
+    except OSError as error:
         raise InputError(f"{path}: not a PNG that can be read: {error}") from error
 
 
@@ -131,9 +133,9 @@ def _is_photo(codes: np.ndarray) -> bool:
     pairs = opaque[:, 1:] & opaque[:, :-1]
     if covered.all() or not pairs.any():
         return False
-    length = max(int(np.ptp(np.flatnonzero(covered.any(axis)))) + 1 for axis in (0, 1))
     equal = (codes[:, 1:, :3] == codes[:, :-1, :3]).all(axis=2)[pairs].mean()
     translucent = (covered & ~opaque).sum() / covered.sum()
+    length = max(mask_box(covered)[2:])
     return bool(length >= _MIN_LENGTH and equal <= _MAX_EQUAL and translucent <= _MAX_TRANSLUCENT)
 
 
@@ -157,9 +159,17 @@ def photo_cutouts(photos: list[CutPhoto], part: Part, side: int = SIDE) -> np.nd
     -------
     (N, 4, side, side) uint8 ndarray
         As `packs.Ingredients.cutouts`.
+
+    Raises
+    ------
+    InputError
+        If there is none.
     """
     made = [one.cutout(side) for one in photos if one.part == part]
-    return np.stack([one for one in made if one is not None])
+    cutouts = [one for one in made if one is not None]
+    if not cutouts:
+        raise InputError(f"none of {len(photos)} photographs belongs to part {part}: add more")
+    return np.stack(cutouts)
 
 
 def main() -> None:
@@ -174,11 +184,12 @@ def main() -> None:
     given = parser.parse_args()
     try:
         photos = read_cut_photos(given.folder, given.without)
+        parts = [photo_cutouts(photos, part) for part in (Part.TRAIN, Part.CHOICE)]
     except InputError as error:
         parser.error(str(error))
     given.output.mkdir(parents=True, exist_ok=True)
-    for name, part in zip(SETS, (Part.TRAIN, Part.CHOICE), strict=True):
-        made = Ingredients.of_cutouts(photo_cutouts(photos, part))
+    for name, cutouts in zip(SETS, parts, strict=True):
+        made = Ingredients.of_cutouts(cutouts)
         path = given.output / f"{name}{SUFFIX}"
         print(f"{path}: {len(made.cutouts)} cut-outs, {made.write(path) / 1e6:.1f} MB", flush=True)
 

@@ -77,3 +77,12 @@ def test_a_folder_without_photographs_is_refused(tmp_path: Path) -> None:
     (tmp_path / "broken.png").write_bytes(b"no picture")
     with pytest.raises(InputError, match=r"broken\.png: not a PNG"):
         read_cut_photos(tmp_path)
+
+
+def test_a_part_without_photographs_is_refused(tmp_path: Path) -> None:
+    """One photograph belongs to one part."""
+    _save(tmp_path / "owl.png", (200, 100, 50), 5)
+    photos = read_cut_photos(tmp_path)
+    others = [part for part in Part if part != photos[0].part]
+    with pytest.raises(InputError, match="none of 1 photographs belongs to part"):
+        photo_cutouts(photos, others[0])
