@@ -21,7 +21,6 @@ from isc_core.imaging.srgb import linear_to_srgb, srgb_codes, srgb_to_linear
 from isc_core.io.png import encode_png
 
 from ..files.exr import encode_exr
-from ..files.result_arrays import ResultArrays
 from .provenance import datablock_name, find_tagged, tag
 
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
@@ -314,27 +313,6 @@ def image_name(key: str, role: ImageRole) -> str:
     if role in TEXTURE_NAMES:
         return datablock_name(key, TEXTURE_NAMES[role], "_")
     return datablock_name(key, role.replace("_", " "))
-
-
-def map_files(result: ResultArrays, every: bool = True) -> dict[ImageRole, ImageFile]:
-    """Return the files of maps; this may run in another thread.
-
-    Parameters
-    ----------
-    result : ResultArrays
-        The result.
-    every : bool, optional
-        Whether all of `MAPS` are made, or those of `USED_MAPS`.
-
-    Returns
-    -------
-    dict of ImageRole to ImageFile
-    """
-    return {
-        role: map_file(getattr(result, role), space)
-        for role, space in MAPS.items()
-        if every or role in USED_MAPS
-    }
 
 
 def attach_maps(key: str, obj: bpy.types.Object, maps: dict[ImageRole, bpy.types.Image]) -> None:

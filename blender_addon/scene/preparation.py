@@ -3,7 +3,10 @@
 Nothing here accesses a datablock, so it may run in another thread while the window is used.
 """
 
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -14,12 +17,13 @@ from isc_core.result_files.solids.back import Back
 from ..datablocks.images import (
     COLOR,
     DATA,
+    MAPS,
     SRGB,
+    USED_MAPS,
     ImageFile,
     ImageRole,
     coded_file,
     map_file,
-    map_files,
     texture_file,
 )
 from ..datablocks.mesh import MeshArrays, MeshGeometry, front_geometry, mesh_arrays
@@ -34,6 +38,7 @@ from .solid_mesh import solid_geometry
 # `BuildOptions.own_shadows` of each item of the panel.
 OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
 _DEFAULT_ROUGHNESS = 0.5
+_Jobs = dict[ImageRole, Callable[[], ImageFile]]
 
 
 @dataclass(frozen=True)
@@ -155,39 +160,75 @@ def prepare(
         If the options are invalid, or the object is too thin for a mesh.
     """
     require_options(options)
+    specular = _specular_settings(result, options)
+    with ThreadPoolExecutor() as pool:  # NumPy and zlib let other threads run
+        shaped = pool.submit(_shape, result, options)
+        colored = pool.submit(_color_files, result, options, specular)
+        jobs = _map_jobs(result, options, with_photo) | _texture_jobs(result, options)
+        encoded = {role: pool.submit(job) for role, job in jobs.items()}
+        mesh, checksum, normal_map = shaped.result()
+        files = {role: file.result() for role, file in encoded.items()} | colored.result()
+    if normal_map is not None:
+        files[ImageRole.NORMAL_MAP] = normal_map
+    return PreparedObject(result, options, mesh, checksum, files, specular)
+
+
+def _shape(result: ResultArrays, options: BuildOptions) -> tuple[MeshArrays, str, ImageFile | None]:
+    """The mesh, its checksum, and its normal map, unless that is flat.
+
+    A mesh with a vertex per pixel has all detail in its own normals.
+    """
     geometry, normal_map = _geometry(result, options)
     mesh = mesh_arrays(geometry)
-    specular = _specular_settings(result, options)
-    files = map_files(result, options.all_maps)
-    files[ImageRole.ENVIRONMENT_MAP] = map_file(result.environment_map, COLOR)
+    is_flat = np.abs(normal_map - (0.5, 0.5, 1)).max() < 1e-3
+    return mesh, mesh_checksum(mesh), None if is_flat else texture_file(normal_map, DATA)
+
+
+def _color_files(
+    result: ResultArrays, options: BuildOptions, specular: SpecularSettings
+) -> dict[ImageRole, ImageFile]:
+    """The base colour, and under gloss what is needed to follow it."""
     surface = coated_surface(result)
     is_matt = options.specular_from == "none"
     layer = None if is_matt else surface.layer(specular.level, specular.roughness)
-    files[ImageRole.BASE_COLOR] = _base_color(result, layer)
+    files = {ImageRole.BASE_COLOR: _base_color(result, layer)}
     if layer is not None:
         files[ImageRole.PLAIN_BASE_COLOR] = _base_color(result, None)
         files[ImageRole.VIEW_NORMAL] = replace(
             coded_file(encode_normals(surface.normal)), space=DATA
         )
-    if result.specular_variation is not None:
-        values = result.specular_variation / _peak(result)
-        files[ImageRole.SPECULAR_VARIATION] = texture_file(values, DATA)
-    # A mesh with a vertex per pixel has all detail in its own normals.
-    if np.abs(normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
-        files[ImageRole.NORMAL_MAP] = texture_file(normal_map, DATA)
-    # The mesh of the result ends at its pixels, where the rim is soft, too.
-    if result.alpha is not None and options.back and not options.displacement:
-        files[ImageRole.ALPHA] = texture_file(result.alpha / 255, DATA)
+    return files
+
+
+def _map_jobs(result: ResultArrays, options: BuildOptions, with_photo: bool) -> _Jobs:
+    """What encodes the maps."""
+    roles = MAPS if options.all_maps else {role: MAPS[role] for role in USED_MAPS}
+    jobs: _Jobs = {
+        role: partial(map_file, getattr(result, role), space) for role, space in roles.items()
+    }
+    jobs[ImageRole.ENVIRONMENT_MAP] = partial(map_file, result.environment_map, COLOR)
     if options.displacement:
-        files[ImageRole.DISPLACEMENT] = map_file(
+        jobs[ImageRole.DISPLACEMENT] = lambda: map_file(
             displacement_map(result, options.size_metres), DATA
         )
     if with_photo:
         part = result.part
-        files[ImageRole.PHOTO] = map_file(
+        jobs[ImageRole.PHOTO] = lambda: map_file(
             part.placed(result.image), COLOR, part.placed(result.mask)
         )
-    return PreparedObject(result, options, mesh, mesh_checksum(mesh), files, specular)
+    return jobs
+
+
+def _texture_jobs(result: ResultArrays, options: BuildOptions) -> _Jobs:
+    """What encodes the textures that depend on neither mesh nor gloss."""
+    jobs: _Jobs = {}
+    if result.specular_variation is not None:
+        values = result.specular_variation / _peak(result)
+        jobs[ImageRole.SPECULAR_VARIATION] = partial(texture_file, values, DATA)
+    # The mesh of the result ends at its pixels, where the rim is soft, too.
+    if result.alpha is not None and options.back and not options.displacement:
+        jobs[ImageRole.ALPHA] = partial(texture_file, result.alpha / 255, DATA)
+    return jobs
 
 
 def require_options(options: BuildOptions) -> None:

@@ -32,7 +32,7 @@ import numpy as np
 from .. import __version__
 from ..errors import InputError
 from .atomic import new_file
-from .npy import read_arrays
+from .npy import read_arrays, write_archive
 from .source_stamp import source_stamp
 
 SUFFIX = ".npz"  # of the files in the folder; the Blender add-on limits their size
@@ -146,5 +146,5 @@ def _read(place: Path, key: bytes) -> Arrays | None:
 
 
 def _write(place: Path, key: bytes, arrays: Arrays) -> None:
-    with new_file(place) as partial, partial.open("wb") as file:  # savez adds a suffix to a name
-        np.savez(file, **{_CHECK: _check(key, arrays)}, **arrays)
+    with new_file(place) as partial, partial.open("wb") as file:
+        write_archive(file, {_CHECK: _check(key, arrays), **arrays})

@@ -29,6 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.luminance import luminance, white_of
+from ..numerics.least_squares import robust_least_squares
 from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
@@ -325,8 +326,6 @@ def _refined(
     """Robust least squares over the direction and the other parameters, from a start: light (3,),
     parameters, cone in degrees.
     """
-    from scipy.optimize import least_squares
-
     bounds = (
         np.concatenate([[-1.0, -1.0], low]),
         np.concatenate([[1.0, 1.0], np.broadcast_to(high, others.shape)]),
@@ -340,17 +339,9 @@ def _refined(
             return (model(_moved(around, plane, x[:2]), x[2:]) - samples.values).reshape(-1)
 
         start = np.concatenate([[0.0, 0.0], np.clip(others, bounds[0][2:], bounds[1][2:])])
-        fit = least_squares(
-            errors,
-            start,
-            bounds=bounds,
-            loss="soft_l1",
-            f_scale=samples.scale,
-            x_scale="jac",
-            max_nfev=60,
-        )
-        light, others = _moved(light, plane, fit.x[:2]), fit.x[2:]
-    return light, others, _cone(errors, fit.x, samples)
+        found = robust_least_squares(errors, start, bounds, samples.scale)
+        light, others = _moved(light, plane, found[:2]), found[2:]
+    return light, others, _cone(errors, found, samples)
 
 
 def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _Samples) -> float:

@@ -65,6 +65,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.bounding_box import FramePart, aligned_edge
+from ..io.npy import write_archive
 from ..lobe_fitting.specular_level import SpecularFit
 from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
@@ -113,8 +114,8 @@ def write_arrays(
         arrays["texture"] = built.texture
     if cover is not None:
         arrays |= _cover(cover, built)
-    with path.open("wb") as file:  # NumPy would add a suffix to a file name
-        np.savez(file, **arrays)
+    with path.open("wb") as file:
+        write_archive(file, arrays)
 
 
 def mesh_of(

@@ -30,8 +30,6 @@ import numpy as np
 
 from ...errors import InputError
 from ...imaging.bounding_box import FramePart, mask_slices
-from ...imaging.channels import total
-from ...imaging.row_blocks import row_blocks
 from ...photo.camera import Camera
 from ...shading.lights import VIEW
 from ...shading.perspective import lifted_points, object_axis, view_directions
@@ -46,6 +44,7 @@ from ..triangulation.vertex_normals import (
     facing,
     flat_normals,
     mean_normals,
+    view_cosine,
 )
 from .base_color import base_color
 from .glb import TexturedMesh
@@ -246,10 +245,7 @@ def _triangulated(
         )
     if not budget or 2 * np.count_nonzero(cells) <= budget:
         return 1, _full_grid(cells), False
-    cosine, stride = np.empty(mask.shape, np.float32), 1
-    for block in row_blocks(mask.shape):
-        toward = view if view.ndim == 1 else view[block.rows]
-        cosine[block.rows] = total(normal[block.rows] * toward)
+    cosine, stride = view_cosine(normal, view), 1
     while True:
         thin = height if stride == 1 else height[::stride, ::stride] / stride
         thinned = thin, cells, cosine[::stride, ::stride]

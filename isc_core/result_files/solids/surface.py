@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...imaging.channels import length, total
+from ...imaging.channels import length
 from ...photo.camera import Camera
 from ...shading.perspective import lifted_points, object_axis
-from ..triangulation.vertex_normals import interpolated_normals
+from ..triangulation.vertex_normals import interpolated_normals, view_cosine
 from .back import Back
 from .rim import Rim
 from .solid_mesh import SolidMesh, continued, make_solid_mesh
@@ -100,7 +100,7 @@ def make_solid(
     InputError
         If no block of 2 x 2 pixels lies inside.
     """
-    mesh = make_solid_mesh(height, total(normal * view), mask, rim, back, triangles)
+    mesh = make_solid_mesh(height, view_cosine(normal, view), mask, rim, back, triangles)
     smooth, detail = interpolated_normals(
         mesh.visible, _continued_normals(normal, mask, mesh.pixels), view
     )

@@ -14,10 +14,11 @@ Limits: normals that face away from the viewer are rotated until their tangent i
 
 import numpy as np
 
-from ...imaging.channels import length
+from ...imaging.channels import length, total
 from ...imaging.row_blocks import row_blocks
 from .adaptive_triangles import Triangulation, covered_pixels
 
+_CACHED = 1 << 14  # pixels of a block
 _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
 
 
@@ -110,13 +111,34 @@ def detail_normals(
         corners = smooth.take(patch.faces.T, axis=0).reshape(3, -1)
         base = patch.weights.astype(np.float32) @ corners
         flat[patch.flat_pixels(normal.shape[1])] = base.reshape(len(base), -1, 3)
-    for block in row_blocks(detail.shape):  # each pixel once: triangles share those on their sides
+    for block in row_blocks(detail.shape, pixels=_CACHED):  # each pixel once: triangles share those on their sides
         rows = detail[block.rows]
         covered = ~np.isnan(rows[..., 0])
         toward = view if view.ndim == 1 else view[block.rows][covered]
         rows[covered] = _local(normal[block.rows][covered], facing(rows[covered], toward), toward)
         rows[~covered] = flat_normals(())
     return detail, _tangents(smooth, directions_at(view, *(grid.vertices * stride).T))
+
+
+def view_cosine(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
+    """Return the cosine of the angle between normal and view.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Unit vectors, camera frame.
+    view : (3,) or (H, W, 3) ndarray
+        Unit vectors toward the viewer.
+
+    Returns
+    -------
+    (H, W) float32 ndarray
+    """
+    cosine = np.empty(normal.shape[:2], np.float32)
+    for block in row_blocks(cosine.shape, pixels=_CACHED):
+        toward = view if view.ndim == 1 else view[block.rows]
+        cosine[block.rows] = total(normal[block.rows] * toward)
+    return cosine
 
 
 def directions_at(view: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:

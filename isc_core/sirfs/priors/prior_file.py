@@ -5,18 +5,15 @@ to MIT-Berkeley.
 
 import dataclasses
 import importlib.resources
-import io
 import json
-import zipfile
 from functools import cache
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 
 from ...errors import InputError
 from ...io.atomic import new_file
-from ...io.npy import parse_arrays
+from ...io.npy import parse_arrays, write_archive
 from ...io.regular_files import read_regular
 from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
@@ -45,7 +42,7 @@ def save_prior_set(path: str | Path, priors: PriorSet) -> None:
         If `path` cannot be written.
     """
     with new_file(path) as partial, partial.open("wb") as file:
-        _write_archive(file, _to_arrays(priors))
+        write_archive(file, _to_arrays(priors), compressed=True)
 
 
 def load_prior_set(path: str | Path) -> PriorSet:
@@ -156,17 +153,6 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
         arrays |= {f"lights.{name}.mean": light.mean, f"lights.{name}.covariance": light.covariance}
         arrays[f"lights.{name}.floor"] = np.array(light.floor)
     return arrays
-
-
-def _write_archive(file: IO[bytes], arrays: dict[str, np.ndarray]) -> None:
-    """As `np.savez_compressed`, without the time of day in the archive."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in arrays.items():
-            buffer = io.BytesIO()
-            np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
-            entry = zipfile.ZipInfo(f"{name}.npy")
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            archive.writestr(entry, buffer.getvalue())
 
 
 def _parse(data: bytes, source: str) -> PriorSet:
