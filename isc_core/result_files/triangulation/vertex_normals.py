@@ -111,7 +111,8 @@ def detail_normals(
         corners = smooth.take(patch.faces.T, axis=0).reshape(3, -1)
         base = patch.weights.astype(np.float32) @ corners
         flat[patch.flat_pixels(normal.shape[1])] = base.reshape(len(base), -1, 3)
-    for block in row_blocks(detail.shape, pixels=_CACHED):  # each pixel once: triangles share those on their sides
+    # each pixel once: triangles share those on their sides
+    for block in row_blocks(detail.shape, pixels=_CACHED):
         rows = detail[block.rows]
         covered = ~np.isnan(rows[..., 0])
         toward = view if view.ndim == 1 else view[block.rows][covered]
