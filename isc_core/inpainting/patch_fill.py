@@ -112,9 +112,9 @@ def _filled(
     """One level of the pyramid, 0 the finest, after the coarser ones."""
     if not wanted.any() or min(known.shape) < 2 * PATCH:
         return fill(values, known)
-    smaller, share = pull(values, known.astype(np.float32))
-    missing = _any_of_four(wanted) & (share == 0)
-    above = _filled(smaller, share > 0, missing, options, level + 1, monitor)
+    smaller, still_known = pull(values, known)
+    missing = _any_of_four(wanted) & ~still_known
+    above = _filled(smaller, still_known, missing, options, level + 1, monitor)
     current = push(values, known, above)
     source = patches_within(current, known)
     if not len(source):

@@ -16,6 +16,7 @@ import numpy as np
 from ..imaging.doubling import doubled
 from ..imaging.row_blocks import row_blocks
 
+_CACHED = 1 << 14  # pixels of a block
 _FEW = 0.2  # of the pixels: so few are looked up one by one
 
 
@@ -32,9 +33,7 @@ def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
     -------
     (H, W, C) float32 ndarray
     """
-    return _pull_push(
-        np.where(known[..., None], values, 0).astype(np.float32), known.astype(np.float32)
-    )
+    return _pull_push(values.astype(np.float32), known)
 
 
 def fill_at(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.ndarray:
@@ -53,45 +52,49 @@ def fill_at(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.nda
     (n, C) float32 ndarray
         The values of `fill` at these pixels.
     """
-    parts = []
-    for block in row_blocks((-(-len(known) // 2), known.shape[1])):
-        rows = slice(2 * block.rows.start, 2 * block.rows.stop)
-        here = known[rows]
-        inside = np.where(here[..., None], values[rows], 0).astype(np.float32)
-        parts.append(pull(inside, here.astype(np.float32)))
-    coarse = _pull_push(*(np.concatenate(part) for part in zip(*parts, strict=True)))
-    return _pushed(coarse, np.nonzero(wanted))
+    return _pushed(_pull_push(*pull(values, known)), np.nonzero(wanted))
 
 
-def _pull_push(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    if weight.all():
+def _pull_push(values: np.ndarray, known: np.ndarray) -> np.ndarray:
+    if known.all():
         return values
-    return push(values, weight > 0, _pull_push(*pull(values, weight)))
+    return push(values, known, _pull_push(*pull(values, known)))
 
 
-def pull(values: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def pull(values: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Average 2 x 2 blocks over their known pixels.
 
     Parameters
     ----------
     values : (H, W, C) ndarray
-    weight : (H, W) ndarray
+    known : (H, W) bool ndarray
 
     Returns
     -------
-    values, weight
-        Half as wide and high; a block is known if any of its pixels is.
+    values : (h, w, C) float32 ndarray
+        Half as wide and high, 0 where nothing is known.
+    known : (h, w) bool ndarray
+        Whether any pixel of a block is known.
     """
-    total = _sum_of_blocks(weight)
-    mean = _sum_of_blocks(values * weight[..., None]) / np.maximum(total, 1)[..., None]
-    return mean, (total > 0).astype(np.float32)
+    half = tuple(-(-size // 2) for size in known.shape)
+    means, count = np.empty((*half, values.shape[2]), np.float32), np.empty(half, np.float32)
+    for block in row_blocks(half, pixels=_CACHED):
+        rows = slice(2 * block.rows.start, 2 * block.rows.stop)
+        here = known[rows]
+        inside = np.where(here[..., None], values[rows], 0).astype(np.float32, copy=False)
+        count[block.rows] = number = _sum_of_blocks(here.astype(np.float32))
+        means[block.rows] = _sum_of_blocks(inside) / np.maximum(number, 1)[..., None]
+    return means, count > 0
 
 
 def _sum_of_blocks(values: np.ndarray) -> np.ndarray:
-    """Sums over 2 x 2 blocks of `values` (H, W, ...), padded by zeros to even sides."""
-    even = np.pad(values, [(0, n % 2) for n in values.shape[:2]] + [(0, 0)] * (values.ndim - 2))
-    rows = even[::2] + even[1::2]
-    return rows[:, ::2] + rows[:, 1::2]
+    """Sums over 2 x 2 blocks of `values` (H, W, ...), with zeros beyond odd sides."""
+    for axis in (0, 1):
+        lines = np.moveaxis(values, axis, 0)
+        sums, others = lines[::2].copy(), lines[1::2]
+        sums[: len(others)] += others
+        values = np.moveaxis(sums, 0, axis)
+    return values
 
 
 def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarray:

@@ -45,8 +45,10 @@ def opponent(image: np.ndarray) -> np.ndarray:
     (H, W, C) float32 ndarray
         Contiguous.
     """
-    rotated = image @ _OPPONENT.T if image.shape[2] == 3 else image
-    return np.ascontiguousarray(rotated, np.float32)
+    if image.shape[2] != 3:
+        return np.ascontiguousarray(image, np.float32)
+    # one product of tall matrices: NumPy multiplies a stack of them one by one
+    return (image.reshape(-1, 3) @ _OPPONENT.T).astype(np.float32).reshape(image.shape)
 
 
 def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:

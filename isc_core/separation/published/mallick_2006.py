@@ -181,8 +181,8 @@ def _specular_of(
     """
     if options.longest is None or max(mask.shape) <= options.longest:
         return _eroded_light(image, mask, options, monitor)
-    averages, share = pull(image.astype(np.float32), mask.astype(np.float32))
-    coarse = _specular_of(averages, share > 0, options, monitor)
+    averages, known = pull(image, mask)
+    coarse = _specular_of(averages, known, options, monitor)
     nothing = np.zeros((*mask.shape, 1), np.float32), np.zeros_like(mask)
     return np.where(mask, push(*nothing, coarse[..., None])[..., 0], 0)
 
