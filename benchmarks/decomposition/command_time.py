@@ -20,6 +20,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,32 +46,54 @@ class Checkout:
     folder: Path
     threads: int
 
-    def run(self, photo: Path, output: Path) -> tuple[float, ...]:
+    def run(self, photo: Path, output: Path, *options: str) -> tuple[float, ...]:
         """Decompose a photo.
 
         Parameters
         ----------
         photo, output : Path
+        *options : str
+            Further options of the command.
 
         Returns
         -------
         tuple of float
             In the order of `COLUMNS`.
         """
+        command = ["-m", "isc_core", "decompose", str(photo), "-o", str(output)]
+        command += ["--quiet", "--threads", str(self.threads), *options]
+        before, start = _processor(), time.perf_counter()
+        self.python(output.parent, *command)
+        wall, processor = time.perf_counter() - start, _processor() - before
+        result = json.loads((output / "decomposition.json").read_text(encoding="utf-8"))
+        return wall, processor, float(result["status"]["evaluations"])
+
+    def python(self, folder: Path, *words: str) -> str:
+        """Run Python with this version's packages.
+
+        Parameters
+        ----------
+        folder : Path
+            To run in.
+        *words : str
+            Arguments of Python.
+
+        Returns
+        -------
+        str
+            What it prints.
+        """
         # Bytecode is kept, as wherever the package is installed.
         kept = {name: value for name, value in os.environ.items() if name not in _UNSET}
         environment = {
             **kept,
             "PYTHONPATH": str(self.folder),
-            "PYTHONPYCACHEPREFIX": str(output.parent / f"bytecode{hash(self.folder)}"),
+            "PYTHONPYCACHEPREFIX": str(folder / f"bytecode{hash(self.folder)}"),
         }
-        command = [sys.executable, "-m", "isc_core", "decompose", str(photo), "-o", str(output)]
-        command += ["--quiet", "--threads", str(self.threads)]
-        before, start = _processor(), time.perf_counter()
-        subprocess.run(command, env=environment, cwd=output.parent, check=True)
-        wall, processor = time.perf_counter() - start, _processor() - before
-        result = json.loads((output / "decomposition.json").read_text(encoding="utf-8"))
-        return wall, processor, float(result["status"]["evaluations"])
+        command = [sys.executable, *words]
+        return subprocess.run(
+            command, env=environment, cwd=folder, check=True, stdout=subprocess.PIPE, text=True
+        ).stdout
 
 
 _UNSET = ("PYTHONDONTWRITEBYTECODE", "PYTHONPATH")
@@ -82,12 +105,12 @@ def _processor() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def measure(checkouts: list[Checkout], photos: list[Path], rounds: int) -> np.ndarray:
+def measure(checkouts: Sequence[Checkout], photos: list[Path], rounds: int) -> np.ndarray:
     """Measure versions in turn.
 
     Parameters
     ----------
-    checkouts : list of Checkout
+    checkouts : sequence of Checkout
     photos : list of Path
     rounds : int
 
@@ -109,13 +132,14 @@ def measure(checkouts: list[Checkout], photos: list[Path], rounds: int) -> np.nd
     return np.median(np.array(found), axis=0)
 
 
-def report(photos: list[Path], found: np.ndarray) -> str:
+def report(photos: list[Path], found: np.ndarray, columns: Sequence[str]) -> str:
     """Format the times.
 
     Parameters
     ----------
     photos : list of Path
     found : (photos, checkouts, columns) ndarray
+    columns : sequence of str
 
     Returns
     -------
@@ -123,22 +147,32 @@ def report(photos: list[Path], found: np.ndarray) -> str:
         A Markdown table, and the ratios of the first version to the second.
     """
     versions = ("this", "other")[: found.shape[1]]
-    names = [f"{column}, {version}" for version in versions for column in COLUMNS]
+    names = [f"{column}, {version}" for version in versions for column in columns]
     lines = ["| photo | " + " | ".join(names) + " |", "|---" * (len(names) + 1) + "|"]
     means = np.exp(np.log(found).mean(axis=0))
     for name, row in [*((p.stem, r) for p, r in zip(photos, found, strict=True)), ("mean", means)]:
         lines.append(f"| {name} | " + " | ".join(f"{value:.2f}" for value in row.ravel()) + " |")
     if found.shape[1] == 2:
         ratio = means[0] / means[1]
-        parts = (f"{column} {value:.3f}" for column, value in zip(COLUMNS, ratio, strict=True))
+        parts = (f"{column} {value:.3f}" for column, value in zip(columns, ratio, strict=True))
         lines.append("\nthis / other: " + ", ".join(parts))
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Run the command line."""
+def run(description: str, version: type[Checkout], columns: Sequence[str]) -> None:
+    """Run the command line of a benchmark of whole commands.
+
+    Parameters
+    ----------
+    description : str
+        Help text.
+    version : type of Checkout
+        Its `run` measures a photo.
+    columns : sequence of str
+        What it returns.
+    """
     parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of masked photos")
     parser.add_argument("--against", type=Path, metavar="CHECKOUT", help="root of another version")
@@ -150,13 +184,13 @@ def main() -> None:
     if not photos:
         parser.error(f"no photo in {given.photos}")
     others = [] if given.against is None else [given.against.resolve()]
-    checkouts = [Checkout(folder, given.threads) for folder in (_HERE, *others)]
+    checkouts = [version(folder, given.threads) for folder in (_HERE, *others)]
     found = measure(checkouts, photos, given.rounds)
     if given.json:
         values = {photo.stem: row.tolist() for photo, row in zip(photos, found, strict=True)}
         given.json.write_text(json.dumps(values), encoding="utf-8")
-    print(report(photos, found))
+    print(report(photos, found, columns))
 
 
 if __name__ == "__main__":
-    main()
+    run(__doc__, Checkout, COLUMNS)
