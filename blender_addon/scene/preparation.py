@@ -161,7 +161,7 @@ def prepare(
     """
     require_options(options)
     specular = _specular_settings(result, options)
-    with ThreadPoolExecutor() as pool:  # NumPy and zlib let other threads run
+    with ThreadPoolExecutor(2) as pool:  # NumPy and zlib let other threads run
         shaped = pool.submit(_shape, result, options)
         colored = pool.submit(_color_files, result, options, specular)
         jobs = _map_jobs(result, options, with_photo) | _texture_jobs(result, options)
