@@ -33,12 +33,13 @@ from .coherency_sensitive_hashing import (
     patches_touching,
     patches_within,
 )
-from .pull_push import fill, pull, push
+from .pull_push import fill, pull, pushed_at
 from .voting import vote
 from .walsh_hadamard import PATCH
 
 # Factor by which a vote's weight decreases per pixel of its patch's depth in the hole.
 _DEPTH_LOSS = 1.3
+Part = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def fill_patches(
     Returns
     -------
     (H, W, C) float32 ndarray
-        Known pixels are unchanged; all others are estimates.
+        Known pixels are unchanged, and wanted ones estimated; others have no meaning.
 
     Raises
     ------
@@ -98,31 +99,41 @@ def fill_patches(
             "check the mask"
         )
     values = np.where(known[..., None], image, 0).astype(np.float32)
-    return _filled(values, known, wanted, options, 0, monitor or Monitor())
+    return _filled(values, known, wanted, (slice(0, 0),) * 2, options, 0, monitor or Monitor())
 
 
 def _filled(
     values: np.ndarray,
     known: np.ndarray,
     wanted: np.ndarray,
+    needed: Part,
     options: PatchFillOptions,
     level: int,
     monitor: Monitor,
 ) -> np.ndarray:
-    """One level of the pyramid, 0 the finest, after the coarser ones."""
+    """One level of the pyramid, 0 the finest, after the coarser ones, in place.
+
+    Only the wanted pixels, their surroundings and the part that the finer level needs are filled.
+    """
     if not wanted.any() or min(known.shape) < 2 * PATCH:
         return fill(values, known)
     smaller, still_known = pull(values, known)
     missing = _any_of_four(wanted) & ~still_known
-    above = _filled(smaller, still_known, missing, options, level + 1, monitor)
-    current = push(values, known, above)
-    source = patches_within(current, known)
-    if not len(source):
-        return current
-    search = CshSearch(source, options.matching)
     near = mask_slices(wanted, PATCH - 1)  # contains all patches with a wanted pixel
+    part = _both(near, needed)
+    above = _filled(
+        smaller, still_known, missing, _read_from(part, smaller.shape), options, level + 1, monitor
+    )
+    at = tuple(
+        index + one.start for index, one in zip(np.nonzero(~known[part]), part, strict=True)
+    )
+    values[at] = pushed_at(above, at)
+    source = patches_within(values, known)
+    if not len(source):
+        return values
+    search = CshSearch(source, options.matching)
     depth = distance_to(known)[near]
-    filled, unknown = current[near], ~known[near]
+    filled, unknown = values[near], ~known[near]
     count = min(options.iterations + level, options.most_iterations)
     matches = None
     for turn in range(count):
@@ -130,9 +141,28 @@ def _filled(
         monitor.report("filling holes", 0.25**level * (0.25 + 0.75 * turn / count))
         target = patches_touching(filled, wanted[near])
         matches = search.match(target, None if matches is None else matches.source)
-        means, has_votes = vote(current, target, source, matches, _depth_penalty(target, depth))
+        means, has_votes = vote(values, target, source, matches, _depth_penalty(target, depth))
         np.copyto(filled, means, where=(has_votes & unknown)[..., None], casting="same_kind")
-    return current
+    return values
+
+
+def _both(one: Part, other: Part) -> Part:
+    """The smallest part that contains two, of which `other` may be empty."""
+    if other[0].start == other[0].stop:
+        return one
+    rows, columns = (
+        slice(min(a.start, b.start), max(a.stop, b.stop)) for a, b in zip(one, other, strict=True)
+    )
+    return rows, columns
+
+
+def _read_from(part: Part, shape: tuple[int, ...]) -> Part:
+    """The part of the next coarser level, of `shape`, from which `part` is interpolated."""
+    rows, columns = (
+        slice(max(one.start // 2 - 1, 0), min((one.stop + 1) // 2 + 1, size))
+        for one, size in zip(part, shape, strict=False)
+    )
+    return rows, columns
 
 
 def _any_of_four(flags: np.ndarray) -> np.ndarray:

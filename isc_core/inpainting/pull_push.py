@@ -52,7 +52,7 @@ def fill_at(values: np.ndarray, known: np.ndarray, wanted: np.ndarray) -> np.nda
     (n, C) float32 ndarray
         The values of `fill` at these pixels.
     """
-    return _pushed(_pull_push(*pull(values, known)), np.nonzero(wanted))
+    return pushed_at(_pull_push(*pull(values, known)), np.nonzero(wanted))
 
 
 def _pull_push(values: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -118,7 +118,7 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     if np.count_nonzero(missing) < _FEW * known.size:
         at = np.nonzero(missing)
         filled = values.copy()
-        filled[at] = _pushed(coarse, at)
+        filled[at] = pushed_at(coarse, at)
         return filled
     # across first, as in `_pushed`: the last digits are the same
     upsampled = doubled(coarse.swapaxes(0, 1)).swapaxes(0, 1)
@@ -126,8 +126,19 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
     return np.where(missing[..., None], upsampled[:height, :width], values)
 
 
-def _pushed(coarse: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
-    """The values (n, C) of a coarser level at fine pixels."""
+def pushed_at(coarse: np.ndarray, at: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Upsample a coarser level at some pixels, see `push`.
+
+    Parameters
+    ----------
+    coarse : (h, w, C) ndarray
+    at : tuple of (n,) ndarray
+        Rows and columns of the finer level.
+
+    Returns
+    -------
+    (n, C) ndarray
+    """
     (row, next_row), (column, next_column) = (
         _nearest_blocks(index, size) for index, size in zip(at, coarse.shape, strict=False)
     )
