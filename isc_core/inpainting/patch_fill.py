@@ -124,9 +124,7 @@ def _filled(
     above = _filled(
         smaller, still_known, missing, _read_from(part, smaller.shape), options, level + 1, monitor
     )
-    at = tuple(
-        index + one.start for index, one in zip(np.nonzero(~known[part]), part, strict=True)
-    )
+    at = tuple(index + one.start for index, one in zip(np.nonzero(~known[part]), part, strict=True))
     values[at] = pushed_at(above, at)
     source = patches_within(values, known)
     if not len(source):
