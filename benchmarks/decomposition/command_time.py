@@ -1,15 +1,18 @@
 """How long does `isc decompose` take, as a whole command, and against another version?
 
-  python -m benchmarks.decomposition.command_time PHOTOS [--against CHECKOUT] [--rounds N]
-  [--threads N] [--json FILE]
+  python -m benchmarks.decomposition.command_time PHOTOS [--against CHECKOUT] [--blender]
+  [--rounds N] [--threads N] [--json FILE]
 
 Every photo of the folder PHOTOS is decomposed once in each round, by this checkout and by the other
 one in turn, so that both meet the same machine. A first round fills the caches of compiled code and
 is not counted. The table has the median over rounds of wall-clock seconds, of the processor's
 seconds, and of evaluations of the objective; below are the geometric means over photos, and those
-of the ratios.
+of the ratios. With `--blender`, the command also writes the arrays that the add-on reads, and the
+columns are the seconds of the command, of Blender from these arrays to the object in the scene, and
+of both.
 
-Limits: processor time grows, too, on a busy machine.
+Limits: processor time grows, too, on a busy machine. The Python module `bpy` stands for Blender;
+its start, and drawing, are not included.
 """
 
 import argparse
@@ -23,12 +26,21 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
 _HERE = Path(__file__).parents[2]
 _SUFFIXES = (".png", ".jpg", ".jpeg")
-COLUMNS = ("wall", "processor", "evaluations")
+_BUILD = """
+import sys, time
+import bpy
+from blender_addon.files.result_arrays import read_result
+from blender_addon.scene.build import BuildOptions, build_object
+start = time.perf_counter()
+build_object(read_result(sys.argv[1]), BuildOptions(back="rounded"))
+print(time.perf_counter() - start)
+"""
 
 
 @dataclass(frozen=True)
@@ -41,10 +53,13 @@ class Checkout:
         Its root.
     threads : int
         `--threads`.
+    columns : tuple of str
+        What `run` returns.
     """
 
     folder: Path
     threads: int
+    columns: ClassVar[tuple[str, ...]] = ("wall", "processor", "evaluations")
 
     def run(self, photo: Path, output: Path, *options: str) -> tuple[float, ...]:
         """Decompose a photo.
@@ -58,7 +73,7 @@ class Checkout:
         Returns
         -------
         tuple of float
-            In the order of `COLUMNS`.
+            In the order of `columns`.
         """
         command = ["-m", "isc_core", "decompose", str(photo), "-o", str(output)]
         command += ["--quiet", "--threads", str(self.threads), *options]
@@ -94,6 +109,30 @@ class Checkout:
         return subprocess.run(
             command, env=environment, cwd=folder, check=True, stdout=subprocess.PIPE, text=True
         ).stdout
+
+
+class InBlender(Checkout):
+    """A version of the add-on to measure."""
+
+    columns = ("worker", "Blender", "both")
+
+    def run(self, photo: Path, output: Path, *options: str) -> tuple[float, ...]:
+        """Decompose a photo as the add-on does, and build its object.
+
+        Parameters
+        ----------
+        photo, output : Path
+        *options : str
+            Further options of the command.
+
+        Returns
+        -------
+        tuple of float
+            In the order of `columns`.
+        """
+        worker = super().run(photo, output, "--arrays", *options)[0]
+        blender = float(self.python(output.parent, "-c", _BUILD, str(output)).split()[-1])
+        return worker, blender, worker + blender
 
 
 _UNSET = ("PYTHONDONTWRITEBYTECODE", "PYTHONPATH")
@@ -159,23 +198,14 @@ def report(photos: list[Path], found: np.ndarray, columns: Sequence[str]) -> str
     return "\n".join(lines)
 
 
-def run(description: str, version: type[Checkout], columns: Sequence[str]) -> None:
-    """Run the command line of a benchmark of whole commands.
-
-    Parameters
-    ----------
-    description : str
-        Help text.
-    version : type of Checkout
-        Its `run` measures a photo.
-    columns : sequence of str
-        What it returns.
-    """
+def main() -> None:
+    """Run the command line."""
     parser = argparse.ArgumentParser(
-        description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("photos", type=Path, metavar="PHOTOS", help="folder of masked photos")
     parser.add_argument("--against", type=Path, metavar="CHECKOUT", help="root of another version")
+    parser.add_argument("--blender", action="store_true", help="build the objects in Blender, too")
     parser.add_argument("--rounds", type=int, default=3, help="default: %(default)s")
     parser.add_argument("--threads", type=int, default=0, help="0 (default) for all cores")
     parser.add_argument("--json", type=Path, help="file to write")
@@ -183,14 +213,15 @@ def run(description: str, version: type[Checkout], columns: Sequence[str]) -> No
     photos = sorted(p for p in given.photos.iterdir() if p.suffix.lower() in _SUFFIXES)
     if not photos:
         parser.error(f"no photo in {given.photos}")
+    version = InBlender if given.blender else Checkout
     others = [] if given.against is None else [given.against.resolve()]
     checkouts = [version(folder, given.threads) for folder in (_HERE, *others)]
     found = measure(checkouts, photos, given.rounds)
     if given.json:
         values = {photo.stem: row.tolist() for photo, row in zip(photos, found, strict=True)}
         given.json.write_text(json.dumps(values), encoding="utf-8")
-    print(report(photos, found, columns))
+    print(report(photos, found, version.columns))
 
 
 if __name__ == "__main__":
-    run(__doc__, Checkout, COLUMNS)
+    main()

@@ -99,14 +99,14 @@ def fill_patches(
             "check the mask"
         )
     values = np.where(known[..., None], image, 0).astype(np.float32)
-    return _filled(values, known, wanted, (slice(0, 0),) * 2, options, 0, monitor or Monitor())
+    return _filled(values, known, wanted, None, options, 0, monitor or Monitor())
 
 
 def _filled(
     values: np.ndarray,
     known: np.ndarray,
     wanted: np.ndarray,
-    needed: Part,
+    needed: Part | None,
     options: PatchFillOptions,
     level: int,
     monitor: Monitor,
@@ -121,9 +121,8 @@ def _filled(
     missing = _any_of_four(wanted) & ~still_known
     near = mask_slices(wanted, PATCH - 1)  # contains all patches with a wanted pixel
     part = _both(near, needed)
-    above = _filled(
-        smaller, still_known, missing, _read_from(part, smaller.shape), options, level + 1, monitor
-    )
+    read = _read_from(part, still_known.shape)
+    above = _filled(smaller, still_known, missing, read, options, level + 1, monitor)
     at = tuple(index + one.start for index, one in zip(np.nonzero(~known[part]), part, strict=True))
     values[at] = pushed_at(above, at)
     source = patches_within(values, known)
@@ -144,9 +143,9 @@ def _filled(
     return values
 
 
-def _both(one: Part, other: Part) -> Part:
-    """The smallest part that contains two, of which `other` may be empty."""
-    if other[0].start == other[0].stop:
+def _both(one: Part, other: Part | None) -> Part:
+    """The smallest part that contains one or two."""
+    if other is None:
         return one
     rows, columns = (
         slice(min(a.start, b.start), max(a.stop, b.stop)) for a, b in zip(one, other, strict=True)
@@ -158,7 +157,7 @@ def _read_from(part: Part, shape: tuple[int, ...]) -> Part:
     """The part of the next coarser level, of `shape`, from which `part` is interpolated."""
     rows, columns = (
         slice(max(one.start // 2 - 1, 0), min((one.stop + 1) // 2 + 1, size))
-        for one, size in zip(part, shape, strict=False)
+        for one, size in zip(part, shape, strict=True)
     )
     return rows, columns
 
