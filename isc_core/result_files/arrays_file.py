@@ -58,8 +58,9 @@ Limits: `sky` is as accurate as `shading.environment_map` states.
 """
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -75,10 +76,29 @@ from .mesh.object_cover import ObjectCover
 from .mesh.options import MeshOptions
 from .mesh.result import MeshResult
 
+if TYPE_CHECKING:
+    from ..lobe_fitting.light_direction import DirectionEstimate
+
 ARRAYS = "arrays.npz"
 _MARGIN = 64  # pixels around the object, beyond those that the texture is extended by
 _SEARCH = 64  # pixels by which the part of the frame is extended at most
 _INTEGERS = {"faces", "vertex_pixel", "photo_size", "frame"}
+
+
+@dataclass(frozen=True, eq=False)
+class MainLights:
+    """What a result is rendered under.
+
+    Attributes
+    ----------
+    sky : (rows, 2 rows, 3) ndarray
+        Radiance, see `shading.environment_map`.
+    sun : DirectionEstimate
+        The distant light that best explains the shading, or the highlights.
+    """
+
+    sky: np.ndarray
+    sun: "DirectionEstimate"
 
 
 def write_arrays(
@@ -87,6 +107,7 @@ def write_arrays(
     built: MeshResult | None = None,
     texture: np.ndarray | None = None,
     cover: ObjectCover | None = None,
+    lights: MainLights | None = None,
 ) -> None:
     """Write the file; equal results give equal bytes.
 
@@ -99,6 +120,8 @@ def write_arrays(
     texture : (h, w, 3) uint8 ndarray, optional
         Of `exports.full_texture`.
     cover : ObjectCover, optional
+    lights : MainLights, optional
+        Found here by default.
 
     Raises
     ------
@@ -109,7 +132,7 @@ def write_arrays(
     """
     built = built or mesh_of(stored, finer=finer_by(texture, stored.part.shape))
     built = built if texture is None else built.with_texture(texture)
-    arrays = arrays_of(stored.at(built.place), built)
+    arrays = arrays_of(stored.at(built.place), built, lights)
     if built.texture is not None:
         arrays["texture"] = built.texture
     if cover is not None:
@@ -208,7 +231,9 @@ def _surface_of(
         return build_mesh(*maps, options, camera=d.camera, part=part)
 
 
-def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+def arrays_of(
+    d: Decomposition, built: MeshResult, lights: MainLights | None = None
+) -> dict[str, np.ndarray]:
     """Return the arrays of the file by name.
 
     Parameters
@@ -217,12 +242,15 @@ def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
         The part of the result that the mesh covers.
     built : MeshResult
         Its mesh.
+    lights : MainLights, optional
+        Of the result; found here by default.
 
     Returns
     -------
     dict of str to ndarray
     """
-    values = _maps(d) | _mesh(built) | _camera(built) | _light(d, built) | _gloss(d, built)
+    light = _light(d, built, lights or main_lights(d))
+    values = _maps(d) | _mesh(built) | _camera(built) | light | _gloss(d, built)
     size, scale = (
         d.provenance.input.get("size", d.mask.shape[::-1]),
         d.provenance.input.get("scale", 1.0),
@@ -297,22 +325,35 @@ def _camera(built: MeshResult) -> dict[str, np.ndarray]:
     }
 
 
-def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+def main_lights(d: Decomposition) -> MainLights:
+    """Find the lights under which the file's readers render a result.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    MainLights
+    """
     from ..lobe_fitting.light_direction import main_light
     from ..shading.environment_map import recovered_environment
 
-    mesh_light, sun = built.illumination(d.illumination), main_light(d)
-    if d.environment is None:
-        sky = recovered_environment(mesh_light, viewer=d.viewer)
-    else:
-        sky = d.environment / built.reflectance_scale
+    sky = d.environment
+    if sky is None:
+        sky = recovered_environment(d.illumination, viewer=d.viewer)
+    return MainLights(sky, main_light(d))
+
+
+def _light(d: Decomposition, built: MeshResult, lights: MainLights) -> dict[str, np.ndarray]:
+    k, sun = built.reflectance_scale, lights.sun
     return {
         "illumination": d.illumination,
-        "mesh_illumination": mesh_light,
-        "sky": sky,
+        "mesh_illumination": built.illumination(d.illumination),
+        "sky": lights.sky / k,
         "sun_direction": sun.light.direction,
-        "sun_strength": sun.light.irradiance / built.reflectance_scale,
-        "sun_ambient": sun.light.ambient / built.reflectance_scale,
+        "sun_strength": sun.light.irradiance / k,
+        "sun_ambient": sun.light.ambient / k,
         "sun_explained": np.array(sun.explained),
         "sun_cone": np.array(sun.cone),
     }

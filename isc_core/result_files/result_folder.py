@@ -37,7 +37,7 @@ from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separat
 from ..scene.expected_error import ExpectedError
 from ..scene.lobe_fit import LobeFit
 from ..scene.part_of_result import ResultPart, placed_result
-from .arrays_file import ARRAYS, finer_by, mesh_of, write_arrays
+from .arrays_file import ARRAYS, finer_by, main_lights, mesh_of, write_arrays
 from .camera_json import camera_from_json, camera_to_json
 from .contact_sheet import contact_sheet, separation_sheet
 from .layer_pngs import LAYER_PNGS, write_layer_pngs
@@ -134,11 +134,12 @@ def save(
     channels = map_channels(stored)
     # The pool is inside the folder's block, so that its files are finished, or have failed, before
     # the folder is removed.
-    with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(2) as pool:
+    with new_folder(folder, _RESULT_FILES) as partial, ThreadPoolExecutor(3) as pool:
         monitor.report("writing maps", 0.0)
         d = decomposition
         (partial / "maps").mkdir()
         maps = pool.submit(write_maps, stored, channels, place, partial)
+        lights = pool.submit(main_lights, d) if arrays else None
         preview = pool.submit(_write_preview, given, partial / "preview.png")
         if d.mask[mask_slices(d.mask)].size > _MOST_AT_ONCE:
             maps.result()
@@ -148,11 +149,11 @@ def save(
         finer = finer_by(texture, place.shape)
         built = mesh_of(given, mesh, edge, finer=finer)
         (partial / "mesh.glb").write_bytes(built.glb())
-        if arrays:
+        if lights is not None:
             monitor.report("writing arrays", 0.6)
             # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
             plain = built if edge is None else mesh_of(given, mesh, None, built.gloss, finer)
-            write_arrays(given, partial / ARRAYS, plain, texture, edge)
+            write_arrays(given, partial / ARRAYS, plain, texture, edge, lights.result())
         if png:
             write_layer_pngs(placed_result(d, given.part), partial)
         if d.environment is not None:
