@@ -148,12 +148,15 @@ def save(
         edge = object_cover(given, cover)
         finer = finer_by(texture, place.shape)
         built = mesh_of(given, mesh, edge, finer=finer)
+        plain = None
+        if arrays and edge is not None:
+            # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
+            plain = pool.submit(mesh_of, given, mesh, None, built.gloss, finer)
         (partial / "mesh.glb").write_bytes(built.glb())
         if lights is not None:
             monitor.report("writing arrays", 0.6)
-            # Vertices of the arrays are pixels, unlike those of an outline between the pixels.
-            plain = built if edge is None else mesh_of(given, mesh, None, built.gloss, finer)
-            write_arrays(given, partial / ARRAYS, plain, texture, edge, lights.result())
+            of_pixels = built if plain is None else plain.result()
+            write_arrays(given, partial / ARRAYS, of_pixels, texture, edge, lights.result())
         if png:
             write_layer_pngs(placed_result(d, given.part), partial)
         if d.environment is not None:
