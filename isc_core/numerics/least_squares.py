@@ -61,7 +61,9 @@ def robust_least_squares(
     for _ in range(steps):
         jacobian = _jacobian(residuals, x, error, high)
         weighted = jacobian / np.sqrt(1 + np.square(error / scale))[:, None]
-        gradient, curvature = weighted.T @ error, weighted.T @ jacobian
+        # not `@`, whose sums depend on the number of threads
+        gradient = np.einsum("np,n->p", weighted, error)
+        curvature = np.einsum("np,nq->pq", weighted, jacobian)
         free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
         before = loss
         while damping < _MOST_DAMPING and free.any():
