@@ -7,6 +7,8 @@ those of the whole map where each value depends on rows at most `halo` away.
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+CACHED = 1 << 14
+"""Pixels of a block whose intermediate arrays stay in a processor's cache."""
 _PIXELS = 1 << 18
 
 

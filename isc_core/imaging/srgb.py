@@ -14,6 +14,8 @@ from functools import cache
 
 import numpy as np
 
+from .row_blocks import row_blocks
+
 _CELLS = 4096  # narrower than the narrowest code, 1 / (255 x 12.92): at most one bound in each
 
 
@@ -69,6 +71,24 @@ def srgb_codes(linear: np.ndarray) -> np.ndarray:
     cell = (inside * _CELLS).astype(np.int16)
     codes = first.take(cell)
     codes += inside >= bound.take(cell)
+    return codes
+
+
+def share_codes(values: np.ndarray) -> np.ndarray:
+    """Encode values in [0, 1] linearly with 8 bits.
+
+    Parameters
+    ----------
+    values : (H, W) ndarray
+        Clipped to [0, 1].
+
+    Returns
+    -------
+    (H, W) uint8 ndarray
+    """
+    codes = np.empty(values.shape, np.uint8)
+    for block in row_blocks(values.shape):  # small enough for the cache
+        codes[block.rows] = np.rint(255 * np.clip(values[block.rows], 0, 1))
     return codes
 
 

@@ -25,6 +25,7 @@ import numpy as np
 from ..errors import InputError
 from ..filters.distance import distance_to
 from ..imaging.bounding_box import mask_slices
+from ..imaging.tiles import Place
 from ..progress import Monitor
 from .coherency_sensitive_hashing import (
     CshOptions,
@@ -39,7 +40,6 @@ from .walsh_hadamard import PATCH
 
 # Factor by which a vote's weight decreases per pixel of its patch's depth in the hole.
 _DEPTH_LOSS = 1.3
-Part = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
@@ -106,7 +106,7 @@ def _filled(
     values: np.ndarray,
     known: np.ndarray,
     wanted: np.ndarray,
-    needed: Part | None,
+    needed: Place | None,
     options: PatchFillOptions,
     level: int,
     monitor: Monitor,
@@ -143,7 +143,7 @@ def _filled(
     return values
 
 
-def _both(one: Part, other: Part | None) -> Part:
+def _both(one: Place, other: Place | None) -> Place:
     """The smallest part that contains one or two."""
     if other is None:
         return one
@@ -153,7 +153,7 @@ def _both(one: Part, other: Part | None) -> Part:
     return rows, columns
 
 
-def _read_from(part: Part, shape: tuple[int, ...]) -> Part:
+def _read_from(part: Place, shape: tuple[int, ...]) -> Place:
     """The part of the next coarser level, of `shape`, from which `part` is interpolated."""
     rows, columns = (
         slice(max(one.start // 2 - 1, 0), min((one.stop + 1) // 2 + 1, size))

@@ -14,9 +14,8 @@ Limits: the fill is smooth, without texture.
 import numpy as np
 
 from ..imaging.doubling import doubled
-from ..imaging.row_blocks import row_blocks
+from ..imaging.row_blocks import CACHED, row_blocks
 
-_CACHED = 1 << 14  # pixels of a block
 _FEW = 0.2  # of the pixels: so few are looked up one by one
 
 
@@ -78,7 +77,7 @@ def pull(values: np.ndarray, known: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     """
     half = tuple(-(-size // 2) for size in known.shape)
     means, count = np.empty((*half, values.shape[2]), np.float32), np.empty(half, np.float32)
-    for block in row_blocks(half, pixels=_CACHED):
+    for block in row_blocks(half, pixels=CACHED):
         rows = slice(2 * block.rows.start, 2 * block.rows.stop)
         here = known[rows]
         inside = np.where(here[..., None], values[rows], 0).astype(np.float32, copy=False)

@@ -29,7 +29,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..imaging.luminance import luminance, white_of
-from ..numerics.least_squares import robust_least_squares
+from ..numerics.least_squares import robust_least_squares, robust_loss
 from ..numerics.linear import nonnegative_pair
 from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
@@ -227,7 +227,8 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
             np.array([0, 0, 0, np.log(1.0)]),
             np.array([np.inf] * 3 + [np.log(_MAX_EXPONENT)]),
         )
-        fits.append((_robust_cost(samples, model(*found[:2])), found))
+        error = model(*found[:2]) - samples.values
+        fits.append((robust_loss(error, samples.scale), found))
     light, others, cone = min(fits, key=lambda fit: fit[0])[1]
     explained = _explained(samples.values - model(light, others), np.square(samples.values).sum())
     estimate = DirectionalLight(light, others[:3])
@@ -368,10 +369,6 @@ def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _S
         if flat
         else float(min(180.0, np.rad2deg(np.sqrt(max(np.linalg.eigvalsh(spread)[-1], 0)))))
     )
-
-
-def _robust_cost(samples: _Samples, predicted: np.ndarray) -> float:
-    return float(np.sum(np.sqrt(1 + np.square((predicted - samples.values) / samples.scale)) - 1))
 
 
 def _explained(error: np.ndarray, whole: float) -> float:

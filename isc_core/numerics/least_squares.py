@@ -57,7 +57,7 @@ def robust_least_squares(
     low, high = bounds
     x = np.clip(start, low, high)
     error, damping = residuals(x), _DAMPING
-    loss = _loss(error, scale)
+    loss = robust_loss(error, scale)
     for _ in range(steps):
         jacobian = _jacobian(residuals, x, error, high)
         weighted = jacobian / np.sqrt(1 + np.square(error / scale))[:, None]
@@ -71,7 +71,7 @@ def robust_least_squares(
             trial[free] -= _step(curvature[np.ix_(free, free)], gradient[free], damping)
             trial = np.clip(trial, low, high)
             found = residuals(trial)
-            if (lower := _loss(found, scale)) < loss:
+            if (lower := robust_loss(found, scale)) < loss:
                 x, error, loss = trial, found, lower
                 damping = max(damping / 10, _LEAST_DAMPING)
                 break
@@ -81,8 +81,19 @@ def robust_least_squares(
     return x
 
 
-def _loss(error: np.ndarray, scale: float) -> float:
-    """Half of the loss."""
+def robust_loss(error: np.ndarray, scale: float) -> float:
+    """Return half of the loss of residuals.
+
+    Parameters
+    ----------
+    error : (...) ndarray
+    scale : float
+        s; above 0.
+
+    Returns
+    -------
+    float
+    """
     square = np.square(error / scale)
     return float(np.sum(square / (1 + np.sqrt(1 + square))))
 

@@ -27,8 +27,7 @@ from ..errors import InputError
 from ..filters.morphology import dilated, eroded
 from ..imaging.minimum_cut import STEPS, minimum_cut, shifted
 from ..imaging.resampling import resampled
-from ..imaging.row_blocks import row_blocks
-from ..imaging.srgb import srgb_codes
+from ..imaging.srgb import share_codes, srgb_codes
 from ..io.atomic import new_file, require_writable_file
 from ..io.decoders import MIN_SIDE
 from ..io.limits import DEFAULT_LIMITS, Limits
@@ -258,10 +257,7 @@ def encoded_mask(mask: np.ndarray) -> bytes:
     -------
     bytes
     """
-    codes = np.empty(mask.shape, np.uint8)
-    for block in row_blocks(mask.shape):  # small enough for the cache
-        codes[block.rows] = np.rint(255 * mask[block.rows].astype(np.float32))
-    return encode_png(codes, compression=1)
+    return encode_png(share_codes(mask), compression=1)
 
 
 def check_mask_path(photo_path: str | Path, out_path: str | Path) -> None:

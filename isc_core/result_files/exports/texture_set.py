@@ -48,6 +48,7 @@ from PIL import Image
 
 from ...errors import InputError
 from ...imaging.row_blocks import row_blocks
+from ...imaging.srgb import share_codes
 from ...imaging.upsampling import enlarged, enlarged_cubically
 from ...io.atomic import new_folder
 from ...io.exr import write_channels
@@ -59,7 +60,7 @@ from ..mesh.base_color import nearest_inside
 from ..mesh.result import MeshResult
 from ..mesh.texture_codes import vector_codes
 from .targets import TARGETS
-from .textures import PLASTIC, share_codes
+from .textures import PLASTIC
 
 _COMPRESSION = 2  # of 9: a third of the time of the default 6
 

@@ -4,26 +4,11 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
+from ...imaging.srgb import share_codes
 from ..mesh.result import MeshResult
 from ..mesh.texture_codes import encoded_png
 
 PLASTIC = 0.5  # a specular texture's value for f0 = .04, as in Blender and Unreal
-
-
-def share_codes(values: np.ndarray) -> np.ndarray:
-    """Return values in [0, 1] as 8-bit codes; others are clipped.
-
-    Parameters
-    ----------
-    values : (H, W) ndarray
-
-    Returns
-    -------
-    (H, W) uint8 ndarray
-    """
-    return np.rint(255 * np.clip(values, 0, 1)).astype(np.uint8)
 
 
 def plain_stem(path: Path) -> str:

@@ -25,7 +25,7 @@ from ...filters.components import labelled
 from ...filters.morphology import dilated
 from ...imaging.area_resize import AreaFilter, reduced_count
 from ...imaging.bounding_box import FramePart, mask_slices
-from ...imaging.row_blocks import row_blocks
+from ...imaging.srgb import share_codes
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
 from ...photo.soft_rim import rim_reach, soft_rim
@@ -134,7 +134,7 @@ def object_cover(stored: ResultPart, given: np.ndarray | None) -> ObjectCover | 
     """
     if given is None:
         return None
-    codes = _codes(given)
+    codes = share_codes(given)
     if not ((codes > 0) & (codes < 255)).any():
         return None
     source, mask = stored.result.provenance.input, stored.mask
@@ -153,14 +153,6 @@ def object_cover(stored: ResultPart, given: np.ndarray | None) -> ObjectCover | 
     share, soft = _near(share, place.cut(mask), own)
     whole = None if soft is None else place.placed(soft)
     return ObjectCover(place.placed(share), whole, codes, scale)
-
-
-def _codes(cover: np.ndarray) -> np.ndarray:
-    """A coverage (h, w) from 0 to 1 as codes."""
-    codes = np.empty(cover.shape, np.uint8)
-    for block in row_blocks(cover.shape):
-        codes[block.rows] = np.rint(255 * np.clip(cover[block.rows], 0, 1))
-    return codes
 
 
 def _reduced_part(codes: np.ndarray, scale: float, shape: tuple[int, int]) -> FramePart:

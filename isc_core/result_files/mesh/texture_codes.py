@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...imaging.srgb import srgb_codes
+from ...imaging.srgb import share_codes, srgb_codes
 from ...io.png import encode_png
 
 _ROWS = 256  # coded at a time
@@ -58,7 +58,7 @@ def alpha_codes(values: np.ndarray) -> np.ndarray:
     (H, W, 4) uint8 ndarray
     """
     pixels = np.full((*values.shape, 4), 255, np.uint8)
-    pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
+    pixels[..., 3] = share_codes(values)
     return pixels
 
 

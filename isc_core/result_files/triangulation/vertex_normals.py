@@ -15,10 +15,9 @@ Limits: normals that face away from the viewer are rotated until their tangent i
 import numpy as np
 
 from ...imaging.channels import length, total
-from ...imaging.row_blocks import row_blocks
+from ...imaging.row_blocks import CACHED, row_blocks
 from .adaptive_triangles import Triangulation, covered_pixels
 
-_CACHED = 1 << 14  # pixels of a block
 _LEAST_FACING = 1e-3  # cosine of a vertex normal to its view, so that its tangent is defined
 
 
@@ -112,7 +111,7 @@ def detail_normals(
         base = patch.weights.astype(np.float32) @ corners
         flat[patch.flat_pixels(normal.shape[1])] = base.reshape(len(base), -1, 3)
     # each pixel once: triangles share those on their sides
-    for block in row_blocks(detail.shape, pixels=_CACHED):
+    for block in row_blocks(detail.shape, pixels=CACHED):
         rows = detail[block.rows]
         covered = ~np.isnan(rows[..., 0])
         toward = view if view.ndim == 1 else view[block.rows][covered]
@@ -136,7 +135,7 @@ def view_cosine(normal: np.ndarray, view: np.ndarray) -> np.ndarray:
     (H, W) float32 ndarray
     """
     cosine = np.empty(normal.shape[:2], np.float32)
-    for block in row_blocks(cosine.shape, pixels=_CACHED):
+    for block in row_blocks(cosine.shape, pixels=CACHED):
         toward = view if view.ndim == 1 else view[block.rows]
         cosine[block.rows] = total(normal[block.rows] * toward)
     return cosine

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...imaging.channels import fade_in, mean_channel, saturation, smallest
-from ...imaging.row_blocks import row_blocks
+from ...imaging.row_blocks import CACHED, row_blocks
 from ...scene.decomposition import Separation
 from .clipped import explain_clipped
 
@@ -173,7 +173,7 @@ def restore_image(
 def _restricted(layer: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """A layer (H, W, 3), 0 outside of `kept`; what is 0 takes no memory until it is written."""
     found = np.zeros_like(layer)
-    for block in row_blocks(kept.shape, pixels=1 << 14):
+    for block in row_blocks(kept.shape, pixels=CACHED):
         if kept[block.rows].any():
             found[block.rows] = np.where(kept[block.rows][..., None], layer[block.rows], 0)
     return found
