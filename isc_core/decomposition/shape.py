@@ -254,7 +254,7 @@ def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> R
     return RecoverOptions(
         solve_size=options.solve_size,
         margin=options.margin,
-        refine_at_full_size=settings.illumination != Illumination.PHOTO,
+        reduce_larger=settings.illumination == Illumination.PHOTO,
         whole_frame=options.whole_frame,
         drop_near_edge=options.drop_near_edge,
         shading_only=settings.shading_only,

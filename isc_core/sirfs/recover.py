@@ -5,9 +5,8 @@ Problem: the priors are statistics per pixel, so the result would depend on the 
 the empty space around the object. The object is therefore resampled to one size
 (`RecoverOptions.solve_size`), and a window around its bounding box with a fixed margin is solved.
 If this enlarges it, the average over each pixel is preserved (`imaging.area_enlarge`): a blurring
-interpolation would change the differences between neighbours. Where the priors were fitted at the
-size of the image, a larger object is then solved again at that size, starting from the first result
-(`RecoverOptions.refine_at_full_size`).
+interpolation would change the differences between neighbours. Where the priors were fitted to
+larger objects, too, a larger object is not reduced (`RecoverOptions.reduce_larger`).
 
 Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
 2015, doi:10.1109/TPAMI.2014.2377712.
@@ -50,8 +49,8 @@ class RecoverOptions:
         image's own.
     margin : int
         Pixels of empty space around the box at that size.
-    refine_at_full_size : bool
-        Solve a larger object again at its own size, starting from the result at `solve_size`.
+    reduce_larger : bool
+        Reduce a larger object to `solve_size`; otherwise it is solved at its own size.
     whole_frame : bool
         Solve the frame as given instead of a window around the object. The height is then returned
         as solved, not shifted to a mean of 0.
@@ -65,7 +64,7 @@ class RecoverOptions:
 
     solve_size: int = SOLVE_SIZE
     margin: int = MARGIN
-    refine_at_full_size: bool = False
+    reduce_larger: bool = True
     whole_frame: bool = False
     drop_near_edge: bool = False
     shading_only: bool = False
@@ -175,17 +174,9 @@ def recover(
     fixed = None
     if known.height is not None:
         fixed = _scaled_height(window.cut_replicated(known.height), factor)
-    refine = options.refine_at_full_size and factor < 1 and fixed is None
     result = solve(
-        problem,
-        options.solver,
-        known_height=fixed,
-        known_light=known.light,
-        monitor=monitor.part(0, 0.5 if refine else 1),
+        problem, options.solver, known_height=fixed, known_light=known.light, monitor=monitor
     )
-    if refine:
-        problem = _problem(inputs, floor, priors, weights, options)
-        result = _solve_finer(problem, result, options.solver, known.light, monitor.part(0.5, 1))
     if known.height is not None:
         height = window.cut_replicated(known.height)
     else:
@@ -193,23 +184,6 @@ def recover(
         if known.depth is None and not options.whole_frame:
             height = height - height[inputs.valid].mean()
     return _recovered(result, window.put(height, mask.shape), problem.valid.shape)
-
-
-def _solve_finer(
-    problem: Problem,
-    before: SirfsResult,
-    options: SolverOptions,
-    known_light: np.ndarray | None,
-    monitor: Monitor,
-) -> SirfsResult:
-    """Solve a finer problem from the result of a coarser one; evaluations are summed."""
-    start = resample_height(before.height, problem.valid.shape), before.light
-    found = solve(problem, options, known_light=known_light, start=start, monitor=monitor)
-    return replace(
-        found,
-        iterations=before.iterations + found.iterations,
-        evaluations=before.evaluations + found.evaluations,
-    )
 
 
 def _recovered(result: SirfsResult, height: np.ndarray, solved_shape: tuple[int, ...]) -> Recovered:
@@ -247,6 +221,8 @@ def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[Window, float]:
     rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
     height, width = int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
     factor = options.solve_size / max(height, width) if options.solve_size else 1.0
+    if not options.reduce_larger:
+        factor = max(factor, 1.0)
     margin = round(options.margin / factor)
     return Window(
         int(rows[0]) - margin, int(columns[0]) - margin, height + 2 * margin, width + 2 * margin

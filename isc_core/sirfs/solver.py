@@ -342,25 +342,6 @@ class ParameterVector:
                 height = down(height) / _COARSER
             levels[level][...] = height
 
-    def of(self, height: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return the vector of a height and a light.
-
-        Parameters
-        ----------
-        height : (H, W) ndarray
-        light : (9, C) ndarray
-            Not used where the light is known.
-
-        Returns
-        -------
-        (N,) ndarray
-        """
-        x = np.zeros_like(self.x)
-        self._set_light(x, stack(light) - self._problem.priors.light.offset)
-        if self.shapes:
-            self.levels(x)[0][...] = height
-        return x
-
     def _set_light(self, x: np.ndarray, difference: np.ndarray) -> None:
         """Set the light in a vector from its difference (9 C,) to the mean of the prior."""
         if self._known_light is None:
@@ -387,7 +368,6 @@ def solve(
     *,
     known_height: np.ndarray | None = None,
     known_light: np.ndarray | None = None,
-    start: tuple[np.ndarray, np.ndarray] | None = None,
     monitor: Monitor | None = None,
 ) -> SirfsResult:
     """Minimise the objective of a problem.
@@ -403,8 +383,6 @@ def solve(
         Kept as given.
     known_light : (9, C) ndarray, optional
         Kept as given.
-    start : tuple of ndarray, optional
-        Height (H, W) and light (9, C) to start from instead.
     monitor : Monitor, optional
 
     Returns
@@ -431,10 +409,7 @@ def solve(
         monitor.report(STAGE, 0.0)
         if unknowns.x.size:
             weights, lbfgs, algebra = problem.weights, options.lbfgs, backend.algebra()
-            if start is None:
-                run = multi_start(unknowns, weights.starts, lbfgs, algebra, monitor)
-            else:
-                run = Minimisation(unknowns, unknowns.of(*start), lbfgs, algebra)
+            run = multi_start(unknowns, weights.starts, lbfgs, algebra, monitor)
             outcome = run.run(_reporter(monitor, options.lbfgs.iterations))
             if unknowns.x is not run.x:  # it had converged before another start was tried
                 unknowns(run.x, np.empty_like(run.x))

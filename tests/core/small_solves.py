@@ -17,14 +17,14 @@ def small_solves(
     side: int = 24, steps: LbfgsOptions | None = FEW_STEPS, own_size: bool = False
 ) -> Iterator[None]:
     """Solve SIRFS at `side` pixels instead of 256 while the block lasts, without `steps` to the
-    end; only with `own_size`, go on to the photo's own size where the settings ask for it.
+    end; only with `own_size`, at the photo's own size where the settings ask for it.
     """
 
     def small(**values: Any) -> RecoverOptions:
         given = RecoverOptions(**values)
         solver = given.solver if steps is None else replace(given.solver, lbfgs=steps)
-        own = own_size and given.refine_at_full_size
-        return replace(given, solve_size=side, margin=4, refine_at_full_size=own, solver=solver)
+        reduces = given.reduce_larger or not own_size
+        return replace(given, solve_size=side, margin=4, reduce_larger=reduces, solver=solver)
 
     with mock.patch("isc_core.decomposition.shape.RecoverOptions", small):
         yield

@@ -1,5 +1,5 @@
 """A photo larger than the size at which SIRFS is solved: under the lights of the data set it is
-solved again at its own size.
+solved at its own size.
 """
 
 from typing import Any
@@ -16,9 +16,9 @@ from tests.core.ball_scene import ball
 from tests.core.small_solves import small_solves
 
 
-@pytest.mark.parametrize(("illumination", "again"), [("natural", True), ("photo", False)])
-def test_the_solution_is_continued_at_the_photos_own_size(
-    illumination: str, again: bool, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("illumination", "own"), [("natural", True), ("photo", False)])
+def test_larger_objects_are_solved_at_their_own_size(
+    illumination: str, own: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene = ball((50, 54), 20.0, (25.0, 27.0))
     solved: list[Recovered] = []
@@ -33,5 +33,5 @@ def test_the_solution_is_continued_at_the_photos_own_size(
     with small_solves(own_size=True):
         result = decompose(photo, Settings("sirfs", illumination=illumination, threads=1))
     size = max(np.ptp(np.nonzero(scene.mask), axis=1)) + 1
-    assert (min(solved[-1].solved_shape) > size) == again
+    assert (min(solved[-1].solved_shape) > size) == own
     assert result.identity_errors().broken() == ()

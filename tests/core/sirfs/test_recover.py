@@ -176,29 +176,16 @@ def test_solving_at_another_size_keeps_the_shape() -> None:
     assert np.median(angles(small.height, plain.height, where)) < 12
 
 
-def test_a_coarse_solution_is_continued_at_the_size_given() -> None:
+@pytest.mark.parametrize("size", [50, 90])
+def test_only_a_larger_object_is_kept_at_its_size(size: int) -> None:
+    """To 50 pixels, it would be reduced; to 90, it is enlarged in either case."""
     scene = blob((96, 104))
-    coarse = replace(OPTIONS, solve_size=50)
-    fine = replace(coarse, refine_at_full_size=True)
-    small, both = run(scene, coarse), run(scene, fine)
-    assert both.evaluations > small.evaluations
-    rows, columns = box(scene.mask, 0)
-    margins = both.solved_shape[0] - (rows.stop - rows.start)
-    assert both.solved_shape[1] == columns.stop - columns.start + margins
-    found = SceneConstraints(small.height, small.light)
-    before = run(scene, replace(OPTIONS, margin=margins // 2), found)
-    assert before.solved_shape == both.solved_shape
-    assert both.terms.total < before.terms.total - 0.1
-    known = run(scene, fine, SceneConstraints(small.height))
-    np.testing.assert_array_equal(known.height, small.height)
-    assert known.solved_shape == small.solved_shape
-
-
-def test_an_object_that_is_not_larger_is_solved_once() -> None:
-    scene = blob()
-    options = replace(OPTIONS, solve_size=90)
-    once, asked = run(scene, options), run(scene, replace(options, refine_at_full_size=True))
-    np.testing.assert_array_equal(once.height, asked.height)
+    length = max(np.ptp(np.nonzero(scene.mask), axis=1)) + 1
+    assert 50 < length < 90
+    found = run(scene, replace(OPTIONS, solve_size=size, reduce_larger=False))
+    same = run(scene, replace(OPTIONS, solve_size=max(size, int(length))))
+    assert found.solved_shape == same.solved_shape
+    np.testing.assert_array_equal(found.height, same.height)
 
 
 @pytest.mark.parametrize("solve_size", [0, 41])

@@ -283,18 +283,6 @@ def test_it_begins_with_the_shape_that_predicted_normals_add_up_to() -> None:
     assert not solve(measured, unmoved).height.any(), "what was measured decides"
 
 
-def test_it_goes_on_from_a_given_height_and_light() -> None:
-    problem = make_problem(blob())
-    options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(evaluations=40))
-    before = solve(problem, options)
-    none = replace(options, lbfgs=LbfgsOptions(evaluations=1))
-    same = solve(problem, none, start=(before.height, before.light))
-    np.testing.assert_allclose(same.height, before.height, atol=1e-9)
-    np.testing.assert_allclose(same.light, before.light, atol=1e-9)
-    further = solve(problem, options, start=(before.height, before.light))
-    assert further.terms.total < before.terms.total
-
-
 @pytest.mark.slow
 def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
     """A light far from any likely one is a bad start; which of the starts stands first does not
