@@ -44,6 +44,7 @@ _TYPICAL_LEVEL = 0.75
 _BRIGHT = 95.0  # percentile: most highlights are smaller
 _DESATURATION = 0.1  # chosen on held-out objects; docs/methods/light_colour.md
 _LEAST_WEIGHT = 0.05
+_FITTED_SIZE = 224  # pixels: priors of the data set were fitted to objects 227 to 503 long
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,10 +252,11 @@ def _recover_options(task: DecompositionTask, loss_tolerance: float | None) -> R
     solver = SolverOptions(engine=settings.engine, threads=settings.threads)
     if loss_tolerance is not None:
         solver = replace(solver, lbfgs=replace(solver.lbfgs, loss_tolerance=loss_tolerance))
+    is_photo = settings.illumination == Illumination.PHOTO
     return RecoverOptions(
-        solve_size=options.solve_size,
+        solve_size=options.solve_size if is_photo else min(options.solve_size, _FITTED_SIZE),
         margin=options.margin,
-        reduce_larger=settings.illumination == Illumination.PHOTO,
+        reduce_larger=is_photo,
         whole_frame=options.whole_frame,
         drop_near_edge=options.drop_near_edge,
         shading_only=settings.shading_only,
