@@ -24,6 +24,9 @@ demo: .venv/.ready-demo
 
 # Tests start hundreds of processes: bytecode is cached, even if the environment disables it.
 test test-slow test-all: export PYTHONDONTWRITEBYTECODE =
+# There is one process per core: threads of libraries within it would only wait for each other.
+test test-slow test-all: export OPENBLAS_NUM_THREADS = 1
+test test-slow test-all: export OMP_NUM_THREADS = 1
 
 # One process per core. Workers process whole files, so that the fixtures of a file are made once.
 PYTEST = $(BIN)/python -m pytest --numprocesses auto --dist loadfile
@@ -34,8 +37,9 @@ test: lint kernels
 test-slow: kernels
 	$(PYTEST) -m slow
 
-test-all: test
-	@$(MAKE) --no-print-directory test-slow
+# In one run: fixtures that fast and slow tests share are made once.
+test-all: lint kernels
+	$(PYTEST) -m "slow or not slow"
 
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .

@@ -1,5 +1,4 @@
-"""What does solving at 256 pixels cost: the ten MIT-Berkeley objects as users run them, and at
-their own size.
+"""The ten MIT-Berkeley objects as users run them, and as the data set's protocol does.
 
   python -m benchmarks.sirfs.own_size [--shared DIR] [--json FILE]
 
