@@ -5,9 +5,11 @@ of Python are built from one.
 """
 
 import hashlib
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -111,7 +113,8 @@ def libraries(machines: Sequence[Machine], cache_folder: Path) -> list[Path]:
         raise InputError(
             f"the kernels cannot be compiled: {error}: install the extra dev"
         ) from error
-    return [library(one, *sources, folder) for one in machines]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:  # of processes of the compiler
+        return list(pool.map(lambda one: library(one, *sources, folder), machines))
 
 
 def _origin() -> str:
