@@ -7,7 +7,7 @@ with fine relief, on the data set's crop. `evaluate`: SIRFS at the objects' own 
 priors and predictions, and, as `isc evaluate` does by default, with the data set's priors alone.
 The table has each object's avg, and the geometric means over objects; below are their ratios.
 
-Limits: the shipped priors were fitted to these objects, for both alike.
+Limits: the shipped priors were fitted to these objects.
 """
 
 import json

@@ -65,7 +65,8 @@ class SolveOptions:
     Attributes
     ----------
     solve_size : int
-        Long side of the object's box, pixels, at which SIRFS is solved; 0 for the working size.
+        Long side of the object's box, pixels, at which SIRFS is solved; 0 for the working size. In
+        the illuminations of MIT-Berkeley 224 at most, and larger objects are not reduced.
     margin : int
         Pixels of empty space around the box at that size.
     whole_frame : bool

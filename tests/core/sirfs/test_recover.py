@@ -182,10 +182,13 @@ def test_only_a_larger_object_is_kept_at_its_size(size: int) -> None:
     scene = blob((96, 104))
     length = max(np.ptp(np.nonzero(scene.mask), axis=1)) + 1
     assert 50 < length < 90
-    found = run(scene, replace(OPTIONS, solve_size=size, reduce_larger=False))
+    options = replace(OPTIONS, solve_size=size, reduce_larger=False)
+    found = run(scene, options)
     same = run(scene, replace(OPTIONS, solve_size=max(size, int(length))))
     assert found.solved_shape == same.solved_shape
     np.testing.assert_array_equal(found.height, same.height)
+    known = run(scene, options, SceneConstraints(found.height))
+    np.testing.assert_array_equal(known.height, found.height)
 
 
 @pytest.mark.parametrize("solve_size", [0, 41])
