@@ -10,6 +10,7 @@ from . import menus, operators, panels
 from .operators.live_edits import add_handlers, remove_handlers
 from .operators.modal import update_display
 from .runs.active_run import active_run, cancel_active_run
+from .scene.appended import separate_appended
 from .settings import preferences, properties
 
 _CLASSES = (
@@ -28,6 +29,7 @@ def register() -> None:
     properties.add_properties()
     menus.add_entries()
     bpy.app.handlers.load_pre.append(_cancel_before_loading)
+    bpy.app.handlers.blend_import_post.append(_after_append)
     add_handlers()
     # Blender exits without notifying add-ons. The worker would stop by itself, but leave its files.
     atexit.register(cancel_active_run)
@@ -38,6 +40,7 @@ def unregister() -> None:
     cancel_active_run()
     atexit.unregister(cancel_active_run)
     remove_handlers()
+    bpy.app.handlers.blend_import_post.remove(_after_append)
     bpy.app.handlers.load_pre.remove(_cancel_before_loading)
     menus.remove_entries()
     properties.remove_properties()
@@ -52,3 +55,9 @@ def _cancel_before_loading(*_: Any) -> None:
     if run is not None:
         run.cancel()
         update_display(bpy.context, run)
+
+
+@persistent
+def _after_append(context: Any, *_: Any) -> None:
+    """Two photos of one name stay two objects."""
+    separate_appended([item.id for item in context.import_items if item.id is not None])

@@ -315,23 +315,22 @@ def image_name(key: str, role: ImageRole) -> str:
     return datablock_name(key, role.replace("_", " "))
 
 
-def attach_maps(key: str, obj: bpy.types.Object, maps: dict[ImageRole, bpy.types.Image]) -> None:
+def attach_maps(obj: bpy.types.Object, maps: dict[ImageRole, bpy.types.Image]) -> None:
     """Store the images as custom properties, so that they are saved and appended with the object.
 
     Parameters
     ----------
-    key : str
-        Name of the photo.
     obj : bpy.types.Object
         The object; gets the properties `isc_map_...`, and loses those of other maps, whose images
-        are removed.
+        are removed unless something else uses them.
     maps : dict of ImageRole to bpy.types.Image
     """
     for role in MAPS:
         if role in maps:
             obj[f"isc_map_{role}"] = maps[role]
             continue
+        old = obj.get(f"isc_map_{role}")  # of an earlier result; None if the user removed it
         if f"isc_map_{role}" in obj:
             del obj[f"isc_map_{role}"]
-        if (old := find_tagged(bpy.data.images, key, role)) is not None:
-            bpy.data.images.remove(old)  # of an earlier result
+        if old is not None and old.users == 0:
+            bpy.data.images.remove(old)

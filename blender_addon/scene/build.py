@@ -268,7 +268,7 @@ def _place(
         remove_displacement(key, obj)
     if is_new:
         _position(obj, options, scene, *position)
-    attach_maps(key, obj, {role: images[role] for role in MAPS if role in images})
+    attach_maps(obj, {role: images[role] for role in MAPS if role in images})
     world = ensure_world(key, images[ImageRole.ENVIRONMENT_MAP], result.sun_ambient, options.sun)
     # So that the light is saved and appended with the object even if no scene uses it.
     obj["isc_world"] = world

@@ -11,7 +11,15 @@ Limits: while they share everything, the order of their names decides which one 
 
 import bpy
 
-from ..datablocks.provenance import KEY, ROLE, find_tagged, tag
+from ..datablocks.provenance import (
+    KEY,
+    PHOTO_HASH,
+    ROLE,
+    SOURCE_IMAGE,
+    all_tagged,
+    find_tagged,
+    tag,
+)
 
 OBJECT, MATERIAL, COPY = "object", "material", "copy"
 
@@ -29,7 +37,29 @@ def find_original(obj: bpy.types.Object) -> bpy.types.Object | None:
     bpy.types.Object or None
         None if the original was deleted.
     """
-    return find_tagged(bpy.data.objects, obj[KEY], OBJECT)
+    originals = all_tagged(bpy.data.objects, obj[KEY], OBJECT)
+    return next((other for other in originals if are_of_one_photo(obj, other)), None)
+
+
+def are_of_one_photo(obj: bpy.types.Object, other: bpy.types.Object) -> bool:
+    """Return whether two objects of one key were built from the same photo.
+
+    Parameters
+    ----------
+    obj, other : bpy.types.Object
+        Objects of ISC.
+
+    Returns
+    -------
+    bool
+        By their images in this file, as the photo may have been edited; otherwise by the hashes. An
+        unknown photo is the same.
+    """
+    images = obj.get(SOURCE_IMAGE), other.get(SOURCE_IMAGE)
+    if None not in images:
+        return bool(images[0] == images[1])
+    hashes = obj.get(PHOTO_HASH, ""), other.get(PHOTO_HASH, "")
+    return "" in hashes or hashes[0] == hashes[1]
 
 
 def is_copy(obj: bpy.types.Object) -> bool:

@@ -2,6 +2,7 @@
 
 import colorsys
 import json
+import shutil
 import struct
 from dataclasses import replace
 from functools import partial
@@ -24,7 +25,11 @@ from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # 
 from blender_addon.operators.export import export_object  # noqa: E402
 from blender_addon.scene.build import build_object  # noqa: E402
 from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
-from blender_addon.scene.copies import objects_sharing_material  # noqa: E402
+from blender_addon.scene.copies import (  # noqa: E402
+    find_original,
+    is_copy,
+    objects_sharing_material,
+)
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
@@ -291,6 +296,47 @@ def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject
         and own.material != built.material
         and not objects_sharing_material(own.object, own.material)
     )
+
+
+def of_other_photo(folder: Path, copy: Path) -> Path:
+    """The same result as if it were that of another photo of the same name."""
+    shutil.copytree(folder, copy)
+    about = json.loads((copy / "decomposition.json").read_text())
+    about["input"]["sha256"] = 64 * "f"
+    (copy / "decomposition.json").write_text(json.dumps(about))
+    return copy
+
+
+def appended(bpy: Any, path: Path) -> Any:
+    with bpy.data.libraries.load(str(path)) as (_, wanted):
+        wanted.objects = ["bump"]
+    bpy.context.scene.collection.objects.link(wanted.objects[0])
+    bpy.context.view_layer.objects.active = wanted.objects[0]
+    return wanted.objects[0]
+
+
+def test_an_appended_object_of_another_photo_of_the_same_name_is_its_own(
+    addon: Any, bump_folder: Path, tmp_path: Path
+) -> None:
+    addon.context.scene.isc.all_maps = True
+    addon.ops.isc.import_result(directory=str(of_other_photo(bump_folder, tmp_path / "bump")))
+    addon.data.libraries.write(str(tmp_path / "a.blend"), {addon.context.object}, fake_user=True)
+    addon.ops.wm.read_factory_settings(use_empty=True)
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    first = find_built(addon.context.object)
+    others = [appended(addon, tmp_path / "a.blend") for _ in range(2)]
+    other = find_built(others[0])
+    assert first is not None and other is not None
+    assert not is_copy(others[0]) and is_copy(others[1]) and find_original(others[1]) == others[0]
+    assert other.world == others[0]["isc_world"] != first.world
+    maps = [name for name in others[0].keys() if name.startswith("isc_map_")]  # noqa: SIM118
+    before = {name: others[0][name] for name in (*maps, "isc_world")}
+    addon.context.view_layer.objects.active = first.object
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    assert len(maps) == 10 and {name: others[0].get(name) for name in before} == before
+    assert other.material.node_tree.nodes["Base Color"].image.get("isc_key") == "bump-2"
+    addon.ops.isc.import_result(directory=str(tmp_path / "bump"))
+    assert addon.context.object == others[0], "updated, as its number shows"
 
 
 # --- files ----------------------------------------------------------------------------------------
