@@ -45,13 +45,14 @@ from .collection import (
     ensure_collection,
     ensure_optional_part,
     ensure_scene,
+    is_in_scene,
     link_object,
     use_standard_view,
 )
 from .copies import OBJECT
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
-from .placement import free_location
+from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
@@ -244,7 +245,8 @@ def _place(
     _require_ready(key, options, scene)
     if options.own_scene:
         scene = ensure_scene(key)
-    collection = ensure_collection(key, scene)
+    existing = find_tagged(bpy.data.objects, key, OBJECT)
+    collection = ensure_collection(key, scene, existing)
     images = {
         role: replace_image(image, key, role)
         for role in prepared.files
@@ -260,13 +262,14 @@ def _place(
     )
     material = ensure_material(key, maps, prepared.specular)
     _remove_unused(key, images)
-    is_new = find_tagged(bpy.data.objects, key, OBJECT) is None
-    obj = _ensure_object(key, collection, prepared, blocks.take_mesh(), material)
+    obj = _ensure_object(key, prepared, blocks.take_mesh(), material)
+    if not is_in_scene(obj, scene):
+        link_object(obj, collection)
     if options.displacement:
         add_displacement(key, obj, images[ImageRole.DISPLACEMENT], result.eye is not None)
     else:
         remove_displacement(key, obj)
-    if is_new:
+    if existing is None:
         _position(obj, options, scene, *position)
     attach_maps(obj, {role: images[role] for role in MAPS if role in images})
     world = ensure_world(key, images[ImageRole.ENVIRONMENT_MAP], result.sun_ambient, options.sun)
@@ -337,7 +340,6 @@ def _mesh_number(key: str) -> int:
 
 def _ensure_object(
     key: str,
-    collection: bpy.types.Collection,
     prepared: PreparedObject,
     mesh: bpy.types.Mesh,
     material: bpy.types.Material,
@@ -354,7 +356,6 @@ def _ensure_object(
     store_checksum(mesh, prepared.checksum)
     if shadows is not None:
         obj.visible_shadow = obj.visible_diffuse = shadows
-    link_object(obj, collection)
     if not mesh.materials:
         mesh.materials.append(material)
     return obj
@@ -389,8 +390,9 @@ def _ensure_camera_and_light(
         collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
         if options.light_and_camera and not options.sun:
             ensure_sun(key, collection, result.sun_direction, result.sun_strength)
+    place = world_matrix(obj)
     return ensure_camera(
-        key, collection, result, options.size_metres, obj.matrix_basis, options.photo_resolution
+        key, collection, result, options.size_metres, place, options.photo_resolution
     )
 
 

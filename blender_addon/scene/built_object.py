@@ -23,7 +23,7 @@ class BuiltObject:
     world : bpy.types.World
         The recovered light; a shared scene uses it only if requested.
     scene : bpy.types.Scene
-        Scene of the object.
+        Scene of the object; the current one if it is in several.
     material : bpy.types.Material
         Material of the object.
     """
@@ -67,9 +67,17 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
         object=built,
         camera=find_tagged(bpy.data.objects, key, "camera"),
         world=find_tagged(bpy.data.worlds, key, "world"),
-        scene=find_tagged(bpy.data.scenes, key, "scene") or next(iter(built.users_scene), None),
+        scene=_scene_of(built),
         material=material,
     )
+
+
+def _scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
+    """The current scene if it has the object, else the object's own, else any that has it."""
+    scenes = obj.users_scene
+    if bpy.context.scene in scenes:
+        return bpy.context.scene
+    return find_tagged(bpy.data.scenes, obj[KEY], "scene") or next(iter(scenes), None)
 
 
 def selection_problem(obj: bpy.types.Object | None) -> str:

@@ -56,12 +56,14 @@ def ensure_camera(
         name = datablock_name(key, "camera")
         data = tag(bpy.data.cameras.new(name), key, "camera")
         camera = tag(bpy.data.objects.new(name, data), key, "camera")
-    link_object(camera, collection)
+    if not camera.users_collection:  # users may have moved it to another one
+        link_object(camera, collection)
     frame = _photo_frame(result) if photo_frame else result.size
     fit = _fit_orthographic if result.focal_length is None else _fit_pinhole
     position = fit(camera.data, result, metres_per_pixel(result, size_metres), frame)
     place = Matrix() if transform is None else Matrix.LocRotScale(*transform.decompose()[:2], None)
-    camera.matrix_basis = (
+    # Not its basis: users may have given it a parent.
+    camera.matrix_world = (
         place @ Matrix.Translation(position) @ Matrix.Rotation(0.5 * np.pi, 4, "X")
     )
     return camera

@@ -9,8 +9,10 @@ from ..datablocks.provenance import datablock_name, find_tagged, tag
 _PREVIEW_SAMPLES = 32
 
 
-def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """Find or create the collection of a photo, and link it to a scene.
+def ensure_collection(
+    key: str, scene: bpy.types.Scene, obj: bpy.types.Object | None
+) -> bpy.types.Collection:
+    """Find or create the collection of a photo, and link it to a scene that lacks the object.
 
     Parameters
     ----------
@@ -18,15 +20,20 @@ def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
         Name of the photo.
     scene : bpy.types.Scene
         The scene.
+    obj : bpy.types.Object or None
+        The photo's object, if it exists. Where the scene has it, users have arranged it as they
+        want, and an existing collection stays where it is.
 
     Returns
     -------
     bpy.types.Collection
         The collection.
     """
-    collection = find_tagged(bpy.data.collections, key, "collection") or tag(
-        bpy.data.collections.new(datablock_name(key)), key, "collection"
-    )
+    collection = find_tagged(bpy.data.collections, key, "collection")
+    if collection is None:
+        collection = tag(bpy.data.collections.new(datablock_name(key)), key, "collection")
+    elif obj is not None and is_in_scene(obj, scene):
+        return collection
     if collection not in set(scene.collection.children_recursive):
         scene.collection.children.link(collection)
     return collection
@@ -122,6 +129,23 @@ def find_layer_collection(
         return entry
     below = (find_layer_collection(child, collection) for child in entry.children)
     return next((found for found in below if found is not None), None)
+
+
+def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:
+    """Return whether a scene has an object, in whatever collection.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    bool
+    """
+    return any(other == obj for other in scene.objects)
 
 
 def link_object(obj: bpy.types.Object, collection: bpy.types.Collection) -> None:

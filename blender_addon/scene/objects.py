@@ -32,6 +32,7 @@ from ..files.result_arrays import ResultArrays
 from .build import StagedObject, key_of, place_object, require_placeable, stage_object
 from .built_object import BuiltObject
 from .camera import eye_of
+from .placement import world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare
 
 _CONSTANT = 0.5 / np.sqrt(np.pi)  # the first spherical harmonic
@@ -190,7 +191,7 @@ def place_objects(
         for one in staged:
             require_placeable(one, scene=scene, photo=photo)
         built = [place_object(first, scene=scene, photo=photo, bounds=_joint_bounds(staged))]
-        place = Matrix.LocRotScale(*built[0].object.matrix_basis.decompose()[:2], None)
+        place = Matrix.LocRotScale(*world_matrix(built[0].object).decompose()[:2], None)
         for one in others:
             beside = place @ Matrix.Translation(one.prepared.offset)
             built.append(place_object(one, scene=built[0].scene, photo=photo, matrix=beside))

@@ -26,7 +26,7 @@ from itertools import pairwise
 
 import bpy
 import numpy as np
-from mathutils import Vector
+from mathutils import Matrix, Vector
 
 _MAX_FACES = 1000  # of a mesh that are used
 _GOLDEN = 0.618034  # its multiples are spread evenly over [0, 1), and follow no order of faces
@@ -68,6 +68,23 @@ def free_location(
             break
         place.x = _world_bounds(enclosing)[1].x - low.x + _GAP * (high.x - low.x)
     return place
+
+
+def world_matrix(obj: bpy.types.Object) -> Matrix:
+    """Return the transform of an object in the world.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+
+    Returns
+    -------
+    Matrix
+        The transform. Blender updates its own later; it is used only where it differs.
+    """
+    moved = obj.parent is not None or len(obj.constraints) > 0
+    return obj.matrix_world if moved else obj.matrix_basis
 
 
 def _bounds(points: Iterable[Vector]) -> tuple[Vector, Vector]:

@@ -162,6 +162,56 @@ def test_light_and_camera_wait_in_a_collection_that_is_unchecked(result: ResultA
     assert len(bpy.context.view_layer.objects) == 3
 
 
+def test_an_object_stays_in_the_collections_that_the_user_chose(result: ResultArrays) -> None:
+    built = build_object(result, SHARED)
+    props = bpy.data.collections.new("props")
+    bpy.context.scene.collection.children.link(props)
+    for obj in (built.object, built.camera):
+        for collection in obj.users_collection:
+            collection.objects.unlink(obj)
+        props.objects.link(obj)
+    build_object(result, SHARED)
+    assert built.object.users_collection == built.camera.users_collection == (props,)
+    shot = bpy.data.scenes.new("shot")
+    shot.collection.children.link(props)
+    bpy.context.scene.collection.children.unlink(props)
+    again = build_object(result, SHARED, scene=shot)
+    assert again.object == built.object and built.object.users_scene == (shot,)
+    assert not shot.collection.children.get("bump"), "the scene has the object already"
+    build_object(result, SHARED)
+    assert set(built.object.users_scene) == {shot, bpy.context.scene}, "it was to be built here"
+
+
+def test_an_object_is_updated_in_the_current_scene(result: ResultArrays) -> None:
+    built = build_object(result, SHARED)
+    backup = bpy.data.scenes.new("A backup, first in the list")
+    backup.collection.objects.link(built.object)
+    assert built.object.users_scene[0] == backup
+    found = find_built(built.object)
+    assert found is not None and found.scene == bpy.context.scene
+    bpy.context.window.scene = backup
+    found = find_built(built.object)
+    assert found is not None and found.scene == backup
+
+
+def test_the_camera_follows_an_object_with_a_parent(result: ResultArrays) -> None:
+    built = build_object(result, SHARED)
+    parent = bpy.data.objects.new("parent", None)
+    bpy.context.scene.collection.objects.link(parent)
+    before = built.camera.location.copy()
+    for obj in (built.object, built.camera):
+        obj.parent = parent
+    parent.location.x = 5
+    bpy.context.view_layer.update()
+    build_object(result, SHARED)
+    bpy.context.view_layer.update()
+    wanted = before + Vector((5, 0, 0))
+    assert (built.camera.matrix_world.translation - wanted).length < 1e-5
+    built.camera.parent = None
+    build_object(result, SHARED)
+    assert (built.camera.location - wanted).length < 1e-5
+
+
 def test_a_wanted_camera_or_sun_is_in_the_scene_at_once(result: ResultArrays) -> None:
     built = build_object(result, BuildOptions(own_scene=False, set_camera=True, sun=True))
     assert bpy.context.scene.camera == built.camera
