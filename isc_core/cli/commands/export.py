@@ -146,11 +146,12 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     built = mesh_of(stored, how, edge, finer=finer_by(texture, part.shape))
     built = built if texture is None else built.with_texture(texture)
     if options.roughness is not None:
-        given = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
-        built = replace(built, gloss=replace(built.gloss, **given))
+        known = {"roughness": options.roughness, "roughness_source": SpecularSource.GIVEN}
+        built = replace(built, gloss=replace(built.gloss, **known))
     monitor.report("writing", 0.4)
     if options.format is not None:
-        files = write_mesh_file(built, output, options.format)
+        given = [one for one in (options.photo, options.mask) if one is not None]
+        files = write_mesh_file(built, output, options.format, given)
         return hints(options, f"wrote {', '.join(map(str, files))}")
     writing, near = monitor.part(0.4, 1.0), stored.at(built.place)
     write_texture_set(

@@ -92,6 +92,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         if options.each:
             raise InputError("--overlay shows one mask: leave out --each")
         check_mask_path(options.photo, options.overlay)
+        if options.overlay.resolve() == options.output.resolve():
+            raise InputError(f"--overlay {options.overlay} is the mask itself: choose another file")
     with photo_file(options.photo, options) as file:
         lines = _each(file, options) if options.each else _one(file, given, options)
     return hints(options, *lines)
@@ -110,10 +112,13 @@ def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
 def _each(file: Path, options: argparse.Namespace) -> list[str]:
     photos = read_each_object(file, None, options.transfer, limits_of(options))
     output: Path = options.output
-    return [
-        _write(photo, output.with_name(f"{output.stem}_{number}{output.suffix}"))
-        for number, photo in enumerate(photos, 1)
+    paths = [
+        output.with_name(f"{output.stem}_{number}{output.suffix}")
+        for number in range(1, len(photos) + 1)
     ]
+    for path in paths:  # all of them before the first is written
+        check_mask_path(options.photo, path)
+    return [_write(photo, path) for photo, path in zip(photos, paths, strict=True)]
 
 
 def _write(photo: Photo, path: Path) -> str:

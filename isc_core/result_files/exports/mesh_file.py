@@ -6,7 +6,7 @@ vertices than pixels), NAME_specular.png (where the level varies) and NAME_alpha
 is soft), NAME being that of the file.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -55,7 +55,9 @@ def check_mesh_path(path: Path, kind: str) -> None:
     require_writable_file(path)
 
 
-def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
+def write_mesh_file(
+    built: MeshResult, path: Path, kind: str, keep: Sequence[Path] = ()
+) -> list[Path]:
     """Write a mesh and its textures: all files or none.
 
     Parameters
@@ -64,6 +66,8 @@ def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
     path : Path
     kind : str
         One of `SUFFIXES`.
+    keep : sequence of Path
+        Files that must not be replaced.
 
     Returns
     -------
@@ -73,11 +77,17 @@ def write_mesh_file(built: MeshResult, path: Path, kind: str) -> list[Path]:
     Raises
     ------
     InputError
-        If a file cannot be written, or a package is missing.
+        If a file cannot be written or would replace one of `keep`, or a package is missing.
     """
     check_mesh_path(path, kind)
     contents = _ENCODERS[kind](built, path)
     targets = [path.with_name(name) for name in contents]
+    kept = {one.resolve() for one in keep}
+    for target in targets:
+        if target.resolve() in kept:
+            raise InputError(
+                f"{target} would be replaced by a texture: choose another name for {path}"
+            )
     with ExitStack() as stack:
         # All are complete before the first is renamed; the mesh is renamed last.
         for target, content in zip(targets, contents.values(), strict=True):

@@ -119,6 +119,19 @@ def test_the_photo_gives_a_finer_base_color(tmp_path: Path, what: list[str]) -> 
     assert sizes[0] == sizes[3] < sizes[2] <= 50 < sizes[1]
 
 
+def test_a_texture_does_not_replace_the_photo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo = ball_photo(tmp_path).rename(tmp_path / "cup_basecolor.png")
+    words = ["decompose", str(photo), "-q", "--model", "naive", "--max-size", "24"]
+    assert main([*words, "-o", str(tmp_path / "result")]) == 0
+    before = photo.read_bytes()
+    given = [tmp_path / "result", "--format", "obj", "--photo", photo]
+    assert exported(*given, "-o", tmp_path / "cup.obj") == 2
+    assert "choose another name" in capsys.readouterr().err
+    assert photo.read_bytes() == before and not (tmp_path / "cup.obj").exists()
+
+
 def test_another_photo_is_refused(
     result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -74,6 +74,21 @@ def test_each_object_gets_a_mask(tmp_path: Path) -> None:
     assert overlap(found, truth) > 0.8
 
 
+def test_no_mask_replaces_the_photo_or_the_overlay(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, _ = photo(tmp_path, TWO)
+    shelf = path.rename(tmp_path / "shelf_2.png")
+    before = shelf.read_bytes()
+    assert isc("mask", shelf, "--each", "-o", tmp_path / "shelf.png") == 2
+    assert "is the photo itself" in capsys.readouterr().err
+    assert shelf.read_bytes() == before and not (tmp_path / "shelf_1.png").exists()
+    mask = tmp_path / "mask.png"
+    assert isc("mask", shelf, "--auto", "-o", mask, "--overlay", mask) == 2
+    assert "is the mask itself" in capsys.readouterr().err
+    assert not mask.exists()
+
+
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
