@@ -97,6 +97,11 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     Returns
     -------
     Edited
+
+    Raises
+    ------
+    InputError
+        If the gloss is to be rendered in a light that is black.
     """
     notes: list[str] = []
     same = gloss.exponent is None and gloss.sharper == 1 and gloss.method == "remap"
@@ -161,7 +166,14 @@ def _new_lobe(
         )
         present = DEFAULT_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
-    used_light = light or (fit.light if fit is not None else None)
+    if light is not None and not light.irradiance.any():
+        raise InputError("the light is black: give one that shines, or none for that of the photo")
+    found = fit is not None and fit.light.irradiance.any()  # black where no light explains anything
+    used_light = light or (fit.light if fit is not None and found else None)
+    if gloss.method == "render" and used_light is None:
+        notes.append(
+            "no single light explains the specular layer: its highlights are changed in place"
+        )
     if gloss.method == "remap" or used_light is None:
         return remapped(d.specular, d.mask, present, exponent)
     unit_light = replace(

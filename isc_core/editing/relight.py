@@ -254,10 +254,11 @@ def _highlights(
             if choice.highlights == "scale"
             else "no lobe is known, so the highlights follow the shading and do not move"
         )
-        return as_map(present[d.mask] * np.minimum(ratio, _MAX_SCALE), d.mask), note
+        scale = choice.exposure * np.minimum(ratio / choice.exposure, _MAX_SCALE)
+        return as_map(present[d.mask] * scale, d.mask), note
     lobe = lobe or Lobe()
-    view, source = d.view_inside, None if rotation is None else _dominant_light(d)
-    if source is None or rotation is None:
+    view, sources = d.view_inside, () if rotation is None else _highlight_lights(d)
+    if not sources or rotation is None:
         before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals, view)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
         note = (
@@ -266,32 +267,36 @@ def _highlights(
             else "the highlights are rendered in a smooth light, so they are broad"
         )
         return as_map(strength * factor * light.lobe(lobe, normals, view), d.mask), note
-    moved = replace(source, direction=rotation @ source.direction)
+    moved = [replace(one, direction=rotation @ one.direction) for one in sources]
     before, after = (
-        as_map(lobe_under(lobe, normals, one, view), d.mask) for one in (source, moved)
+        as_map(np.sum([lobe_under(lobe, normals, one, view) for one in lights], axis=0), d.mask)
+        for lights in (sources, moved)
     )
     still = (
-        _kept_share(source.direction, moved.direction)
+        _kept_share(sources[0].direction, moved[0].direction)
         if choice.highlights == "auto" and choice.lobe is None
         else 0.0
     )
     return factor * (still * present + (1 - still) * strength_of(d, lobe, before, None) * after), ""
 
 
-def _dominant_light(d: Decomposition) -> DirectionalLight | None:
-    """The light that causes the highlights, with luminance 1 perpendicular to its direction; None
-    if unknown.
+def _highlight_lights(d: Decomposition) -> tuple[DirectionalLight, ...]:
+    """The lights that cause the highlights; none if unknown.
+
+    The first is the brightest, and has luminance 1 perpendicular to its direction.
     """
     fit = explain_specular(d)
     lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
     if not fit.determined and not lights:
-        return None
+        return ()
     fitted = 0.0 if d.brdf is None or not lights else d.brdf.explained
-    if fit.determined and fit.explained >= fitted:
-        direction, color = fit.light.direction, fit.light.irradiance
-    else:
-        direction, color = lights[0].direction, lights[0].strength_light
-    return DirectionalLight(direction, color / max(float(luminance(color)), 1e-12))
+    found = (
+        [(fit.light.direction, fit.light.irradiance)]
+        if fit.determined and fit.explained >= fitted
+        else [(one.direction, one.strength_light) for one in lights]
+    )
+    unit = max(float(luminance(found[0][1])), 1e-12)
+    return tuple(DirectionalLight(direction, color / unit) for direction, color in found)
 
 
 def _kept_share(before: np.ndarray, after: np.ndarray) -> float:

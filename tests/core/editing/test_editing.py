@@ -19,7 +19,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.luminance import LUMINANCE, luminance, white_of
 from isc_core.lobe_fitting.light_direction import explain_specular
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOutcome, LobeLight
 from isc_core.shading.environment_map import directions, solid_angles
 from isc_core.shading.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
 from isc_core.shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
@@ -362,6 +362,31 @@ def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> 
     assert centres[0] + 3 < centres[1] < centres[2] - 3
 
 
+def test_the_highlights_of_all_lamps_move(scene: Decomposition) -> None:
+    lobe, unknown = Lobe(alpha=0.2), Interval(np.zeros(3), np.full(3, np.inf))
+    lamps = [(toward(-0.6, 0.5, 0.6), 0.02), (toward(0.7, 0.3, 0.6), 0.014)]
+
+    def layer(rotation: np.ndarray) -> np.ndarray:
+        lit = [s * lobe_under(lobe, scene.normal, DirectionalLight(rotation @ l)) for l, s in lamps]
+        return np.where(scene.mask[..., None], np.sum(lit, axis=0), 0).astype(np.float32)
+
+    present, rotation = layer(np.eye(3)), turn(yaw=20)
+    lights = tuple(LobeLight(l, 5.0, np.full(3, s), unknown) for l, s in lamps)
+    found = LobeFit(
+        "ggx: of the test", LobeFitOutcome.DETERMINED, 0.2, None, lights, None, None, 1.0, present
+    )
+    d = replace(scene, specular=present, image=scene.diffuse + present, brdf=found)
+    light = NewLight(coefficients=turned_light(d.illumination, rotation), rotation=rotation)
+    error = np.square(relight(d, light).specular - layer(rotation)).sum()
+    assert error < 0.02 * np.square(layer(rotation)).sum()
+
+
+def test_exposure_scales_highlights_as_everything_else(scene: Decomposition) -> None:
+    light = NewLight(coefficients=scene.illumination)
+    edit = relight(scene, light, Relighting("scale", exposure=8.0))
+    assert np.allclose(edit.specular, 8 * scene.specular, rtol=1e-4)
+
+
 @pytest.mark.slow
 def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Decomposition) -> None:
     light = NewLight(coefficients=scene.illumination)
@@ -485,6 +510,21 @@ def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> 
     red = scene.mask & (scene.reflectance[..., 0] > 0.3)
     color = edit.specular[red].sum(0)
     assert color[0] > 2 * color[2]
+
+
+def test_gloss_is_remapped_where_no_light_explains_it(scene: Decomposition) -> None:
+    outcome = LobeFitOutcome.NO_SPECULAR
+    brdf = LobeFit("ggx: of the test", outcome, None, None, (), None, None, 0.0, scene.specular)
+    d = replace(scene, brdf=brdf)
+    rendered = change_gloss(d, Gloss(sharper=2.0, method="render"))
+    assert np.array_equal(rendered.specular, change_gloss(d, Gloss(sharper=2.0)).specular)
+    assert any("no single light explains" in note for note in rendered.notes)
+
+
+def test_gloss_under_a_black_light_is_an_error(scene: Decomposition) -> None:
+    black = DirectionalLight(toward(0, 0, 1), np.zeros(3))
+    with pytest.raises(InputError, match="the light is black"):
+        change_gloss(scene, Gloss(sharper=2.0, method="render"), black)
 
 
 def test_gloss_of_a_diffuse_object_is_an_error(scene: Decomposition) -> None:
