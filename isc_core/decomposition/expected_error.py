@@ -158,7 +158,10 @@ def confidence_of(normal_error: np.ndarray) -> np.ndarray:
 
 
 def with_expected_error(
-    d: Decomposition, prediction: ScenePrediction, working: Photo
+    d: Decomposition,
+    prediction: ScenePrediction,
+    working: Photo,
+    normal: np.ndarray | None = None,
 ) -> Decomposition:
     """Add the expected errors to a result, and the confidence that follows from them.
 
@@ -168,6 +171,9 @@ def with_expected_error(
     prediction : ScenePrediction
         Of the working photo.
     working : Photo
+    normal : (H, W, 3) ndarray, optional
+        Normals relative to the ray of each pixel, as predicted ones are; by default those of the
+        result, as without a camera.
 
     Returns
     -------
@@ -175,16 +181,15 @@ def with_expected_error(
         The confidence of a photo that violates assumptions is lower by the factor of
         `assumption_checks.confidence_factor`.
     """
-    normal, shading, mask = d.normal, d.shading, working.mask
+    shading, mask = d.shading, working.mask
+    normal = d.normal if normal is None else normal
     factor = mask.shape[0] / d.mask.shape[0]
     if mask.shape != d.mask.shape:
-        normal, shading = (
-            np.stack(
-                [nearest_samples(plane, mask.shape, factor) for plane in np.moveaxis(map_, -1, 0)],
-                -1,
-            )
-            for map_ in (normal, shading)
+        # of the object alone: at its rim, the centre of a working pixel may lie outside of it
+        rows, columns = (
+            nearest_samples(part, mask.shape, factor).astype(int) for part in nearest_pixels(d.mask)
         )
+        normal, shading = normal[rows, columns], shading[rows, columns]
     small = np.zeros((*mask.shape, 2))
     small[mask] = np.stack(Evidence.of(prediction, normal, shading, mask).errors(), axis=1)
     if mask.shape != d.mask.shape:

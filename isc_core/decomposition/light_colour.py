@@ -171,8 +171,12 @@ def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:
 def _with_light(estimate: SceneEstimate, colour: np.ndarray) -> SceneEstimate:
     """The estimate under the photo's light; height and confidence stay."""
     brdf = None if estimate.brdf is None else _lobe(estimate.brdf, colour)
+    seen = estimate.prediction
+    if seen is not None:
+        seen = replace(seen, shading=seen.shading.brighter(np.log(colour)))
     return replace(
         estimate,
+        prediction=seen,
         split=_relit(estimate.split, colour),
         light=scaled_light(estimate.light, np.log(colour)),
         brdf=brdf,

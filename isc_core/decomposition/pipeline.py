@@ -14,7 +14,7 @@ from .. import __version__
 from ..errors import InputError
 from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
-from ..imaging.resampling import nearest_samples
+from ..imaging.resampling import nearest_samples, resample_height
 from ..imaging.row_blocks import row_blocks
 from ..io.memory import LARGE_PHOTO, enough_memory, release_memory, require_memory
 from ..io.stage_cache import StageCache
@@ -142,7 +142,9 @@ def decompose(
     with clock.stage("maps"):
         result = assemble(maps, estimate, provenance, known_light=inputs.light is not None)
         if estimate.prediction is not None and inputs.height is None:
-            result = with_expected_error(result, estimate.prediction, working)
+            # the network's normals, like the solver's, are relative to the ray of each pixel
+            normal = _solver_normals(estimate, maps)
+            result = with_expected_error(result, estimate.prediction, working, normal)
         result = part.placed(result)
     if maps.mask.size > LARGE_PHOTO:
         release_memory()
@@ -267,6 +269,13 @@ def assemble(
     )
 
 
+def _solver_normals(estimate: SceneEstimate, maps: Photo) -> np.ndarray | None:
+    """The normals before those of a camera; None without a camera."""
+    if maps.camera is None:
+        return None
+    return normals_and_shading(estimate.height, estimate.light, maps.mask)[0]
+
+
 def _confidence(split: Separation, normal: np.ndarray, photo: Photo) -> np.ndarray:
     """The confidence where no error can be expected: that of the separation, lower where the
     surface turns away from the viewer.
@@ -284,16 +293,7 @@ def _at_scale(inputs: KnownInputs, photo: Photo, working: Photo) -> SceneConstra
     """The known quantities on the working photo's grid and in its pixels."""
     factor = working.scale / photo.scale
     light = None if inputs.light is None else light_to_reference(np.asarray(inputs.light, float))
-    height = (
-        None
-        if inputs.height is None
-        else nearest_samples(inputs.height, working.mask.shape, factor) * factor
-    )
-    if height is not None and not np.isfinite(height[working.mask]).all():
-        raise InputError(
-            "the known shape has holes inside the mask: give it as --depth, which may have holes"
-        )
-    height = None if height is None else continued_height(height, working.mask)
+    height = None if inputs.height is None else _shape_at_scale(inputs.height, photo, working)
     if inputs.depth is None:
         return SceneConstraints(height, light)
     seen = nearest_samples(inputs.depth, working.mask.shape, factor) * factor
@@ -304,6 +304,17 @@ def _at_scale(inputs: KnownInputs, photo: Photo, working: Photo) -> SceneConstra
     return SceneConstraints(
         height, light, DepthObservation(seen, inputs.depth_sigma * factor, inputs.depth_weight)
     )
+
+
+def _shape_at_scale(height: np.ndarray, photo: Photo, working: Photo) -> np.ndarray:
+    """A known shape on the working photo's grid, smoothly: terraces would have other normals."""
+    if not np.isfinite(height[photo.mask]).all():
+        raise InputError(
+            "the known shape has holes inside the mask: give it as --depth, which may have holes"
+        )
+    whole = continued_height(height, photo.mask)
+    small = resample_height(whole, working.mask.shape, working.scale / photo.scale)
+    return continued_height(small, working.mask)
 
 
 def _settings_json(settings: Settings) -> dict[str, object]:

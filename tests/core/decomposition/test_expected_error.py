@@ -124,3 +124,21 @@ def test_maps_of_another_size_have_the_errors_of_the_working_size(
     blocks = fine.normal.reshape(96, 2, 120, 2).mean(axis=(1, 3))
     assert np.abs(blocks - coarse.normal)[core].mean() < 1
     assert fine.normal.shape == large.mask.shape and (fine.normal[large.mask] > 0).all()
+
+
+def test_the_rim_of_larger_maps_is_compared_with_the_object(
+    scene: Decomposition, seen: ScenePrediction
+) -> None:
+    large = ball((192, 240), 78.0, (88.5, 132.5))  # a little smaller than the mask of the photo
+    fine = with_expected_error(large, seen, photo_of(scene)).expected_error
+    assert fine is not None and fine.reflectance[large.mask].max() < 3
+
+
+def test_normals_before_a_camera_are_the_evidence(
+    scene: Decomposition, seen: ScenePrediction
+) -> None:
+    turned = replace(scene, normal=np.roll(scene.normal, 1, axis=-1))
+    told = with_expected_error(turned, seen, photo_of(scene), scene.normal).expected_error
+    plain = with_expected_error(scene, seen, photo_of(scene)).expected_error
+    assert told is not None and plain is not None
+    np.testing.assert_array_equal(told.normal, plain.normal)

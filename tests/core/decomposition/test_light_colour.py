@@ -185,6 +185,10 @@ def test_a_cast_given_as_the_light_s_colour_changes_nothing_else(model: str) -> 
     )
     np.testing.assert_allclose(tinted.reflectance, plain.reflectance, atol=1e-5)
     np.testing.assert_allclose(tinted.normal, plain.normal, atol=1e-5)
+    assert tinted.expected_error is not None and plain.expected_error is not None
+    np.testing.assert_allclose(
+        tinted.expected_error.reflectance, plain.expected_error.reflectance, atol=1e-4
+    )
 
 
 def test_tempered_colours_keep_grey_and_brightness_and_bound_the_ratio_of_channels() -> None:

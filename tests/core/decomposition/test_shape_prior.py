@@ -45,6 +45,28 @@ def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
 
 
 @pytest.mark.slow
+def test_a_known_shape_is_as_smooth_in_smaller_maps() -> None:
+    normal, _ = ball()
+    image, mask = under_lights((-0.7, 0.2, 0.6))
+    cap = mask & (normal[..., 2] > 0.4)
+    photo = Photo(
+        image, cap, 1e-4, np.zeros_like(cap), PhotoSource("", cap.shape, 32, "linear", "file")
+    )
+    height = np.where(cap, 67.5 * normal[..., 2], np.nan)
+    settings = Settings(model="sirfs", threads=1, max_size=80)
+    d = decompose(photo, settings, known=KnownInputs(height=height))
+    assert d.mask.shape != cap.shape
+    # a plane through the centre in pixels of the maps
+    scale, (rows, columns) = d.provenance.input["scale"], np.indices(d.mask.shape) + 0.5
+    centre = [float(part[ball()[1]].mean()) + 0.5 for part in np.indices(cap.shape)]
+    right, up = (columns / scale - centre[1]) / 67.5, -(rows / scale - centre[0]) / 67.5
+    truth = np.dstack([right, up, np.sqrt(np.maximum(1 - right**2 - up**2, 0))])
+    inner = d.mask & (truth[..., 2] > 0.5)
+    off = np.degrees(np.arccos(np.clip((d.normal * truth).sum(-1)[inner], -1, 1)))
+    assert np.percentile(off, 95) < 1.5
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("illumination", "cut"), [("natural", 60), ("laboratory", 0)])
 def test_every_photo_takes_what_was_predicted(illumination: str, cut: int) -> None:
     one, other = (
