@@ -28,6 +28,7 @@ from .interface.parser import GENERAL, actions_of
 
 DEFAULT_FILE = Path("isc.toml")
 _ONLY_IF_NAMED = frozenset({"scheduler"})
+_HELP = frozenset({"-h", "--help", "--version"})
 _MAX_BYTES = 1 << 20
 
 
@@ -44,7 +45,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     Returns
     -------
     Path or None
-        The file, if there is one.
+        The file, if there is one and the arguments do not ask for help.
 
     Raises
     ------
@@ -53,7 +54,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
         accepted only with `--config`.
     """
     path, named = _find(arguments)
-    if path is None:
+    if path is None or not _HELP.isdisjoint(arguments):  # a broken file must not hide the help
         return None
     inner = dict(actions_of(parser))
     for name, table in _read(path).items():
@@ -140,6 +141,8 @@ def _value(action: argparse.Action, value: object, path: Path, where: str) -> ob
     if repeated != isinstance(value, list):
         raise InputError(f"{name} must be {'a list' if repeated else 'one value'}, not {value!r}")
     if isinstance(value, list):
+        if isinstance(action.nargs, int) and len(value) != action.nargs:
+            raise InputError(f"{name} must have {action.nargs} values, not {len(value)}")
         return [_converted(action, one, path, name) for one in value]
     return _converted(action, value, path, name)
 

@@ -78,6 +78,20 @@ def test_mistakes_name_the_file_and_the_option(text: str, message: str) -> None:
     assert message in str(refusal.value)
 
 
+def test_a_list_of_another_length_is_one_error() -> None:
+    with pytest.raises(InputError, match="direction of .edit.relight. must have 3 values, not 2"):
+        parsed("[edit.relight]\ndirection = [1.0, 0.2]\n", "edit", "cup", "relight", "-o", "out")
+
+
+@pytest.mark.parametrize("words", [("decompose", "--help"), ("--version",)])
+def test_a_broken_file_does_not_hide_the_help(
+    words: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("isc.toml").write_text("[decompose\n")
+    assert main(list(words)) == 0
+    assert capsys.readouterr().out
+
+
 def test_a_missing_file_is_one_error(capsys: pytest.CaptureFixture[str]) -> None:
     assert main([*WORDS, "--config", "none.toml"]) == 2
     assert capsys.readouterr().err.startswith("isc: error: none.toml: no such file")
