@@ -23,3 +23,17 @@ def object_folders(folder: Path) -> list[Path]:
     """
     found = (path.parent for path in folder.glob(f"*/{_RESULT}"))
     return sorted((one for one in found if one.name.isdecimal()), key=lambda one: int(one.name))
+
+
+def holds_result(folder: Path) -> bool:
+    """Return whether a folder is itself a result, rather than one of several results.
+
+    Parameters
+    ----------
+    folder : Path
+
+    Returns
+    -------
+    bool
+    """
+    return (folder / _RESULT).is_file()

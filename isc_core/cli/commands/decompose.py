@@ -18,7 +18,7 @@ from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.diagnostics_text import CROPPED, note_lines
 from ...result_files.mesh.options import MeshOptions
-from ...result_files.object_folders import object_folders
+from ...result_files.object_folders import holds_result, object_folders
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_room, require_writable_result, save
 from ...scene.decomposition import Decomposition
@@ -226,7 +226,7 @@ def _decompose_one(
         photo = read_photo(
             file, options.mask, options.transfer, limits=limits_of(options), finder=finder
         )
-    lines = [f"note: {note}" for note in mask_notes(photo)]
+    lines = hints(options, *(f"note: {note}" for note in mask_notes(photo)))
     return lines + _decompose_photo(photo, path, output, options, settings, prior_set, monitor)
 
 
@@ -323,6 +323,7 @@ def _decompose_each(
     monitor.report("finding the objects", 0.0)
     with photo_file(path, options) as file:
         photos = read_each_object(file, options.mask, options.transfer, limits_of(options))
+    _require_no_result(options.output)
     _require_no_other_objects(options.output, len(photos))
     works = {
         f"object {number} of {len(photos)}": partial(
@@ -337,6 +338,14 @@ def _decompose_each(
         for number, photo in enumerate(photos, 1)
     }
     return do_all("objects", works, monitor)
+
+
+def _require_no_result(output: Path) -> None:
+    """Raise `InputError` for the folder of one result, which several results would mix with."""
+    if holds_result(output):
+        raise InputError(
+            f"{output} is the result of one object: choose another folder for several results"
+        )
 
 
 def _require_no_other_objects(output: Path, count: int) -> None:
@@ -376,6 +385,7 @@ def _decompose_several(
             )
     if hints_of(options):
         raise InputError("--box, --point and --not apply to one photo: give one photo")
+    _require_no_result(options.output)
     works = {
         path.name: partial(_decompose_one, path, output, options, settings, prior_set)
         for path, output in _outputs(options.photo, options.output)

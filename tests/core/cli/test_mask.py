@@ -133,6 +133,8 @@ def test_decompose_finds_the_mask_and_prints_a_note(
     path, truth = photo(tmp_path, ONE)
     assert isc("decompose", path, "-o", tmp_path / "out", *QUICK) == 0
     assert "found automatically" in capsys.readouterr().out
+    assert isc("decompose", path, "-q", "-o", tmp_path / "out", *QUICK) == 0
+    assert capsys.readouterr().out == ""
     assert overlap(mask_in(tmp_path / "out" / "mask.png"), truth) > 0.95
     given = json.loads((tmp_path / "out" / "decomposition.json").read_text())["input"]
     assert given["mask_from"] == "automatic" and 0.5 <= given["mask_confidence"] <= 1

@@ -47,6 +47,19 @@ def test_several_photos_get_a_folder_each(
     assert np.array_equal(alone.reflectance, together.reflectance)
 
 
+@pytest.mark.parametrize("several", [True, False])
+def test_several_results_are_not_written_into_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], several: bool
+) -> None:
+    first, second = two_photos(tmp_path)
+    assert isc("decompose", first, *NAIVE, "-q", "-o", tmp_path / "out") == 0
+    before = sorted(tmp_path.glob("out/**/*"))
+    words = (first, second) if several else (first, "--each")
+    assert isc("decompose", *words, *NAIVE, "-q", "-o", tmp_path / "out") == 2
+    assert "is the result of one object" in capsys.readouterr().err
+    assert sorted(tmp_path.glob("out/**/*")) == before
+
+
 def test_a_photo_that_fails_does_not_stop_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
