@@ -26,6 +26,8 @@ PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = (
     "isc_source_image",
     "isc_specular_level",
 )
+# Of a mask that ISC found: its photo. Earlier versions wrote the mask's name, "PHOTO mask".
+MASK_OF = "isc_mask_of"
 # Roles that earlier versions wrote.
 _FORMER_ROLES = {"environment_map": "sky"}
 _NAME_BYTES = 63  # limit of a datablock's name in Blender 4.5; later versions allow more

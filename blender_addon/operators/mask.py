@@ -15,6 +15,7 @@ from bpy.props import StringProperty
 
 from isc_core.errors import InputError
 
+from ..datablocks.provenance import MASK_OF
 from ..files.image_source import ImageSource, inspect_image
 from ..runs.active_run import require_no_active_run
 from ..runs.messages import error_line, sentence
@@ -27,7 +28,7 @@ from .modal import NeedsPhoto, WorkerOperator, start_operator
 from .photo_canvas import PhotoCanvas
 from .photo_operators import DragOnPhoto
 
-_MASK_OF, _SHOWN_ON = "isc_mask_of", "isc_shown_on"
+_SHOWN_ON = "isc_shown_on"
 _MIN_SIDE = 8
 
 
@@ -137,6 +138,10 @@ class ISC_OT_take_mask(bpy.types.Operator):
         """
         scene = find_by_full_name(bpy.data.scenes, self.scene) or context.scene
         photo = find_by_full_name(bpy.data.images, self.image)
+        if photo is not None and photo != scene.isc.image:
+            message = f"The panel has another photo than {photo.name} now: find the mask again"
+            self.report({"ERROR"}, message)
+            return {"CANCELLED"}
         try:
             mask = bpy.data.images.load(self.filepath)
         except RuntimeError:
@@ -146,7 +151,7 @@ class ISC_OT_take_mask(bpy.types.Operator):
         mask.filepath = ""
         name = "mask" if photo is None else f"{photo.name} mask"
         mask.colorspace_settings.name = "Non-Color"
-        _replace_mask(mask, name)
+        _replace_mask(mask, photo, name)
         if photo is not None:
             _set_overlay(mask, photo, overlay_of(Path(self.filepath)))
         scene.isc.mask, scene.isc.mask_source = mask, "IMAGE"
@@ -331,17 +336,14 @@ def load_mask(path: Path, image: str, scene: str) -> None:
         raise InputError(error_line(error)) from error
 
 
-def _replace_mask(mask: Any, name: str) -> None:
-    """Name the mask; it replaces one that was cut out earlier under that name."""
+def _replace_mask(mask: Any, photo: Any, name: str) -> None:
+    """Name the mask; it replaces one that was found earlier in the same photo."""
+    of = (name,) if photo is None else (photo, name)
     old = next(
-        (
-            image
-            for image in bpy.data.images
-            if image.get(_MASK_OF) == name and image.library is None
-        ),
+        (image for image in bpy.data.images if image.get(MASK_OF) in of and image.library is None),
         None,
     )
     if old is not None:
         old.user_remap(mask)
         bpy.data.images.remove(old)
-    mask.name, mask[_MASK_OF] = name, name
+    mask.name, mask[MASK_OF] = name, of[0]

@@ -20,6 +20,7 @@ from bpy.props import (
     StringProperty,
 )
 
+from ..datablocks.provenance import MASK_OF
 from ..worker.commands import CERTAIN
 from .choices import (
     BACKS,
@@ -59,9 +60,13 @@ def _is_still_image(_settings: Any, image: Any) -> bool:
     return image.source in {"FILE", "GENERATED"} or image.type == "COMPOSITING"
 
 
-def _forget_points(settings: Any, context: Any) -> None:
-    """Points belong to one photo."""
+def _forget_other_photo(settings: Any, context: Any) -> None:
+    """Points belong to one photo, and so does a mask that ISC has found."""
     del context
+    image, mask = settings.image, settings.mask
+    is_of_isc = image is not None and mask is not None and MASK_OF in mask
+    if is_of_isc and mask[MASK_OF] not in (image, f"{image.name} mask"):
+        settings.mask, settings.mask_source = None, "ALPHA"
     for name in ("points", "other_points", "highlights", "not_highlights"):
         if getattr(settings, name):
             setattr(settings, name, "")
@@ -75,7 +80,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         description="Photo of an object: an image file, or any image in this .blend file",
         type=bpy.types.Image,
         poll=_is_still_image,
-        update=_forget_points,
+        update=_forget_other_photo,
     )
     mask_source: EnumProperty(
         name="Mask",

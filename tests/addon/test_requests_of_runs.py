@@ -12,7 +12,7 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402 (after the skip)
 from blender_addon.operators import decompose  # noqa: E402
-from blender_addon.operators.mask import mask_run  # noqa: E402
+from blender_addon.operators.mask import load_mask, mask_run  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
 from blender_addon.runs import request as requests  # noqa: E402
 from blender_addon.runs.request import request_from_settings  # noqa: E402
@@ -20,6 +20,7 @@ from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.scene.build import build_object  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
+from isc_core.errors import InputError  # noqa: E402
 from tests.addon.test_operators import mask_image, photo  # noqa: E402
 
 
@@ -80,3 +81,48 @@ def test_a_mask_is_that_of_a_photo_that_is_renamed_meanwhile(addon: Any, tmp_pat
         pass
     assert run.status.state == "done", run.status.message
     assert settings.mask.name == "bowl mask"
+
+
+def white_mask(folder: Path) -> Path:
+    """The file of a mask of the photo's size."""
+    path = folder / "mask.png"
+    Image.fromarray(255 * np.eye(64, 88, dtype=np.uint8)).save(path)
+    return path
+
+
+def test_a_found_mask_is_not_used_for_the_next_photo(addon: Any, tmp_path: Path) -> None:
+    settings, scene = addon.context.scene.isc, addon.context.scene.name_full
+    settings.image = photo()
+    load_mask(white_mask(tmp_path), settings.image.name_full, scene)
+    settings.image.name = "bowl"
+    settings.image = addon.data.images["bowl"]
+    assert settings.mask is not None, "still the same photo"
+    settings.image = photo("other.png")
+    assert settings.mask is None and settings.mask_source == "ALPHA"
+    assert not request_from_settings(addon.context.scene).mask
+
+
+def test_a_mask_that_the_user_chose_is_kept_with_the_next_photo(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    settings.image, settings.mask, settings.mask_source = photo(), mask_image(), "IMAGE"
+    settings.image = photo("other.png")
+    assert settings.mask.name == "cup mask" and settings.mask_source == "IMAGE"
+
+
+def test_a_mask_found_in_another_photo_than_the_panels_is_refused(
+    addon: Any, tmp_path: Path
+) -> None:
+    settings, first = addon.context.scene.isc, photo()
+    settings.image = photo("other.png")
+    with pytest.raises(InputError, match="another photo than cup.png"):
+        load_mask(white_mask(tmp_path), first.name_full, addon.context.scene.name_full)
+    assert settings.mask is None and len(addon.data.images) == 2
+
+
+def test_a_mask_replaces_the_one_found_earlier(addon: Any, tmp_path: Path) -> None:
+    settings, scene = addon.context.scene.isc, addon.context.scene.name_full
+    settings.image = photo()
+    load_mask(white_mask(tmp_path), settings.image.name_full, scene)
+    settings.image.name = "bowl"
+    load_mask(white_mask(tmp_path), settings.image.name_full, scene)
+    assert [image.name for image in addon.data.images] == ["bowl", "bowl mask"]
