@@ -21,6 +21,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.exports.targets import TARGETS
 
 from ..datablocks.images import ImageRole
+from ..datablocks.painted_images import pack_images
 from ..datablocks.provenance import KEY, ROLE
 from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
 from ..runs.messages import reason_line, sentence
@@ -311,6 +312,7 @@ def export_object(
         If the files cannot be written.
     """
     with _object_folder(built, parent) as folder:
+        pack_images(built.object, [built.material])  # exporters read the packed files
         names = [_export_mesh(built, folder, file_format)]
         return names + (_export_maps(str(built.object[KEY]), folder) if maps else [])
 

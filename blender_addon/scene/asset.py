@@ -17,6 +17,7 @@ from mathutils import Matrix, Vector
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
 
+from ..datablocks.painted_images import pack_images
 from ..datablocks.provenance import KEY, require_local
 from .built_object import BuiltObject
 from .collection import use_standard_view
@@ -74,7 +75,7 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
     else:  # Cycles is an add-on, which may be disabled
         for block in (built.object, built.material):
             block.asset_generate_preview()
-    _pack_images(built.object)
+    pack_images(built.object, [built.material], files=True)
     if entries := _missing_entries(catalogs):
         with new_file(library / _CATALOGS) as partial:
             partial.write_text((catalogs or _HEADER) + entries, encoding="utf-8")
@@ -116,14 +117,6 @@ def _mark(block: Any) -> None:
     about.catalog_id = CATALOG
     about.description = "Object created from a photo by ISC"
     about.tags.new("ISC", skip_if_exists=True)
-
-
-def _pack_images(obj: bpy.types.Object) -> None:
-    """Pack what the object refers to and is not packed yet, such as its photo."""
-    for value in obj.values():
-        if isinstance(value, bpy.types.Image) and value.packed_file is None:
-            with suppress(RuntimeError):  # its file is gone: nothing to pack
-                value.pack()
 
 
 def _set_preview(built: BuiltObject) -> None:

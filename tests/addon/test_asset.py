@@ -8,7 +8,9 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.operators.asset import library_folder  # noqa: E402 (after the skip)
+from blender_addon.materials.edit_nodes import surface_node  # noqa: E402 (after the skip)
+from blender_addon.operators.asset import library_folder  # noqa: E402
+from blender_addon.scene import asset  # noqa: E402
 from blender_addon.scene.asset import CATALOG  # noqa: E402
 from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
@@ -80,6 +82,30 @@ def test_an_asset_is_saved_without_cycles(addon: Any, built: BuiltObject, tmp_pa
     finally:
         addon_utils.enable("cycles")
     assert (tmp_path / "bump.blend").is_file() and built.object.asset_data is not None
+
+
+def test_an_asset_has_what_was_painted(
+    addon: Any, built: BuiltObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(asset, "_set_preview", lambda _: None)
+    tree, surface = built.material.node_tree, surface_node(built.material)
+    assert surface is not None
+    roughness = addon.data.images.new("roughness", 4, 4)
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = roughness
+    tree.links.new(node.outputs["Color"], surface.inputs["Roughness"])
+    for image in (roughness, tree.nodes["Base Color"].image):
+        image.pixels.foreach_set(np.tile(np.float32([0, 1, 0, 1]), len(image.pixels) // 4))
+        image.update()
+        assert image.is_dirty
+    path = asset.save_asset(built, tmp_path)
+    addon.ops.wm.read_factory_settings(use_empty=True)
+    with addon.data.libraries.load(str(path)) as (_, wanted):
+        wanted.objects = ["bump"]
+    for name in ("roughness", "bump_basecolor"):
+        image = addon.data.images[name]
+        assert image.packed_file is not None
+        assert tuple(image.pixels[:4]) == pytest.approx((0, 1, 0, 1), abs=0.01), name
 
 
 def test_a_library_that_cannot_be_written_is_reported(

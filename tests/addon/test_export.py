@@ -194,6 +194,23 @@ def test_obj_comes_with_its_textures(built: BuiltObject, tmp_path: Path) -> None
     assert (tmp_path / "bump" / "bump_basecolor.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.parametrize("kind", ["OBJ", "USD", "FBX"])
+def test_what_was_painted_is_exported(built: BuiltObject, tmp_path: Path, kind: str) -> None:
+    image = built.material.node_tree.nodes["Base Color"].image
+    image.pixels.foreach_set(np.tile(np.float32([0, 1, 0, 1]), len(image.pixels) // 4))
+    image.update()
+    assert image.is_dirty
+    export_object(built, tmp_path, kind)
+    if kind == "FBX":
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.import_scene.fbx(filepath=str(tmp_path / "bump" / "bump.fbx"))
+        found = next(image for image in bpy.data.images if "basecolor" in image.name)
+    else:
+        (path,) = (tmp_path / "bump").rglob("*basecolor.png")
+        found = bpy.data.images.load(str(path))
+    assert tuple(found.pixels[:4]) == pytest.approx((0, 1, 0, 1), abs=0.01)
+
+
 @pytest.mark.parametrize("file_format", ["PNG8", "PNG16", "EXR"])
 def test_texture_sets_have_the_edits(built: BuiltObject, tmp_path: Path, file_format: str) -> None:
     from isc_core.io.decoders import read_raster
