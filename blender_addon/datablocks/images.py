@@ -269,6 +269,25 @@ def unmodified_file(image: bpy.types.Image) -> bytes:
     return data if f"{zlib.crc32(data):08x}" == image[_CHECKSUM] else b""
 
 
+def content_mark(image: bpy.types.Image) -> str:
+    """Return a text that changes with the content of an image, without reading its pixels.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        Any image.
+
+    Returns
+    -------
+    str
+        Equal for equal files. Two strokes of a brush without saving the image in between give the
+        same text.
+    """
+    size = image.packed_file.size if image.packed_file is not None else 0
+    painted = " painted" if image.is_dirty else ""
+    return f"{image.name} {image.get(_CHECKSUM, '')} {size}{painted}"
+
+
 def replace_image(image: bpy.types.Image, key: str, role: ImageRole) -> bpy.types.Image:
     """Name and tag an image, and replace the previous one of that role everywhere.
 

@@ -24,7 +24,14 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ..datablocks.images import ImageFile, ImageRole, image_name, new_image
+from ..datablocks.images import (
+    ImageFile,
+    ImageRole,
+    content_mark,
+    image_name,
+    new_image,
+    unmodified_file,
+)
 from ..datablocks.nodes import add_node
 from ..datablocks.provenance import KEY, ROLE, all_tagged, tag
 from .color_bake import (
@@ -273,7 +280,7 @@ def _color_state(material: bpy.types.Material, group: bpy.types.Node) -> str:
         base = " ".join(f"{value:.6f}" for value in source.default_value)
     else:
         image = getattr(source.links[0].from_node, "image", None)
-        base = image.name if image is not None else "nodes"
+        base = content_mark(image) if image is not None else "nodes"
     gloss = edited_gloss(material, group)
     parts = (_color_edit(group.inputs).values, () if gloss is None else gloss)
     colors, above = (" ".join(f"{value:.6f}" for value in part) for part in parts)
@@ -377,7 +384,18 @@ def _edited_texture(material: bpy.types.Material, base: bpy.types.Node) -> bpy.t
 
 
 def _replace_image(node: Any, image: bpy.types.Image | None) -> None:
-    """A new datablock each time: undo restores the pixels of one only with its datablock."""
+    """A new datablock each time: undo restores the pixels of one only with its datablock.
+
+    An image that the user has painted on stays in the file.
+    """
     old, node.image = node.image, image
-    if old is not None and old.users == 0 and old.get(ROLE) == ImageRole.EDITED_BASE_COLOR:
+    if old is None or old == image or old.get(ROLE) != ImageRole.EDITED_BASE_COLOR or old.users:
+        return
+    if unmodified_file(old):
         bpy.data.images.remove(old)
+        return
+    if old.is_dirty:
+        old.pack()
+    for name in (KEY, ROLE, _STATE):
+        old.pop(name, None)
+    old.name, old.use_fake_user = f"{old.name} painted", True

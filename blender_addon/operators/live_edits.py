@@ -35,7 +35,7 @@ from ..materials.photo_highlights import has_view_changed, hide_highlights, show
 
 # Seconds: without a change before baking; between two polls of bakes; of a status bar text.
 _PAUSE, _POLL, _SHOWN = 0.4, 0.05, 6.0
-_MATERIAL_KINDS = ("MATERIAL", "NODETREE")
+_MATERIAL_KINDS = ("MATERIAL", "NODETREE", "IMAGE")
 _VIEW_KINDS = ("OBJECT", "LIGHT", "CAMERA", "WORLD", "NODETREE", "SCENE")
 _HIDDEN_FOR_EXPORT = "isc_hidden_for_export"
 

@@ -254,6 +254,26 @@ def test_an_edited_copy_is_never_taken_for_the_original(
     assert find_built(built.object).material == built.material  # type: ignore[union-attr]
 
 
+def test_an_edited_linked_copy_follows_an_update_of_the_original(
+    addon: Any, built: BuiltObject, bump_folder: Path
+) -> None:
+    copy = copied(addon, built, linked=True)
+    addon.ops.isc.recolour(hue=0.3)
+    material = find_built(copy.object).material  # type: ignore[union-attr]
+    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+
+    def shown() -> np.ndarray:
+        image = node.inputs["Base Color"].links[0].from_node.image
+        assert image.get("isc_role") == "edited_base_color"
+        return np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
+
+    before, result = shown(), read_result(bump_folder)
+    gray = replace(result, base_color=np.full_like(result.base_color, 0.2), texture=None)
+    build_object(gray, BuildOptions(own_scene=True, name="bump"))
+    addon.context.view_layer.update()
+    assert np.ptp(before.mean(0)) > 0.1 and np.ptp(shown().mean(0)) < 0.01
+
+
 def test_a_copy_is_not_decomposed_again(addon: Any, built: BuiltObject) -> None:
     copied(addon, built)
     assert "is a copy, and only the original is updated: select bump" in error_of(

@@ -289,6 +289,44 @@ def base_color_image(built: Any) -> Any:
     return surface(built).inputs["Base Color"].links[0].from_node.image
 
 
+def paint_gray(image: Any) -> None:
+    image.pixels.foreach_set(np.tile(np.float32([0.5, 0.5, 0.5, 1]), len(image.pixels) // 4))
+    image.update()
+
+
+def test_paint_on_the_base_color_shows_through_its_edits(
+    blender: Any, result: ResultArrays
+) -> None:
+    built = build(result)
+    base = base_color_image(built)
+    edit(built, Hue=0.3)
+    before = base_color_image(built)
+    edit(built)
+    assert base_color_image(built) == before, "nothing was painted"
+    paint_gray(base)
+    edit(built)
+    assert base_color_image(built) != base and np.ptp(pixels(base_color_image(built))[..., :3]) == 0
+    painted = base_color_image(built).name
+    base.pack()
+    edit(built)
+    assert np.ptp(pixels(base_color_image(built))[..., :3]) == 0, painted
+
+
+def test_paint_on_an_edited_base_color_stays_in_the_file(
+    blender: Any, result: ResultArrays
+) -> None:
+    built = build(result)
+    edit(built, Hue=0.3)
+    shown = base_color_image(built)
+    paint_gray(shown)
+    edit(built, Hue=0.4)
+    assert base_color_image(built) != shown
+    assert shown.name.endswith("_edited painted") and shown.use_fake_user and not shown.is_dirty
+    assert np.ptp(pixels(shown)[..., :3]) == 0 and "isc_role" not in shown
+    edit(built, Hue=0.5)
+    assert [image for image in blender.data.images if "edited" in image.name] == [shown]
+
+
 @pytest.mark.parametrize("varies", [False, True])
 def test_the_base_color_follows_the_gloss(blender: Any, result: ResultArrays, varies: bool) -> None:
     """It is that of an object whose fit has the edited gloss; with the fitted gloss again, it is
