@@ -101,7 +101,7 @@ def run_batch(
     plan = _plan(batch)
     folder = RunFolder(plan.output)
     monitor.report("reading the inputs", 0.0)
-    inputs = Inputs(batch.inputs, batch.masks, recipe)
+    inputs = Inputs(batch.inputs, batch.masks, recipe, plan.output)
     if next(iter(inputs), None) is None:  # before the folder is created
         raise InputError(
             f"{', '.join(batch.inputs)}: names no image: give photos, or a manifest with rows"

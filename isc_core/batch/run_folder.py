@@ -82,6 +82,27 @@ class RunFolder:
         """
         return self.attempts / name.replace("/", " ")  # names have no spaces
 
+    def wrote(self, folder: Path) -> bool:
+        """Return whether a folder is one of those that runs write into the output folder.
+
+        Parameters
+        ----------
+        folder : Path
+
+        Returns
+        -------
+        bool
+            False for the output folder itself, and for folders of photos in it.
+        """
+        real, output = folder.resolve(), self.output.resolve()
+        if not real.is_relative_to(output) or real == output:
+            return False
+        parts = real.relative_to(output).parts
+        return parts[0] in (*OWN_FILES, self.private.name) or any(
+            (output.joinpath(*parts[:depth]) / "decomposition.json").is_file()
+            for depth in range(1, len(parts) + 1)
+        )
+
     def begin_objects(self, name: str) -> None:
         """Make the folders of a photo with a result for each object.
 

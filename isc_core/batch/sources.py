@@ -1,8 +1,8 @@
 """The inputs of a batch: photos, folders, patterns and manifests, local or in an object store.
 
-A file `cup_mask.*` next to `cup.jpg` is its mask; in a folder of masks it is `cup.*` or
-`cup_mask.*`. Folders are not searched recursively, but patterns with ** are. Files are sorted by
-name.
+A file `cup_mask.*` next to `cup.jpg` is its mask; in a folder of masks it is `cup_mask.*` or
+`cup.*`. Folders are not searched recursively, but patterns with ** are; what a run has written into
+its output is not a photo. Files are sorted by name.
 """
 
 import glob
@@ -16,6 +16,7 @@ from ..photo.names import PHOTO_SUFFIXES
 from .fetch import file_system, is_url
 from .item import BatchItem, ImageRecipe
 from .manifest import SUFFIXES, Manifest
+from .run_folder import RunFolder
 
 PHOTOS = (*PHOTO_SUFFIXES, ".npy")
 _MASK = "_mask"
@@ -25,11 +26,18 @@ class Inputs:
     """The items of all inputs; can be iterated any number of times.
 
     Folders and patterns are listed once, manifests are streamed each time. `masks` is a folder of
-    masks; None for masks next to the photos. Raises `InputError` for an input that does not exist
-    or has no photo.
+    masks; None for masks next to the photos. Patterns do not match files that runs wrote into
+    `output`. Raises `InputError` for an input that does not exist or has no photo.
     """
 
-    def __init__(self, inputs: Sequence[str], masks: str | None, recipe: ImageRecipe) -> None:
+    def __init__(
+        self,
+        inputs: Sequence[str],
+        masks: str | None,
+        recipe: ImageRecipe,
+        output: Path | None = None,
+    ) -> None:
+        self._output = None if output is None else RunFolder(output.resolve())
         self._stem_table = lru_cache(maxsize=64)(_by_stem)
         self._masks = None if masks is None else masks.rstrip("/") or masks
         if self._masks is not None and not _files(self._masks):
@@ -43,7 +51,7 @@ class Inputs:
     def _part(self, text: str, recipe: ImageRecipe) -> Iterable[BatchItem]:
         if text.lower().endswith(SUFFIXES):
             return Manifest(text, recipe)
-        photos = _listed(text)
+        photos = _listed(text, self._output)
         if not photos:
             raise InputError(
                 f"{text}: no such photo, folder or manifest, or no photo in it ({' '.join(PHOTOS)})"
@@ -59,10 +67,11 @@ class Inputs:
         stem = name.rpartition(".")[0]
         place = folder if self._masks is None else self._masks
         stems = self._stem_table(place)
-        candidates = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
+        candidates = (f"{stem}{_MASK}",) if self._masks is None else (f"{stem}{_MASK}", stem)
         for candidate in candidates:
-            if candidate in stems:
-                return f"{place}/{stems[candidate]}"
+            found = stems.get(candidate)
+            if found is not None and not (found == name and _is_same(place, folder)):
+                return f"{place}/{found}"
         if self._masks is not None:
             raise InputError(f"--masks {self._masks} has no mask for {name}: name it {stem}.png")
         return ""
@@ -75,7 +84,14 @@ def _is_photo(name: str) -> bool:
     )
 
 
-def _listed(text: str) -> list[str]:
+def _is_same(folder: str, other: str) -> bool:
+    """Whether two locations are the same folder."""
+    if is_url(folder) or is_url(other):
+        return folder == other
+    return os.path.realpath(folder or ".") == os.path.realpath(other or ".")
+
+
+def _listed(text: str, output: RunFolder | None) -> list[str]:
     """The photos of an input, sorted."""
     if is_url(text):
         return _listed_remote(text)
@@ -84,11 +100,11 @@ def _listed(text: str) -> list[str]:
         return [f"{folder}/{name}" for name in _files(folder) if _is_photo(name)]
     if Path(text).exists():
         return [text if "/" in text else f"./{text}"]
-    return sorted(
-        f"./{path}" if "/" not in path else path
-        for path in glob.iglob(text, recursive=True)
-        if _is_photo(Path(path).name)
-    )
+    photos = [path for path in glob.iglob(text, recursive=True) if _is_photo(Path(path).name)]
+    if output is not None:
+        own = {folder: output.wrote(Path(folder)) for folder in set(map(os.path.dirname, photos))}
+        photos = [path for path in photos if not own[os.path.dirname(path)]]
+    return sorted(f"./{path}" if "/" not in path else path for path in photos)
 
 
 def _listed_remote(url: str) -> list[str]:

@@ -140,3 +140,28 @@ def test_photos_of_phones_and_cameras_are_found_in_a_folder(tmp_path: Path) -> N
     found = list(Inputs([str(tmp_path)], None, ImageRecipe()))
     assert [PurePath(item.image).name for item in found] == ["a.HEIC", "b.dng", "c.avif"]
     assert [PurePath(item.mask).name for item in found] == ["", "b_mask.png", ""]
+
+
+def test_a_pattern_does_not_match_what_runs_have_written(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    photos = ["cat/cup.jpg", "cup.jpg", "out/more/jug.jpg"]
+    made = ["out/cup/preview.jpg", "out/cup/maps/a.jpg", "out/shelf/1/a.jpg"]
+    thumbnails = ["out/thumbnails/cup.jpg", "out/thumbnails/each/shelf/1.jpg"]
+    for name in (*photos, *made, *thumbnails):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_bytes(b"x")
+    for result in ("cup", "shelf/1"):
+        (out / result / "decomposition.json").touch()
+    pattern = f"{tmp_path}/**/*.jpg"
+    found = [item.image for item in Inputs([pattern], None, ImageRecipe(), out)]
+    assert found == [str(tmp_path / name) for name in photos]
+
+
+def test_no_photo_is_its_own_mask(tmp_path: Path) -> None:
+    for name in ("cup.png", "cup_mask.png"):
+        (tmp_path / name).write_bytes(b"x")
+    (item,) = Inputs([str(tmp_path)], f"{tmp_path}/", ImageRecipe())
+    assert (PurePath(item.image).name, PurePath(item.mask).name) == ("cup.png", "cup_mask.png")
+    (tmp_path / "cup_mask.png").unlink()
+    with pytest.raises(InputError, match="has no mask for cup.png"):
+        Inputs([str(tmp_path)], str(tmp_path), ImageRecipe())

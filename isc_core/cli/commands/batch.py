@@ -65,7 +65,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--masks",
         metavar="DIR",
-        help="a folder with the masks of all photos: cup.png or cup_mask.png for cup.jpg",
+        help="a folder with the masks of all photos: cup_mask.png or cup.png for cup.jpg",
     )
     add_each(main, "DIR/PHOTO/1, DIR/PHOTO/2 and so on, from left to right")
     add_main_settings(main)
