@@ -100,7 +100,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         _require_same(options.photo, stored.result)
     with Checkpoint(options.output) as checkpoint:
         result, lines = _refined(stored, options, checkpoint, monitor.part(0, 0.9))
-        cover = read_cover(options.result / MASK)
+        cover = read_cover(options.result / MASK, stored.result.provenance.input)
         writing = monitor.part(0.9, 1.0)
         save(result, options.output, cover=cover, part=stored.part, monitor=writing)
         checkpoint.remove()

@@ -54,7 +54,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     monitor.report("reading", 0.0)
     stored, path = load_part(options.result), options.result / ARRAYS
-    cover = object_cover(stored, read_cover(options.result / MASK))
+    seen = read_cover(options.result / MASK, stored.result.provenance.input)
+    cover = object_cover(stored, seen)
     require_writable_file(path)
     monitor.report("writing arrays", 0.3)
     with new_file(path) as partial:

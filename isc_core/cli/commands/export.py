@@ -137,7 +137,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.textures is not None:
         require_writable(output, texture_files(name), (options.result / MASK,))
     monitor.report("building the mesh", 0.2)
-    cover = object_cover(stored, read_cover(options.result / MASK))
+    seen = read_cover(options.result / MASK, stored.result.provenance.input)
+    cover = object_cover(stored, seen)
     how = MeshOptions(triangles=options.triangles, back=Back(options.back))
     # Texture sets are for the plane of the photo, whose mesh has its vertices at pixels.
     fine = options.photo is not None and options.texture_size != MAPS_SIZE

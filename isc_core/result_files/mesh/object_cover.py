@@ -16,8 +16,11 @@ doi:10.1145/800031.808606.
 Limits: without that file the edge is that of the maps' binary mask.
 """
 
-from dataclasses import dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +31,7 @@ from ...imaging.bounding_box import FramePart, mask_slices
 from ...imaging.srgb import share_codes
 from ...imaging.upsampling import enlarged
 from ...io.decoders import read_raster
+from ...io.limits import DEFAULT_LIMITS
 from ...photo.soft_rim import rim_reach, soft_rim
 from ...scene.part_of_result import ResultPart
 from ..solids.rim import Rim
@@ -93,13 +97,16 @@ class ObjectCover:
         return np.rint(255 * (1 - weight * (1 - cover))).astype(np.uint8)
 
 
-def read_cover(mask_file: Path) -> np.ndarray | None:
+def read_cover(mask_file: Path, source: Mapping[str, Any]) -> np.ndarray | None:
     """Read the coverage in a result's `mask.png`.
 
     Parameters
     ----------
     mask_file : Path
         May be absent.
+    source : mapping
+        `Provenance.input` of the result. The file may have as many pixels as its photo, however
+        many these are.
 
     Returns
     -------
@@ -109,11 +116,13 @@ def read_cover(mask_file: Path) -> np.ndarray | None:
     Raises
     ------
     InputError
-        If the file is not an image.
+        If the file is not an image, or has more pixels than the photo and the usual limit.
     """
     if not mask_file.is_file():
         return None
-    raster = read_raster(mask_file)
+    pixels = math.prod(source.get("size", ()))
+    limits = replace(DEFAULT_LIMITS, max_pixels=max(DEFAULT_LIMITS.max_pixels, pixels))
+    raster = read_raster(mask_file, limits)
     values = raster.values.reshape(*raster.values.shape[:2], -1)[..., 0]
     return values.astype(np.float32) / np.iinfo(raster.values.dtype).max
 

@@ -297,7 +297,7 @@ def test_vertices_of_arrays_are_pixels_where_the_outline_is_none(
     smooth: Path, tmp_path: Path
 ) -> None:
     """The same as those that `isc arrays` adds, and without a finer outline."""
-    d, cover = load(smooth), read_cover(smooth / "mask.png")
+    d, cover = load(smooth), read_cover(smooth / "mask.png", {})
     save(d, tmp_path / "a", arrays=True, cover=cover)
     save(d, tmp_path / "b", arrays=True)
     assert main(["arrays", str(smooth)]) == 0

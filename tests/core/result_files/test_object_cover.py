@@ -4,8 +4,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
+from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import FramePart
+from isc_core.io.limits import Limits
 from isc_core.photo.grabcut import encoded_mask
 from isc_core.result_files.mesh.object_cover import object_cover, read_cover
 from isc_core.scene.part_of_result import ResultPart
@@ -30,7 +33,7 @@ def test_the_cover_is_the_mean_over_a_pixel_near_the_object(tmp_path: Path) -> N
     d, cover = halved("file"), ramp(4)
     cover[:20, :20] = 1  # another thing
     (tmp_path / "mask.png").write_bytes(encoded_mask(cover))
-    found = object_cover(d, read_cover(tmp_path / "mask.png"))
+    found = object_cover(d, read_cover(tmp_path / "mask.png", {}))
     assert found is not None and found.share.shape == d.mask.shape
     mean = cover.reshape(96, 2, 120, 2).mean((1, 3))
     near = np.hypot(*(np.indices(d.mask.shape) - np.array([44, 66])[:, None, None])) < 42
@@ -41,9 +44,19 @@ def test_the_cover_is_the_mean_over_a_pixel_near_the_object(tmp_path: Path) -> N
     assert found.alpha(FramePart.whole((96, 120))) is None, "an outline is opaque"
 
 
+def test_the_mask_of_a_large_photo_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "mask.png"
+    path.write_bytes(encoded_mask(ramp(4)))
+    monkeypatch.setattr("isc_core.result_files.mesh.object_cover.DEFAULT_LIMITS", Limits(1000))
+    cover = read_cover(path, {"size": [240, 192]})
+    assert cover is not None and cover.shape == (192, 240)
+    with pytest.raises(InputError, match="exceed the limit"):
+        read_cover(path, {"size": [24, 19]})
+
+
 def test_a_hard_mask_or_that_of_another_photo_has_no_coverage(tmp_path: Path) -> None:
     d = halved("file")
-    assert read_cover(tmp_path / "mask.png") is None and object_cover(d, None) is None
+    assert read_cover(tmp_path / "mask.png", {}) is None and object_cover(d, None) is None
     assert object_cover(d, ramp(4)[:100]) is None
     assert object_cover(d, ramp(4) > 0.5) is None
 
