@@ -26,6 +26,7 @@ from .photo.photo import Photo
 from .photo.reading import photo_from_raster
 from .progress import Monitor
 from .result_files import result_folder
+from .result_files.mesh.object_cover import read_cover
 from .scene.decomposition import Decomposition, Separation
 from .scene.known_inputs import KnownInputs
 from .separation import BEST, IMPROVED
@@ -72,6 +73,7 @@ def decompose(
     Decomposition
         `diffuse`, `specular`, `residual`, `reflectance`, `shading`, `normal` (H, W, 3), `height`,
         `mask`, `confidence` (H, W), `illumination` (9, 3), the fitted lobe, and provenance.
+        `cover` is the coverage of the photo's pixels by the object, if it is known.
 
     Raises
     ------
@@ -84,7 +86,8 @@ def decompose(
     if marks:
         photo = replace(photo, marks=marks)
     name = Path(image).name if isinstance(image, str | Path) else ""
-    return pipeline.decompose(photo, settings, known=known, name=name, monitor=monitor)
+    result = pipeline.decompose(photo, settings, known=known, name=name, monitor=monitor)
+    return replace(result, cover=photo.cover)
 
 
 def separate(
@@ -116,7 +119,8 @@ def separate(
     Returns
     -------
     Separation
-        `diffuse`, `specular`, `residual` (H, W, 3) and `confidence` (H, W).
+        `diffuse`, `specular`, `residual` and the photo's `image` (H, W, 3), `confidence` and
+        `mask` (H, W).
 
     Raises
     ------
@@ -126,9 +130,11 @@ def separate(
         If the monitor cancels.
     """
     photo = _photo(image, mask, transfer, whole_frame=True)
-    return separate_layers(
+    layers = separate_layers(
         method, photo.image, photo.mask, photo.clipped, variant=variant, monitor=monitor
     )
+    cover = None if photo.found is None else photo.found.cover
+    return replace(layers, image=photo.image, mask=photo.mask, cover=cover)
 
 
 def save(result: Decomposition | Separation, folder: str | Path) -> None:
@@ -145,10 +151,12 @@ def save(result: Decomposition | Separation, folder: str | Path) -> None:
         If the folder cannot be written.
     """
     if isinstance(result, Decomposition):
-        result_folder.save(result, folder)
+        result_folder.save(result, folder, cover=result.cover)
         return
-    image = result.diffuse + result.specular + result.residual
-    result_folder.save_separation(result, image, folder)
+    image = result.image
+    if image is None:
+        image = result.diffuse + result.specular + result.residual
+    result_folder.save_separation(result, image, folder, mask=result.mask, cover=result.cover)
 
 
 def load(folder: str | Path) -> Decomposition:
@@ -167,7 +175,9 @@ def load(folder: str | Path) -> Decomposition:
     InputError
         If a file is missing, damaged, or inconsistent.
     """
-    return result_folder.load(folder)
+    result = result_folder.load(folder)
+    mask_file = Path(folder) / result_folder.MASK
+    return replace(result, cover=read_cover(mask_file, result.provenance.input))
 
 
 def _photo(

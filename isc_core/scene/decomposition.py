@@ -34,6 +34,13 @@ class Separation:
         Reliability of the split in [0, 1]; 0 outside the mask.
     abstention : Abstention or None
         Why the method `separation.BEST` removed nothing; None otherwise.
+    image : (H, W, 3) ndarray or None
+        The photo, linear, of which `isc_core.save` writes a copy; None where it is the sum of the
+        layers.
+    mask : (H, W) ndarray of bool or None
+        The object; None where it is the pixels that are not black.
+    cover : (H, W) ndarray or None
+        Coverage of the pixels by the object, if its mask was found in the photo.
     """
 
     diffuse: np.ndarray
@@ -41,6 +48,9 @@ class Separation:
     residual: np.ndarray
     confidence: np.ndarray
     abstention: Abstention | None = None
+    image: np.ndarray | None = None
+    mask: np.ndarray | None = None
+    cover: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -143,6 +153,9 @@ class Decomposition:
     environment : (rows, 2 rows, 3) ndarray of float32 or None
         Radiance of the light, see `shading.environment_map`; None where only the coefficients are
         known.
+    cover : (H', W') ndarray of float32 or None
+        Coverage of the photo's pixels by the object, which `isc_core.save` writes as `mask.png`;
+        None where only the mask is known.
     """
 
     image: np.ndarray
@@ -163,6 +176,7 @@ class Decomposition:
     visibility: np.ndarray | None = None
     indirect: np.ndarray | None = None
     environment: np.ndarray | None = None
+    cover: np.ndarray | None = None
 
     @property
     def view(self) -> np.ndarray:

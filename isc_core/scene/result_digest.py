@@ -1,7 +1,8 @@
 """A digest of all of a result that later work depends on.
 
 Equation: SHA-256 of the types, shapes and bytes of its maps and of the repr of its other values.
-Its origin is left out, but for its settings: dates, timings and names change nothing.
+Its origin is left out, but for its settings: dates, timings and names change nothing. So is the
+coverage of the photo's pixels, which only meshes and textures depend on.
 
 Citation: FIPS 180-4, Secure Hash Standard, 2015.
 
@@ -31,6 +32,8 @@ def result_digest(d: Decomposition) -> np.ndarray:
     """
     digest = hashlib.sha256()
     for field in fields(d):
+        if field.name == "cover":
+            continue
         _add(digest, field.name)
         value = getattr(d, field.name)
         _add(digest, value.settings if field.name == "provenance" else value)

@@ -13,6 +13,7 @@ from PIL import Image
 
 import isc_core
 from isc_core import InputError, Settings
+from isc_core.cli.main import main
 from isc_core.photo import read_photo
 from tests.core.command_line import ROOT, ball_codes, ball_photo
 
@@ -84,6 +85,61 @@ def test_layers_can_be_separated_and_saved(tmp_path: Path, codes: np.ndarray) ->
     patch = codes[18:30, 18:30]  # no border and no mask: all of it
     whole = isc_core.separate(patch, method="none")
     assert np.array_equal(whole.diffuse > 0, patch > 0)
+
+
+def files_of(folder: Path) -> dict[str, bytes]:
+    """The contents of a folder's files, without what differs between equal runs."""
+    return {
+        path.name: path.read_bytes()
+        for path in folder.iterdir()
+        if path.is_file() and path.name not in ("decomposition.json", "preview.png")
+    }
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["soft", "found"])
+def test_a_saved_result_has_the_files_of_the_command(tmp_path: Path, kind: str) -> None:
+    codes, photo = ball_codes(12.0) >> 8, tmp_path / "ball.png"
+    row, column = np.indices(codes.shape[:2])
+    if kind == "soft":
+        middle = np.argwhere(codes.max(axis=2) > 0).mean(axis=0)
+        away = np.hypot(row - middle[0], column - middle[1])
+        codes = np.dstack([codes, np.clip(255 * (12 - away) / 3, 0, 255)])
+    else:
+        codes[codes.max(axis=2) == 0] = (90, 110, 130)
+    Image.fromarray(codes.astype(np.uint8)).save(photo)
+    assert main(["decompose", str(photo), "-q", "--model", "naive", "-o", f"{tmp_path}/a"]) == 0
+    expected = files_of(tmp_path / "a")
+    assert "mask.png" in expected
+    isc_core.save(isc_core.decompose(photo, settings=NAIVE), tmp_path / "b")
+    isc_core.save(isc_core.load(tmp_path / "b"), tmp_path / "c")
+    assert files_of(tmp_path / "b") == files_of(tmp_path / "c") == expected
+
+
+def test_a_result_with_a_found_mask_can_be_exported_with_its_photo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    codes, photo = ball_codes(12.0) >> 8, tmp_path / "ball.png"
+    codes[codes.max(axis=2) == 0] = (90, 110, 130)
+    Image.fromarray(codes.astype(np.uint8)).save(photo)
+    folder = tmp_path / "ball"
+    isc_core.save(isc_core.decompose(photo, settings=NAIVE), folder)
+    words = ["export", str(folder), "-q", "--photo", str(photo), "--format", "glb"]
+    assert main([*words, "-o", f"{tmp_path}/a.glb"]) == 0
+    (folder / "mask.png").unlink()
+    assert main([*words, "-o", f"{tmp_path}/b.glb"]) == 2
+    assert "has no mask.png" in capsys.readouterr().err and not (tmp_path / "b.glb").exists()
+
+
+def test_a_saved_separation_has_the_files_of_the_command(tmp_path: Path) -> None:
+    codes, photo = ball_codes(12.0) >> 8, tmp_path / "ball.png"
+    codes[codes.max(axis=2) == 0] = (90, 110, 130)
+    Image.fromarray(codes.astype(np.uint8)).save(photo)
+    words = ["separate", str(photo), "-q", "--method", "shen_2013"]
+    assert main([*words, "-o", f"{tmp_path}/a"]) == 0
+    isc_core.save(isc_core.separate(photo, method="shen_2013"), tmp_path / "b")
+    expected = files_of(tmp_path / "a")
+    assert "mask.png" in expected and files_of(tmp_path / "b") == expected
 
 
 @pytest.mark.parametrize(

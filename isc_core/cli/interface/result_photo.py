@@ -49,4 +49,9 @@ def photo_of_result(
         raise InputError("the result was made with a separate mask: give the same one with --mask")
     if given.get("mask_from") in FOUND and mask is None:
         mask = folder / MASK
+        if not mask.is_file():
+            raise InputError(
+                f"{folder} has no {MASK}, the mask that was found in its photo: give the mask with "
+                "--mask, or decompose the photo again"
+            )
     return read_photo(photo, mask, "auto" if curve == PROFILE else curve, limits=limits)
