@@ -129,7 +129,9 @@ class ISC_OT_photo_as_object(bpy.types.Operator):
 
 
 def load_photo(path: Path) -> Any:
-    """Load a photo, or find the image of that file.
+    """Load a photo, or find the image of that file; it gets the file's present content.
+
+    An image that was painted on and not saved stays as it is.
 
     Parameters
     ----------
@@ -151,11 +153,26 @@ def load_photo(path: Path) -> Any:
         image = bpy.data.images.load(str(path), check_existing=True)
     except RuntimeError as error:
         raise InputError(_no_photo(path)) from error
+    if image in before and image.library is None and not image.is_dirty:
+        _reload_changed(image, path)
     if 0 in tuple(image.size):
         if image not in before:
             bpy.data.images.remove(image)
         raise InputError(_no_photo(path))
     return image
+
+
+def _reload_changed(image: Any, path: Path) -> None:
+    """Read the file of an image again; a packed one only if the file is another photo now."""
+    if image.packed_file is not None:
+        if not path.is_file() or path.read_bytes() == image.packed_file.data:
+            return
+        other = bpy.data.images.load(str(path))
+        readable = 0 not in tuple(other.size)
+        bpy.data.images.remove(other)
+        if not readable:  # reading it would lose the packed photo
+            raise InputError(_no_photo(path))
+    image.reload()
 
 
 def _no_photo(path: Path) -> str:

@@ -269,7 +269,7 @@ def inspect_images(
     photo = inspect_image(image)
     if mask is None:
         return photo, None, None
-    if request.scale_mask:
+    if request.scale_mask and tuple(image.size) != tuple(mask.size):
         return photo, inspect_image(mask, as_pixels=True), (int(image.size[0]), int(image.size[1]))
     if image.has_data and mask.has_data and tuple(image.size) != tuple(mask.size):
         raise InputError(

@@ -25,7 +25,11 @@ from blender_addon.runs import request as requests  # noqa: E402
 from blender_addon.runs import run_steps, worker_run  # noqa: E402
 from blender_addon.runs.active_run import begin_run  # noqa: E402
 from blender_addon.runs.messages import join_notes, sentence, translate_message  # noqa: E402
-from blender_addon.runs.request import parse_points, request_from_settings  # noqa: E402
+from blender_addon.runs.request import (  # noqa: E402
+    inspect_images,
+    parse_points,
+    request_from_settings,
+)
 from blender_addon.runs.worker_run import WorkerRun  # noqa: E402
 from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions, prepare  # noqa: E402
@@ -324,6 +328,17 @@ def test_a_mask_of_another_size_is_scaled_if_enabled(addon: Any) -> None:
         run.step()
     assert np.load(folder / "mask.npy").shape == (64, 88)
     run.cancel()
+
+
+def test_a_mask_that_fits_is_not_scaled(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    shown = photo()
+    width, height = shown.size
+    settings.image, settings.mask_source = shown, "IMAGE"
+    settings.mask = mask_image(size=(height, width))
+    settings.scale_mask = True
+    wanted = request_from_settings(addon.context.scene)
+    assert inspect_images(wanted)[2] is None
 
 
 def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:

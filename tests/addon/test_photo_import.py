@@ -92,6 +92,44 @@ def test_an_image_that_was_there_stays_when_its_file_is_no_photo(
     assert image.name in addon.data.images
 
 
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_photo_that_changed_on_disk_is_read_again(
+    addon: Any, tmp_path: Path, packed: bool
+) -> None:
+    path = tmp_path / "a.png"
+
+    def write(code: int) -> None:
+        Image.fromarray(np.full((16, 20, 3), code, np.uint8)).save(path)
+
+    write(255)
+    image = photo_import.load_photo(path)
+    assert image.pixels[0] == 1
+    if packed:
+        image.pack()
+    write(51)
+    assert photo_import.load_photo(path) == image
+    assert image.pixels[0] == pytest.approx(0.2) and (image.packed_file is not None) == packed
+    if packed:
+        assert image.packed_file.data == path.read_bytes()
+
+
+def test_a_packed_or_painted_photo_is_kept_from_its_file(addon: Any, tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    Image.fromarray(np.full((16, 20, 3), 255, np.uint8)).save(path)
+    image = photo_import.load_photo(path)
+    image.pack()
+    path.write_text("overwritten")
+    with pytest.raises(InputError, match="is not a photo"):
+        photo_import.load_photo(path)
+    assert image.pixels[0] == 1 and image.packed_file is not None
+    path.unlink()
+    assert photo_import.load_photo(path) == image, "the file is gone, the packed photo is not"
+    image.pixels.foreach_set(np.zeros(len(image.pixels), np.float32))
+    image.update()
+    Image.fromarray(np.full((16, 20, 3), 255, np.uint8)).save(path)
+    assert photo_import.load_photo(path) == image and image.pixels[0] == 0, "painted, not saved"
+
+
 def test_the_entries_are_in_blenders_menus(addon: Any) -> None:
     for name, draw in menus._ENTRIES:
         assert draw in getattr(bpy.types, name)._dyn_ui_initialize(), name
