@@ -55,7 +55,8 @@ class ImageRecipe:
         Parameters
         ----------
         options : tuple of (str, value)
-            Names of settings, "transfer" or "each", and their values.
+            Names of settings, "transfer" or "each", and their values. A size replaces the run's
+            choice of the full size.
 
         Returns
         -------
@@ -71,6 +72,8 @@ class ImageRecipe:
         each = bool(given.pop("each", self.each))
         if transfer not in TRANSFERS:
             raise InputError(f'unknown transfer "{transfer}": choose {", ".join(TRANSFERS)}')
+        if "max_size" in given:
+            given.setdefault("full_size", False)
         settings = replace(self.settings, **given)  # type: ignore[arg-type]
         settings.check()
         return ImageRecipe(settings, transfer, each)

@@ -7,6 +7,7 @@ import pytest
 
 from isc_core.batch.item import BatchItem, ImageRecipe
 from isc_core.batch.manifest import Manifest
+from isc_core.decomposition.settings import Settings
 from isc_core.errors import InputError
 
 
@@ -105,3 +106,10 @@ def test_a_manifest_is_not_loaded_whole(tmp_path: Path) -> None:
     assert next(stream).image == f"{tmp_path}/x"
     with pytest.raises(InputError, match="line 2"):
         next(stream)
+
+
+def test_the_size_of_a_line_replaces_the_full_size_of_the_run() -> None:
+    recipe = ImageRecipe(Settings(full_size=True))
+    assert recipe.changed(()).settings.maps_size == 0
+    assert recipe.changed((("max_size", 256),)).settings.maps_size == 256
+    assert recipe.changed((("full_size", True), ("max_size", 256))).settings.maps_size == 0
