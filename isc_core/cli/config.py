@@ -11,7 +11,8 @@ long names of its options:
     [edit.gloss]
     look = "metallic"
 
-Options on the command line take precedence. A file that was not given explicitly must not make
+Options on the command line take precedence, also over those that they exclude, and a repeated one
+replaces the list of the file. A file that was not given explicitly must not make
 `isc` connect to other machines: `scheduler` requires `--config`. Paths are relative to the file.
 Values are checked as on the command line; `--no-config` ignores the file.
 """
@@ -25,10 +26,12 @@ from ..errors import InputError
 from ..io.regular_files import read_regular
 from .commands.registry import all_commands, find_command
 from .interface.parser import GENERAL, actions_of
+from .interface.values import Location
 
 DEFAULT_FILE = Path("isc.toml")
 _ONLY_IF_NAMED = frozenset({"scheduler"})
-_HELP = frozenset({"-h", "--help", "--version"})
+# Options that have no effect beside others, and are ignored if those are on the command line.
+_REPLACED_BY = {"--full-size": "--max-size"}
 _MAX_BYTES = 1 << 20
 
 
@@ -45,7 +48,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
     Returns
     -------
     Path or None
-        The file, if there is one and the arguments do not ask for help.
+        The file, if there is one.
 
     Raises
     ------
@@ -54,9 +57,10 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
         accepted only with `--config`.
     """
     path, named = _find(arguments)
-    if path is None or not _HELP.isdisjoint(arguments):  # a broken file must not hide the help
+    if path is None:
         return None
     inner = dict(actions_of(parser))
+    given = {word.partition("=")[0] for word in arguments if word.startswith("--")}
     for name, table in _read(path).items():
         if not isinstance(table, dict):
             raise InputError(f"{path}: {name!r} is outside any table: move it below [decompose]")
@@ -66,7 +70,7 @@ def apply_config(parser: argparse.ArgumentParser, arguments: Sequence[str]) -> P
                     f"{path}: {min(barred)} of [{name}] is accepted only from a file given with "
                     f"--config: use --config {path} if you trust it"
                 )
-            _apply(inner[name], table, path, name)
+            _apply(inner[name], table, path, name, given)
         elif find_command(name) is None:
             known = [entry.name for entry in all_commands()]
             raise InputError(f"{path}: unknown command {name!r}: {_advice(name, known)}")
@@ -101,18 +105,55 @@ def _read(path: Path) -> dict[str, object]:
 
 
 def _apply(
-    parser: argparse.ArgumentParser, table: dict[str, object], path: Path, where: str
+    parser: argparse.ArgumentParser,
+    table: dict[str, object],
+    path: Path,
+    where: str,
+    given: set[str],
 ) -> None:
+    """Set defaults from a table, except those that the options `given` on the command line
+    replace.
+    """
     inner, options = dict(actions_of(parser)), _options(parser)
     for key, value in table.items():
         if key in inner and isinstance(value, dict):
-            _apply(inner[key], value, path, f"{where}.{key}")
+            _apply(inner[key], value, path, f"{where}.{key}", given)
         elif key in options:
-            parser.set_defaults(**{options[key].dest: _value(options[key], value, path, where)})
-            options[key].required = False
+            action = options[key]
+            excluded = _excluded_by(parser, action)
+            if clash := [name for name in table if options.get(name) in excluded]:
+                raise InputError(
+                    f"{path}: {key} and {clash[0]} of [{where}] exclude each other: leave one out"
+                )
+            converted = _value(action, value, path, where)
+            if not given & _replacing(action, excluded):
+                parser.set_defaults(**{action.dest: converted})
+            action.required = False
+            for group in parser._mutually_exclusive_groups:
+                group.required = group.required and action not in group._group_actions
         else:
             known = [*options, *inner]
             raise InputError(f"{path}: [{where}] has no option {key!r}: {_advice(key, known)}")
+
+
+def _excluded_by(parser: argparse.ArgumentParser, action: argparse.Action) -> list[argparse.Action]:
+    """The options that cannot be given together with one."""
+    groups = (group._group_actions for group in parser._mutually_exclusive_groups)
+    return [other for group in groups if action in group for other in group if other is not action]
+
+
+def _replacing(action: argparse.Action, excluded: list[argparse.Action]) -> set[str]:
+    """The options that, on the command line, replace the value that a file gives to one.
+
+    An option that is not repeated replaces the default without further ado.
+    """
+    names = {_REPLACED_BY[name] for name in action.option_strings if name in _REPLACED_BY}
+    names.update(*(other.option_strings for other in excluded))
+    return names.union(action.option_strings) if _is_repeated(action) else names
+
+
+def _is_repeated(action: argparse.Action) -> bool:
+    return isinstance(action, argparse._AppendAction)
 
 
 def _options(parser: argparse.ArgumentParser) -> dict[str, argparse.Action]:
@@ -137,12 +178,12 @@ def _value(action: argparse.Action, value: object, path: Path, where: str) -> ob
         if not isinstance(value, bool):
             raise InputError(f"{name} must be true or false, not {value!r}")
         return value if isinstance(action.const, bool) else action.default
-    repeated = action.nargs is not None or isinstance(action, argparse._AppendAction)
+    repeated = action.nargs is not None or _is_repeated(action)
     if repeated != isinstance(value, list):
         raise InputError(f"{name} must be {'a list' if repeated else 'one value'}, not {value!r}")
     if isinstance(value, list):
         if isinstance(action.nargs, int) and len(value) != action.nargs:
-            raise InputError(f"{name} must have {action.nargs} values, not {len(value)}")
+            raise InputError(f"{name} must be a list of {action.nargs} values, not {value!r}")
         return [_converted(action, one, path, name) for one in value]
     return _converted(action, value, path, name)
 
@@ -157,4 +198,6 @@ def _converted(action: argparse.Action, value: object, path: Path, name: str) ->
         raise InputError(f"{name}: {error}") from error
     if action.choices is not None and converted not in action.choices:
         raise InputError(f"{name}: unknown {value!r}: choose {', '.join(map(str, action.choices))}")
+    if isinstance(converted, Location):
+        return str(path.parent / converted)
     return path.parent / converted if isinstance(converted, Path) else converted

@@ -12,6 +12,7 @@ import gc
 import re
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext, suppress
 from itertools import pairwise
 
 from ..errors import Cancelled, InputError, Rejected
@@ -21,6 +22,7 @@ from .interface.several import problem_of
 from .interface.terminal import TerminalReporter, Verbosity, discard_output
 
 SUCCESS, BROKEN_PIPE, REJECTED, REFUSED, CANCELLED = 0, 1, 1, 2, 130
+_HELP = {"-h", "--help", "--version"}
 
 _Reporter = TerminalReporter | JsonReporter
 
@@ -78,7 +80,10 @@ def _run(
     from .config import apply_config
 
     parser = build_parser(arguments)
-    config = apply_config(parser, arguments)
+    config = None
+    # A file that cannot be used must not hide the help, which also says how to ignore the file.
+    with suppress(InputError) if _HELP & set(arguments) else nullcontext():
+        config = apply_config(parser, arguments)
     try:
         options = parser.parse_args(arguments)
     except SystemExit:  # --help and --version

@@ -8,7 +8,7 @@ import shlex
 from pathlib import Path
 
 from isc_core.cli.interface.parser import describe, hints
-from isc_core.cli.interface.values import count, names
+from isc_core.cli.interface.values import count, location, names
 from isc_core.decomposition.pipeline import ILLUMINATIONS
 from isc_core.decomposition.settings import SEPARATING_MODELS
 from isc_core.errors import InputError, Rejected
@@ -106,6 +106,7 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
     checks = parser.add_argument_group("bounds and checks")
     checks.add_argument(
         "--bounds",
+        type=location(_NO_BOUNDS),
         metavar="FILE",
         help="regression bounds; none to skip them (default: those of the package)",
     )

@@ -23,7 +23,7 @@ from ..interface.options import (
 )
 from ..interface.parser import describe, hints
 from ..interface.terminal import print_note
-from ..interface.values import count, positive
+from ..interface.values import count, location, positive
 
 _EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
@@ -64,6 +64,7 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_output(main, "the folder to write; finished results are kept")
     main.add_argument(
         "--masks",
+        type=location(),
         metavar="DIR",
         help="a folder with the masks of all photos: cup_mask.png or cup.png for cup.jpg",
     )

@@ -9,6 +9,30 @@ from collections.abc import Callable
 MAPS_SIZE = -1  # value of `texture_size` for "maps"
 
 
+class Location(str):
+    """The path of a file or folder, as opposed to the other values that its option takes."""
+
+
+def location(*words: str) -> Callable[[str], str]:
+    """Return the type of an option that takes a path, a URL, or one of some words.
+
+    Parameters
+    ----------
+    *words : str
+        Values that are not paths.
+
+    Returns
+    -------
+    callable
+        Marks a path as `Location`, so that a configuration file can give it relative to itself.
+    """
+
+    def read(text: str) -> str:
+        return text if "://" in text or text in words else Location(text)
+
+    return read
+
+
 def current_name(setting: str) -> Callable[[str], str]:
     """Return the type of an option whose values were renamed.
 
