@@ -37,7 +37,7 @@ class Inputs:
         recipe: ImageRecipe,
         output: Path | None = None,
     ) -> None:
-        self._output = None if output is None else RunFolder(output.resolve())
+        self._output = None if output is None else RunFolder(Path(os.path.realpath(output)))
         self._stem_table = lru_cache(maxsize=64)(_by_stem)
         self._masks = None if masks is None else masks.rstrip("/") or masks
         if self._masks is not None and not _files(self._masks):

@@ -166,6 +166,7 @@ def test_an_object_stays_in_the_collections_that_the_user_chose(result: ResultAr
     built = build_object(result, SHARED)
     props = bpy.data.collections.new("props")
     bpy.context.scene.collection.children.link(props)
+    assert built.camera is not None
     for obj in (built.object, built.camera):
         for collection in obj.users_collection:
             collection.objects.unlink(obj)
@@ -198,6 +199,7 @@ def test_the_camera_follows_an_object_with_a_parent(result: ResultArrays) -> Non
     built = build_object(result, SHARED)
     parent = bpy.data.objects.new("parent", None)
     bpy.context.scene.collection.objects.link(parent)
+    assert built.camera is not None
     before = built.camera.location.copy()
     for obj in (built.object, built.camera):
         obj.parent = parent

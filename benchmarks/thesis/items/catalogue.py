@@ -303,6 +303,9 @@ CHARACTERISTICS = (
         "environment", "E", "radiance", "camera", "environment", "rows, columns, RGB", "environment"
     ),
     CharacteristicEntry(
+        "coverage", "a", "0 to 1", "photo", "cover", "rows, columns of the photo", "in mask.png"
+    ),
+    CharacteristicEntry(
         "origin",
         "",
         "",
