@@ -8,7 +8,8 @@ reflectance shows them as bright albedo.
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
 the scene network adds: t is a lower bound of the log(I / D) that it predicts
 (`separation.support.ratio_bound`), and D_1 = min(D_0, I e^-t), the light between D_0 and D_1 being
-nearly white (`separation.support.light_tint`). Colour and form decide together, region by region,
+nearly white (`separation.support.light_tint`). On a grey photo, t is the mean of its channels, so
+that the layers are grey, too. Colour and form decide together, region by region,
 what of that was a highlight and what was print (`separation.support.highlight_evidence`); the image
 is restored where it was print. The paint under clipped highlights is inpainted
 (`separation.support.clipped_texture`). SIRFS on D_1 gives shape and light. They give a better
@@ -44,6 +45,7 @@ from ..filters.components import labelled, means
 from ..filters.gaussian import gaussian_average
 from ..filters.morphology import dilated, opened_by_blocks
 from ..imaging.bounding_box import mask_diagonal
+from ..imaging.channels import averaged_if_grey
 from ..imaging.row_blocks import row_blocks
 from ..imaging.smoothing import masked_gaussian
 from ..networks.scene_network import (
@@ -348,6 +350,7 @@ def detect_residual_highlights(
     """
     options = options or JointOptions()
     expected = ratio_lower_bound(prediction or predict_scene(image, mask), options.deviations)
+    expected = averaged_if_grey(expected, image, mask)
     left = np.empty(image.shape, np.result_type(image, diffuse, expected))
     for block in row_blocks(mask.shape):
         rows = block.rows

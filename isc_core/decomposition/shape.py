@@ -21,6 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..imaging.channels import is_grey
 from ..imaging.resampling import resample_height
 from ..photo import Photo
 from ..progress import Monitor
@@ -180,7 +181,7 @@ def _recover(
 ) -> Recovered:
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
-    channels = 1 if _is_grey(diffuse, working.mask) else 3
+    channels = 1 if is_grey(diffuse, working.mask) else 3
     with task.clock.stage("shape and light"):
         priors = _priors(task, channels)
     weights, loss_tolerance = _weights(task, channels)
@@ -309,13 +310,6 @@ def height_of_maps(height: np.ndarray, task: DecompositionTask) -> np.ndarray:
     if task.one_scale:
         return height
     return resample_height(height, task.maps.mask.shape, task.maps.scale / task.working.scale)
-
-
-def _is_grey(image: np.ndarray, mask: np.ndarray) -> bool:
-    inside = image[mask]
-    return bool(
-        np.array_equal(inside[:, 0], inside[:, 1]) and np.array_equal(inside[:, 0], inside[:, 2])
-    )
 
 
 def _diagnostics(result: Recovered) -> Diagnostics:

@@ -17,6 +17,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..imaging import channels
 from ..imaging.luminance import luminance
 from ..photo import Photo
 from ..scene.decomposition import Separation
@@ -71,8 +72,7 @@ def is_grey(photo: Photo) -> bool:
     -------
     bool
     """
-    red, green, blue = np.moveaxis(photo.image[photo.mask], -1, 0)
-    return bool(np.array_equal(red, green) and np.array_equal(red, blue))
+    return channels.is_grey(photo.image, photo.mask)
 
 
 def _described(estimate: SceneEstimate, colours: PhotoColours) -> SceneEstimate:

@@ -99,6 +99,44 @@ def channel_means(values: np.ndarray, where: np.ndarray) -> np.ndarray:
     )
 
 
+def is_grey(image: np.ndarray, mask: np.ndarray) -> bool:
+    """Return whether the channels of an image are equal inside a mask.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) ndarray of bool
+
+    Returns
+    -------
+    bool
+    """
+    inside = (image[block.rows][mask[block.rows]] for block in row_blocks(mask.shape))
+    return all(np.array_equal(part[:, :1].repeat(2, axis=1), part[:, 1:]) for part in inside)
+
+
+def averaged_if_grey(values: np.ndarray, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Average the channels of what is expected of an image, if those of the image are equal.
+
+    A network's channels differ a little even then, and would give a grey photo colours.
+
+    Parameters
+    ----------
+    values : (H, W, 3) ndarray
+    image : (H, W, 3) ndarray
+    mask : (H, W) ndarray of bool
+        Where the image is looked at.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        `values` itself where the image has colours.
+    """
+    if not is_grey(image, mask):
+        return values
+    return np.repeat(mean_channel(values)[..., None], 3, axis=2)
+
+
 def saturation(colours: np.ndarray) -> float:
     """Return the saturation of a set of pixels: summed chroma over summed largest channel.
 

@@ -32,7 +32,7 @@ from ...filters.components import boxes, labelled
 from ...filters.extrema import window_maximum
 from ...filters.morphology import dilated
 from ...imaging.bounding_box import mask_slices
-from ...imaging.channels import total
+from ...imaging.channels import averaged_if_grey, total
 from ...imaging.tiles import Place
 from ...inpainting.pull_push import fill_at
 
@@ -59,7 +59,7 @@ def inpaint_clipped(
         Linear; `diffuse` is at most `image`.
     clipped, mask : (H, W) ndarray of bool
     log_shading : (H, W, 3) ndarray
-        Expected; read inside the mask.
+        Expected; read inside the mask. The channels count by their mean where the image is grey.
     largest_whole : int, optional
         Pixels of the largest box of an object that is searched as a whole.
 
@@ -71,6 +71,7 @@ def inpaint_clipped(
     holes, known = clipped & mask, mask & ~clipped
     if not holes.any() or not known.any():
         return diffuse
+    log_shading = averaged_if_grey(log_shading, image, mask)
     filled, dark = diffuse.copy(), _DARK * image[mask].max()
     for place, own in _windows(mask, holes, known, largest_whole):
         shading = np.where(mask[place][..., None], log_shading[place], 0).astype(np.float32)

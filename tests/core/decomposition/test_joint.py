@@ -17,10 +17,11 @@ from isc_core.decomposition.joint import (
 )
 from isc_core.decomposition.mdr import mdr
 from isc_core.decomposition.models import DecompositionTask, Settings
+from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.task import SceneEstimate
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.diagnostics import JointOutcome
+from isc_core.scene.diagnostics import JointOutcome, PhotoColours
 from isc_core.scene.known_inputs import SceneConstraints
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
@@ -68,6 +69,10 @@ def task_of(d: Decomposition) -> DecompositionTask:
     photo = photo_of(d)
     truth = SceneConstraints(d.height.astype(float), light_to_reference(d.illumination))
     return DecompositionTask(photo, photo, Settings(illumination="laboratory"), truth)
+
+
+def without_colours(image: np.ndarray) -> np.ndarray:
+    return np.repeat(image[..., 1:2], 3, axis=2)
 
 
 @pytest.fixture(scope="module")
@@ -147,3 +152,30 @@ def test_what_colour_has_taken_off_is_not_taken_twice() -> None:
     found = detect_residual_highlights(d.image, d.diffuse, d.mask)
     assert found is None
     assert detect_residual_highlights(d.image, d.image, d.mask) is not None
+
+
+def test_what_the_network_takes_off_a_grey_photo_is_grey() -> None:
+    d = grey_ball(20)
+    image = without_colours(d.image)
+    found = detect_residual_highlights(image, image, d.mask)
+    assert found is not None
+    np.testing.assert_array_equal(found.diffuse, without_colours(found.diffuse))
+    assert (found.diffuse[d.mask] < image[d.mask]).any()
+    coloured = detect_residual_highlights(d.image, d.image, d.mask)
+    assert coloured is not None and np.ptp(coloured.diffuse[d.mask], axis=1).any()
+
+
+def test_a_grey_photo_is_explained_without_colours() -> None:
+    """With highlights that the network finds, some of them clipped."""
+    d = grey_ball(20)
+    image = np.minimum(without_colours(d.image), np.float32(0.5))
+    clipped = d.mask & (image[..., 0] >= 0.5)
+    photo = replace(photo_of(d), image=image, clipped=clipped)
+    found = decompose(photo, Settings(threads=1))
+    diagnostics = found.provenance.diagnostics
+    assert clipped.any() and found.specular.any()
+    assert diagnostics.photo_colours == PhotoColours.GREY
+    for name in ("diffuse", "specular", "residual", "shading", "reflectance"):
+        layer = getattr(found, name)
+        np.testing.assert_array_equal(layer, without_colours(layer), err_msg=name)
+    assert not np.ptp(found.illumination, axis=1).any()

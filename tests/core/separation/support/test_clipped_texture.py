@@ -109,3 +109,13 @@ def test_the_answer_repeats_bit_for_bit() -> None:
     photo, smooth, clipped = lit(diffuse, mask)
     one, again = (inpaint_clipped(smooth, photo, clipped, mask, log_shading) for _ in range(2))
     np.testing.assert_array_equal(one, again)
+
+
+def test_the_fill_of_a_grey_photo_is_grey() -> None:
+    """The shading that a network expects differs a little between the channels."""
+    diffuse, log_shading, mask = ball(0.4)
+    diffuse = np.repeat(diffuse[..., :1], 3, axis=2)
+    photo, smooth, clipped = lit(diffuse, mask)
+    found = inpaint_clipped(smooth, photo, clipped, mask, log_shading * [1, 1.1, 0.9])
+    assert (found[clipped] != smooth[clipped]).any()
+    np.testing.assert_array_equal(found, np.repeat(found[..., :1], 3, axis=2))
