@@ -6,9 +6,11 @@ neighbouring pixels cannot.
 Equation: with the log shading S_c of the current normals and light, the predicted mean m_c and the
 deviation s of each of n valid pixels and C channels,
   cost = w/(n C) * sum over pixels and channels of (S_c - m_c - k_c)^2 / (2 s^2).
-Brightness and albedo are ambiguous, so k is free: one constant for white-balanced photos, one for
-each channel where the light may have any colour. At its optimum, the mean of S - m weighted by 1 /
-s^2, the derivative with respect to k is 0, so
+Brightness and albedo are ambiguous, so k is free: one constant for photos, whose predicted shading
+then also tells the light's colour, and one for each channel in the illuminations of the data set.
+Photos have one constant under `--light-colour free`, too: the light may then have any colour, and
+the prediction is what recovers it. At its optimum, the mean of S - m weighted by 1 / s^2, the
+derivative with respect to k is 0, so
   d cost / d S_c = w/(n C) * (S_c - m_c - k_c) / s^2.
 
 Citation: none; the quadratic term of a Gaussian likelihood with unknown constants profiled out.
