@@ -5,7 +5,8 @@ faces (`f`), whose indices begin at 1. The material's roughness `Pr`, metallic `
 `norm` are the extension for physically based materials (R. Mach, exocortex, 2013), which Blender
 and others read; `Ns` and `Ks` are what Blender writes for the same roughness and specular level, .5
 being plastic. Blender reads the normal map from `map_Bump`, which programs that support `norm`
-ignore.
+ignore. It imports that image as sRGB, and the format has no way to say otherwise: users must set
+its colour space to Non-Color.
 
 Citation: M. Ramey et al., "Object files (.obj)", Wavefront Technologies 1995 (no DOI).
 
