@@ -224,7 +224,8 @@ class Settings:
 
     def __post_init__(self) -> None:
         for setting in _RENAMED:
-            current = renamed_value(setting, getattr(self, setting))
+            value = getattr(self, setting)
+            current = renamed_value(setting, value) if isinstance(value, str) else None
             if current is not None:
                 object.__setattr__(self, setting, current)
 
@@ -300,6 +301,12 @@ class Settings:
                 f"--confidence-weights does not apply to {self.model}: "
                 f"use --model {' or '.join(WEIGHTING_MODELS)}"
             )
+        for name, value, example in (
+            ("light colour", self.light_colour, "1,1,0.9"),
+            ("camera", self.camera, "35"),
+        ):
+            if not isinstance(value, str):
+                raise InputError(f"the {name} must be a text such as {example!r}, not {value!r}")
         if self.light_colour not in LIGHT_COLOURS and self.given_light_colour is None:
             raise InputError(
                 f'unknown light colour "{self.light_colour}": choose {", ".join(LIGHT_COLOURS)}, '

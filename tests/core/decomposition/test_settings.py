@@ -38,3 +38,11 @@ def test_unknown_names_are_refused() -> None:
     for changes in ({"light_prior": "bright"}, {"shape_prior": "usual"}, {"illumination": "dusk"}):
         with pytest.raises(InputError, match="unknown"):
             Settings(**changes).check()  # type: ignore[arg-type]
+
+
+def test_numbers_are_given_as_text() -> None:
+    for colour in ((1, 1, 0.9), [1, 1, 0.9]):
+        with pytest.raises(InputError, match="a text such as '1,1,0.9', not .1, 1, 0.9"):
+            Settings(light_colour=colour).check()  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="a text such as '35', not 35"):
+        Settings(camera=35).check()  # type: ignore[arg-type]
