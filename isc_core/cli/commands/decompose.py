@@ -194,6 +194,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.cache is not None and options.cache.exists() and not options.cache.is_dir():
         raise InputError(f"--cache {options.cache} is a file: name a folder")
     prior_set = None if options.priors is None else load_prior_set(options.priors)
+    if options.light is not None:
+        from ...result_files.known_inputs import read_light
+
+        read_light(options.light)  # an unusable file is not a failure of each photo
     marked = bool(marks_of(options))
     if marked and (options.each or len(options.photo) > 1):
         raise InputError(

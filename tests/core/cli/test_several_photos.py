@@ -122,6 +122,15 @@ def test_a_folder_with_results_of_more_objects_is_rejected(
     assert [path.name for path in out.iterdir()] == ["3"]
 
 
+def test_an_unusable_light_is_one_error_before_the_work(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ("decompose", *two_photos(tmp_path), "--light", tmp_path / "none.json")
+    assert isc(*words, "-q", "-o", tmp_path / "out") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "none.json" in line and not (tmp_path / "out").exists()
+
+
 def test_exhausted_memory_or_disk_does_not_stop_the_others() -> None:
     events: list[ProgressEvent] = []
 
