@@ -212,8 +212,8 @@ def add_triangles(group: Group | argparse.ArgumentParser) -> None:
         type=count,
         default=MeshOptions().triangles,
         metavar="N",
-        help="maximum number of triangles of the mesh; finer detail is in the normal map "
-        "(default %(default)s; 0: a vertex at each pixel)",
+        help="maximum number of triangles of the mesh, unless its outline alone needs more; finer "
+        "detail is in the normal map (default %(default)s; 0: a vertex at each pixel)",
     )
 
 

@@ -6,7 +6,8 @@ like the photo in any viewer under the recovered light.
 Geometry: vertices at pixel centres, one cell of two triangles where all pixels of the cell lie
 inside the mask. If that exceeds the requested number of triangles, large triangles replace small
 ones where the surface is smooth (see `triangulation`); the silhouette keeps its pixels. Where the
-silhouette alone has too many, the grid takes every second pixel, every fourth and so on. World axes
+silhouette alone has too many, the grid takes every second pixel, every fourth and so on; an outline
+between the pixels and a closed mesh keep all of theirs, and have more triangles then. World axes
 are those of glTF: +X right, +Y up, +Z toward the viewer, metres; the origin is the centre of the
 bounding box. With a perspective camera, vertices are on the rays of their pixels (see
 `shading.perspective`), and the size of a pixel is that at their mean distance.
@@ -189,8 +190,10 @@ def _outlined(
     `solids`).
     """
     view = VIEW if camera is None else view_directions(camera, (mask.shape[0], mask.shape[1]))
-    seen, sides = view_heights(height, mask, camera), 1 if options.back is Back.OPEN else 2
-    solid = make_solid(seen, normal, mask, rim, view, options.back, options.triangles // sides)
+    seen, budget = view_heights(height, mask, camera), options.triangles
+    if budget and options.back is not Back.OPEN:
+        budget = max(1, budget // 2)
+    solid = make_solid(seen, normal, mask, rim, view, options.back, budget)
     places = vertex_positions(solid.mesh, camera)
     mesh, normals = solid.mesh, solid.normals(places)
     return _Shape(places, normals, mesh.faces, solid.uv(), None, mesh.pixels, solid.detail)

@@ -16,7 +16,8 @@ class MeshOptions:
     metres_per_pixel : float or None
         Replaces `longest_side`.
     triangles : int
-        Largest number of triangles; 0 for a vertex at each pixel.
+        Largest number of triangles, unless a closed mesh, or an outline between the pixels, needs
+        more for its outline; 0 for a vertex at each pixel.
     rim : int
         Rings of border pixels whose height is limited; 0 for none.
     bleed : int

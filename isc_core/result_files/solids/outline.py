@@ -75,7 +75,14 @@ def smooth_cover(cover: np.ndarray) -> np.ndarray:
     return smooth
 
 
-def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget: int) -> Outlined:
+def outlined(
+    smooth: np.ndarray,
+    height: np.ndarray,
+    cosine: np.ndarray,
+    budget: int,
+    *,
+    with_wall: bool = False,
+) -> Outlined:
     """Triangulate the inside of the outline.
 
     Parameters
@@ -85,8 +92,10 @@ def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget:
     height, cosine : (H, W) ndarray
         As for `adaptive_triangles`.
     budget : int
-        Largest number of triangles; 0 for two per cell. Those required by the outline are always
-        made.
+        Largest number of triangles, with those along the outline; 0 for two per cell. Those
+        required by the outline are always made.
+    with_wall : bool
+        Leave one triangle of the budget for each edge of the outline.
 
     Returns
     -------
@@ -108,12 +117,16 @@ def outlined(smooth: np.ndarray, height: np.ndarray, cosine: np.ndarray, budget:
             "the mask has no block of 2 x 2 pixels to build a mesh from: mark a larger region or "
             "use a larger photo"
         )
+    cut = _cut_cells(corners, width, smooth.size)
+    if budget:
+        edges = np.count_nonzero(corners & ~np.roll(corners, 1, axis=0)) if with_wall else 0
+        budget = max(1, budget - len(cut) - edges)
     grid = adaptive_triangles(height, cells, cosine, budget or _ALL)
     if grid is None:  # the outline alone needs more
         grid = adaptive_triangles(height, cells, cosine, 0)
     assert grid is not None
     flat = grid.vertices @ (width, 1)
-    faces = np.concatenate([flat[grid.faces], _cut_cells(corners, width, smooth.size)])
+    faces = np.concatenate([flat[grid.faces], cut])
     used, faces = renumbered(faces)
     inner = int(np.searchsorted(used, smooth.size))
     pixels, places = _positions(used, inner, smooth)

@@ -108,7 +108,8 @@ def make_solid_mesh(
     rim : Rim
     back : Back
     triangles : int
-        Largest number on the visible side, if its outline allows; 0 for two at each pixel.
+        Largest number on the visible side, if its outline allows, and half of the largest number of
+        a closed mesh; 0 for two at each pixel.
 
     Returns
     -------
@@ -124,7 +125,8 @@ def make_solid_mesh(
     inside = smooth > 0.5
     core = inside & ~thin
     known = continued(np.where(mask, height, 0.0).astype(np.float64), mask, inside)
-    sheet = outlined(smooth, known + _STEP * thin, cosine, triangles)
+    wall = back is Back.FLAT  # two triangles at each edge, half of them from the visible side's
+    sheet = outlined(smooth, known + _STEP * thin, cosine, triangles, with_wall=wall)
     # Of a pixel's neighbours around: zero half a pixel beyond the outline on average.
     around = dilated(core, square=True) & ~core
     u = np.maximum(membrane(core, around, np.zeros_like(known), 4.0), 0)

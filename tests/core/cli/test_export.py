@@ -72,10 +72,28 @@ def test_a_mesh_with_a_back_is_closed(result: Path, tmp_path: Path, back: str) -
     assert exported(*given, "--back", back, "-o", path) == 0
     seen, mesh = (trimesh.load(one, force="mesh") for one in (front, path))
     assert mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0
-    assert 2000 < len(mesh.faces) < 6500  # the outline has those that it needs
+    assert 3800 < len(mesh.faces) <= 4000
     np.testing.assert_allclose(mesh.extents[:2], seen.extents[:2], rtol=0.06)
     deepest = 1.6 if back == "rounded" else 1.05
     assert mesh.extents[2] > deepest * seen.extents[2]
+
+
+def test_one_triangle_is_the_least_that_the_outline_allows(result: Path, tmp_path: Path) -> None:
+    faces = []
+    for most in (1, 1000):
+        path = tmp_path / f"ball{most}.glb"
+        given = [result, "--format", "glb", "--back", "rounded", "--triangles", most, "-q"]
+        assert exported(*given, "-o", path) == 0
+        faces.append(len(trimesh.load(path, force="mesh").faces))
+    assert faces[0] == faces[1] < 4000
+
+
+@pytest.mark.parametrize("back", ["open", "rounded", "flat"])
+def test_a_soft_rim_counts_among_the_triangles(fur: Path, tmp_path: Path, back: str) -> None:
+    path = tmp_path / "fur.glb"
+    given = [fur, "--format", "glb", "--back", back, "--triangles", 6000, "-q", "-o", path]
+    assert exported(*given) == 0
+    assert 3000 < len(trimesh.load(path, force="mesh").faces) <= 6000
 
 
 @pytest.mark.parametrize("back", ["open", "rounded"])
