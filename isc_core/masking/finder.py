@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..filters.distance import nearest_pixels
 from ..io.decoders import Raster, read_raster
 from ..io.limits import DEFAULT_LIMITS, Limits
 from ..photo.found_mask import FoundMask
@@ -182,12 +183,34 @@ def photos_of_each_object(
     search = EachObjectSearch()
     photo = photo_from_raster(raster, name, mask, mask_name, transfer=transfer, finder=search)
     if not search.found:
-        photos = [replace(photo, mask=component) for component in connected_components(photo.mask)]
+        photos = _components_of(photo)
     else:
         photos = [_photo_of(photo, one) for one in search.found]
     for number, one in enumerate(photos, 1):
         check_mask(one.mask, f"{name}: the mask of object {number}")
     return photos
+
+
+def _components_of(photo: Photo) -> list[Photo]:
+    """One photo of each component of the mask, with the coverage of that object alone."""
+    components = connected_components(photo.mask)
+    if len(components) == 1:
+        return [replace(photo, mask=components[0])]
+    # With an alpha channel, the colours of its rim are the object's own, which its name says.
+    source = photo.original
+    if source.mask_from != "alpha":
+        source = replace(source, mask_from="each")
+    rows, columns = nearest_pixels(photo.mask)
+    cover = photo.mask.astype(np.float32) if photo.cover is None else photo.cover
+    return [
+        replace(
+            photo,
+            mask=component,
+            original=source,
+            cover=np.where(component[rows, columns], cover, np.float32(0)),
+        )
+        for component in components
+    ]
 
 
 def _photo_of(photo: Photo, found: FoundMask) -> Photo:

@@ -69,7 +69,7 @@ def find_mask(
     if hints.points or hints.background:
         return _with_points(light, hints, network)
     small, scaled = _at_working_size(light, hints)
-    found = _upsampled(_both_passes(small, scaled, network), light.shape)
+    found = _upsampled(_both_passes(small, scaled, network), light.shape, hints.box)
     if hints.box is None or _fills_box(found.mask, hints.box):
         return found
     cover = grabcut(light, hints.box).astype(np.float32)
@@ -91,7 +91,7 @@ def _with_points(light: np.ndarray, hints: Hints, network: MaskNetwork) -> Found
     if not usable or agreement(found.mask, scaled) < 1:
         hinted = _both_passes(small, scaled, network) if hints.points else found
         found = corrected(small, found, hinted, scaled, usable=usable)
-    return _upsampled(found, light.shape)
+    return _upsampled(found, light.shape, hints.box)
 
 
 def _both_passes(small: np.ndarray, hints: Hints, network: MaskNetwork) -> FoundMask:
@@ -162,9 +162,11 @@ def _whole(light: np.ndarray) -> Crop:
     return Crop(0, 0, light.shape[1], light.shape[0])
 
 
-def _upsampled(found: FoundMask, shape: tuple[int, ...]) -> FoundMask:
+def _upsampled(found: FoundMask, shape: tuple[int, ...], box: Box | None = None) -> FoundMask:
+    """At the photo's size, where nothing outside the box belongs to the object."""
     cover = resampled(found.cover, (shape[0], shape[1]))
-    return replace(found, cover=np.clip(cover, 0, 1, out=cover))
+    np.clip(cover, 0, 1, out=cover)
+    return replace(found, cover=cover if box is None else cut_to_box(cover, box))
 
 
 def _second_pass(

@@ -101,9 +101,9 @@ def find_mask(
         If no mask is found.
     """
     looked_for = finder is not None and finder.always
-    if raster.transparency is not None and not looked_for:
-        opaque = raster.transparency >= 0.5
-        if float((~opaque).mean()) >= _LEFT_OUT:
+    if not looked_for:
+        opaque = _opaque(raster)
+        if opaque is not None:
             return opaque, "alpha"
     dark = float(srgb_to_linear(BLACK))
     border = _brightest(np.concatenate([linear[0], linear[-1], linear[:, 0], linear[:, -1]]))
@@ -138,6 +138,14 @@ def find_mask(
     return tidy_mask(bright), "black border"
 
 
+def _opaque(raster: Raster) -> np.ndarray | None:
+    """Where the alpha channel is at least .5; None without a channel that leaves something out."""
+    if raster.transparency is None:
+        return None
+    opaque = raster.transparency >= 0.5
+    return opaque if float((~opaque).mean()) >= _LEFT_OUT else None
+
+
 def _brightest(values: np.ndarray) -> np.ndarray:
     """The largest channel of each pixel, 0 where that is not finite."""
     return finite_or_zero(largest(values))
@@ -156,10 +164,10 @@ def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
     Returns
     -------
     (H, W) float32 ndarray or None
-        0 to 1: the alpha channel, else the values over that of most of the object. None where all
-        are practically 0 or 1, or where most of the background is not 0.
+        0 to 1: the alpha channel if it leaves something out, else the values over that of most of
+        the object. None where all are practically 0 or 1, or where most of the background is not 0.
     """
-    alpha = raster.transparency
+    alpha = None if _opaque(raster) is None else raster.transparency
     values = largest(raster.values) if alpha is None else alpha
     full = 1.0 if alpha is not None else float(np.median(finite_or_zero(values[mask])))
 
@@ -208,8 +216,8 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
     Returns
     -------
     (H, W) bool ndarray
-        Where the alpha channel is at least 0.5; without one, where the values are above half of the
-        largest.
+        Where the alpha channel is at least 0.5; without one that leaves something out, where the
+        values are above half of the largest.
 
     Raises
     ------
@@ -222,8 +230,9 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
             f"{name}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: use a "
             "mask of the photo's size"
         )
-    if raster.transparency is not None:
-        return raster.transparency >= 0.5
+    opaque = _opaque(raster)
+    if opaque is not None:
+        return opaque
     values = _brightest(raster.values)
     # Half of the largest value, not of the format's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)

@@ -161,6 +161,10 @@ def test_each_object_is_decomposed(tmp_path: Path, capsys: pytest.CaptureFixture
         for name in ("1", "2")
     ]
     assert boxes[0][0] < boxes[1][0] and boxes[0][2] < truth.shape[1] / 2
+    left, right = (mask_in(tmp_path / "out" / name / "mask.png") for name in ("1", "2"))
+    assert not (left & right).any() and np.array_equal(left | right, truth)
+    edit = ("edit", tmp_path / "out" / "1", "gloss", "--gain", "0.5", "--photo", path)
+    assert isc(*edit, "-o", tmp_path / "edit") == 0, "an edit finds the mask in the result"
 
 
 @pytest.mark.slow

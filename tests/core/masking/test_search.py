@@ -52,6 +52,16 @@ def test_the_mask_is_the_same_on_any_number_of_threads() -> None:
     assert covers[0] == covers[1]
 
 
+@pytest.mark.parametrize("points", [(), ((900, 590),)])
+def test_nothing_outside_the_box_belongs_to_the_object(points: tuple[tuple[int, int], ...]) -> None:
+    light, _ = balls(((880, 600, 300),), (1200, 1700))
+    left, top, width, height = box = (603, 207, 501, 803)  # it cuts the ball
+    inside = np.zeros(light.shape[:2], bool)
+    inside[top : top + height, left : left + width] = True
+    found = find_mask(light, Hints(points=points, box=box))
+    assert found.mask.any() and not found.cover[~inside].any()
+
+
 def test_points_select_an_object() -> None:
     light, (left, right) = balls(TWO)
     for point, other, truth in (((50, 80), (150, 75), left), ((150, 75), (50, 80), right)):
@@ -124,7 +134,7 @@ def test_each_component_of_a_given_mask_becomes_a_photo(tmp_path: Path) -> None:
     photos = read_each_object(path, tmp_path / "mask.png")
     assert len(photos) == 2
     for photo, truth in zip(photos, truths, strict=True):
-        assert np.array_equal(photo.mask, truth) and photo.original.mask_from == "file"
+        assert np.array_equal(photo.mask, truth) and photo.original.mask_from == "each"
 
 
 def test_specks_are_not_components() -> None:

@@ -566,6 +566,22 @@ def _image(values: np.ndarray) -> Image.Image:
     return Image.fromarray(values)
 
 
+@pytest.mark.parametrize("alpha", [255, 254, "a stray row"])
+def test_an_alpha_channel_that_leaves_nothing_out_is_no_mask(
+    tmp_path: Path, alpha: int | str
+) -> None:
+    codes = np.where(object_mask(), 255, 0).astype(np.uint8)
+    opaque = np.full((H, W), 255 if isinstance(alpha, str) else alpha, np.uint8)
+    if isinstance(alpha, str):
+        opaque[0] = 128
+    mask = tmp_path / "mask.png"
+    Image.fromarray(np.dstack([codes, codes, codes, opaque]), "RGBA").save(mask)
+    photo = tmp_path / "photo.png"
+    shade = np.linspace(60, 200, W, dtype=np.uint8)
+    Image.fromarray(np.broadcast_to(shade[:, None], (H, W, 3)).copy()).save(photo)
+    assert np.array_equal(read_photo(photo, mask).mask, object_mask())
+
+
 def test_alpha_comes_before_the_black_border(tmp_path: Path) -> None:
     alpha = np.zeros((H, W), np.uint8)
     alpha[8:30, 10:40] = 127
