@@ -1,10 +1,10 @@
 """The files of an edit: the picture, in the photo's own encoding, and a contact sheet.
 
-`edit.json` records the parameters and measurements; `edited.png` has the photo's bit depth,
-encoding, colour profile and alpha (none for a photo of floats; 16-bit sRGB where a PNG cannot
-represent the encoding, such as camera raw); `edited.exr` is the same picture in linear light,
-premultiplied by alpha; `before_after.png` is the contact sheet; `clusters.png`, of recolouring,
-shows the clusters to choose from. A folder appears completely or not at all.
+`edit.json` records the parameters and measurements; `edited.png` has the photo's bit depth (16 for
+9 to 15), encoding, colour profile and alpha (none for a photo of floats; 16-bit sRGB where a PNG
+cannot represent the encoding, such as camera raw); `edited.exr` is the same picture in linear
+light, premultiplied by alpha; `before_after.png` is the contact sheet; `clusters.png`, of
+recolouring, shows the clusters to choose from. A folder appears completely or not at all.
 
 Limits: pixels outside the mask of a float photo with partly transparent pixels are bit-identical
 only if its file is an EXR with plain R, G, B; else they are rounded by the product with alpha.

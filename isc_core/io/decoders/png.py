@@ -102,13 +102,14 @@ def _with_alpha(codes: np.ndarray, transparent: bytes) -> np.ndarray:
 
 
 def write_png(path: Path, raster: Raster) -> None:
-    """Write integer codes and their alpha as a PNG of 8 or 16 bits, unchanged, with their profile.
+    """Write integer codes and their alpha as a PNG of 8 or 16 bits, with their profile.
 
     Parameters
     ----------
     path : Path
     raster : Raster
-        Of integer codes.
+        Of integer codes. They are written unchanged, or, where their peak is not the largest code
+        of a PNG, scaled to it.
 
     Raises
     ------
@@ -117,8 +118,12 @@ def write_png(path: Path, raster: Raster) -> None:
     """
     assert raster.peak is not None, "floats have no codes"
     kind, planes = raster.values.dtype, raster.values
+    largest = int(np.iinfo(kind).max)
+    if raster.peak != largest:
+        scaled = np.rint(np.arange(raster.peak + 1) * (largest / raster.peak))
+        planes = scaled.astype(kind)[planes]
     if raster.alpha is not None:
-        alpha = np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)
+        alpha = np.rint(raster.alpha * float(largest)).astype(kind)
         planes = np.dstack([as_rgb(planes), alpha])
     written = encode_png(planes, compression=1)
     if raster.space is not None and raster.space.profile:

@@ -11,6 +11,7 @@ from PIL import Image
 
 from isc_core.errors import InputError
 from isc_core.io.decoders import read_raster
+from isc_core.io.decoders.png import write_png
 from isc_core.io.png import SIGNATURE, decode_png, encode_png, png_chunk
 
 CHANNELS = {0: 1, 2: 3, 4: 2, 6: 4}
@@ -187,3 +188,14 @@ def test_a_png_is_decoded_as_it_was_encoded(shape: tuple[int, ...]) -> None:
     np.testing.assert_array_equal(decode_png(encode_png(codes)), codes)
     with pytest.raises(ValueError, match="another kind"):
         decode_png(encode_png(codes.astype(np.uint16)))
+
+
+@pytest.mark.parametrize("peak", [1000, 1023, 4095])
+def test_codes_of_a_smaller_peak_are_scaled_to_that_of_a_png(tmp_path: Path, peak: int) -> None:
+    stored = (samples(12, 9, 3) % (peak + 1)).astype(">u2")
+    stored[0, 0], stored[0, 1] = 0, peak
+    (tmp_path / "a.ppm").write_bytes(b"P6 9 12 %d\n" % peak + stored.tobytes())
+    write_png(tmp_path / "a.png", read_raster(tmp_path / "a.ppm"))
+    written = read_raster(tmp_path / "a.png")
+    assert (written.values[0, :2] == [[0] * 3, [65535] * 3]).all()
+    assert np.abs(written.values / 65535 - stored / peak).max() < 1e-5
