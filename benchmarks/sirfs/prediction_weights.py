@@ -20,7 +20,6 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 
@@ -42,7 +41,7 @@ from isc_core.shading.spherical_harmonics import (
 )
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.settings import PredictionWeights
-from training.world.files import HELD_OUT_OF
+from training.world.files import half_of
 from training.world.recipes import LightKind
 
 from .ways import Predictions, with_way
@@ -131,23 +130,6 @@ def lit_bodies(
         if mask.sum() > _LEAST_PIXELS:
             made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
     return made
-
-
-def half_of(name: str) -> int:
-    """Return the half of the held-out bodies that a body belongs to.
-
-    Parameters
-    ----------
-    name : str
-        Of the body. What precedes its last "-" is common to the parts of one piece of furniture.
-
-    Returns
-    -------
-    int
-        0 or 1.
-    """
-    whole = name.rpartition("-")[0] or name
-    return crc32(whole.encode()) // HELD_OUT_OF % 2
 
 
 def errors_of(

@@ -1,7 +1,6 @@
 """Halves of the held-out bodies, on which weights are chosen and reported."""
 
-from benchmarks.sirfs.prediction_weights import half_of
-from training.world.files import Split, split_of
+from training.world.files import Split, half_of, split_of
 
 
 def test_halves_of_held_out_bodies_are_about_equal() -> None:

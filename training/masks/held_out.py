@@ -25,7 +25,7 @@ from ..networks.scene_batches import read_world
 from ..tabletops.pictures import read_pictures
 from ..world.backgrounds import panoramas_in
 from ..world.camera import BLOCK
-from ..world.files import Split
+from ..world.files import Split, half_of
 from .composites import CompositeDraws, Composites, as_photographed, draw_cameras
 from .difficulty import SIMPLE, Difficulty
 from .ingredients import cut_out, lit_cutouts
@@ -85,10 +85,10 @@ def held_out_ingredients(
     if photos is not None:
         cutouts = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
     else:
-        found.views[Split.UNSEEN_BODY][:] = found.views[Split.UNSEEN_BODY][half::2]
-        cutouts = list(
-            lit_cutouts(found, Split.UNSEEN_BODY, found.held_out_environments, rng, _CUTOUT_SIDE)
-        )
+        views = found.views[Split.UNSEEN_BODY]
+        views[:] = [view for view in views if half_of(view.name) == half]
+        light = found.held_out_environments[half::2]
+        cutouts = list(lit_cutouts(found, Split.UNSEEN_BODY, light, rng, _CUTOUT_SIDE))
     kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
     return Ingredients(np.stack(cutouts), kept, found.atlas.maps)
 

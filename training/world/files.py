@@ -29,7 +29,7 @@ from ..archives import open_archive
 from .patterns import Atlas
 from .views import DIRECTIONS, SIDE, View
 
-FORMAT = 2
+FORMAT = 3  # 2: flat faces beside bevels had the normals of cushions
 SETTINGS, VIEWS, CREDITS = "world.json", "views", "CREDITS.txt"
 PATTERNS, PATTERN_COUNT = "patterns.npz", 1500
 HELD_OUT_OF = 8
@@ -66,6 +66,23 @@ class WorldSettings:
     def as_json(self) -> dict[str, int]:
         """Return the settings with the format, as `world.json` holds them."""
         return {"format": FORMAT, **self.__dict__}
+
+
+def half_of(name: str) -> int:
+    """Return the half of the held-out bodies that a body belongs to.
+
+    Parameters
+    ----------
+    name : str
+        Of the body. What precedes its last "-" is common to the parts of one piece of furniture.
+
+    Returns
+    -------
+    int
+        0 or 1.
+    """
+    whole = name.rpartition("-")[0] or name
+    return crc32(whole.encode()) // HELD_OUT_OF % 2
 
 
 def split_of(name: str) -> Split:

@@ -90,6 +90,22 @@ def test_a_cube_keeps_its_edges_and_a_ball_is_smooth() -> None:
     assert (np.einsum("ij,ij->i", sphere.normals, sphere.vertices) > 0.999).all()
 
 
+def test_a_bevel_does_not_bend_the_flat_face_beside_it() -> None:
+    """A strip of 2 x 2, bent down by 90 degrees in three facets of .03 at either side."""
+    turns = np.radians([15, 45, 75])
+    steps = 0.03 * np.stack([np.cos(turns), -np.sin(turns)], 1)
+    right = np.concatenate([[[1.0, 0.0]], [1.0, 0.0] + np.cumsum(steps, axis=0)])
+    profile = np.concatenate([right[::-1] * (-1, 1), right])
+    rows = [np.insert(profile, 1, y, axis=1) for y in (-1.0, 1.0)]
+    vertices, n = np.concatenate(rows), len(profile)
+    k = np.arange(n - 1)
+    faces = np.concatenate([np.stack([k, k + 1, n + k], 1), np.stack([k + 1, n + k + 1, n + k], 1)])
+    mesh = creased(Surface(vertices, faces))
+    flat = np.abs(np.abs(mesh.vertices[:, 0]) - 1) < 1e-9
+    off = np.degrees(np.arccos(np.abs(mesh.normals[flat, 2])))
+    assert flat.sum() == 4 and off.max() < 1
+
+
 def test_welding_merges_vertices_and_drops_triangles_without_area() -> None:
     corners = CUBE.corners().reshape(-1, 3)
     faces = np.arange(len(corners)).reshape(-1, 3)

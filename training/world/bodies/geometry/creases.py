@@ -2,7 +2,9 @@
 
 Equation: two faces are smooth together where they share an edge and their normals meet at less than
 CREASE. Corners at a vertex that are connected by such edges are one vertex of the mesh; its normal
-comes from its faces alone (`synth.scene.meshes.vertex_normals`).
+is that of its faces alone, weighted by their areas. With the weights of
+`synth.scene.meshes.vertex_normals`, the many small triangles of a bevel would bend the flat face
+beside it.
 
 Limits: at the end of a crease, inside a surface, the corners on both sides are connected around the
 end, so the normal there is smooth.
@@ -12,7 +14,7 @@ import numpy as np
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from synth.scene.meshes import Mesh, vertex_normals
+from synth.scene.meshes import Mesh
 
 from .edges import shared_edges
 from .surface import Surface
@@ -36,7 +38,7 @@ def creased(surface: Surface, crease: float = CREASE) -> Mesh:
         The same faces in the same order; its `uv` are zeros.
     """
     edges, count = shared_edges(surface.faces), len(surface.faces)
-    normals = _face_normals(surface)
+    normals = _normalised(_areas(surface))
     f, g = edges.faces.T
     cosine = np.einsum("ij,ij->i", normals[f], normals[g])
     smooth = edges.opposite & (cosine > np.cos(np.radians(crease)))
@@ -51,11 +53,17 @@ def creased(surface: Surface, crease: float = CREASE) -> Mesh:
     _, where, number = np.unique(corner, return_index=True, return_inverse=True)
     vertices = surface.vertices[surface.faces.ravel()[where]]
     faces = number.reshape(-1, 3)
-    return Mesh(vertices, vertex_normals(vertices, faces), np.zeros((len(vertices), 2)), faces)
+    sums = np.zeros_like(vertices)
+    np.add.at(sums, faces.ravel(), np.repeat(_areas(surface), 3, axis=0))
+    return Mesh(vertices, _normalised(sums), np.zeros((len(vertices), 2)), faces)
 
 
-def _face_normals(surface: Surface) -> np.ndarray:
+def _areas(surface: Surface) -> np.ndarray:
+    """Normals (F, 3) of the faces, as long as twice their area."""
     a, b, c = np.moveaxis(surface.corners(), 1, 0)
-    normals = np.cross(b - a, c - a)
-    length = np.linalg.norm(normals, axis=-1, keepdims=True)
-    return normals / np.where(length > 0, length, 1)
+    return np.cross(b - a, c - a)
+
+
+def _normalised(vectors: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.where(length > 0, vectors / np.where(length > 0, length, 1), (0.0, 0.0, 1.0))
