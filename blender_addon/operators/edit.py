@@ -21,7 +21,7 @@ from ..materials.photo_highlights import can_show_highlights, hide_highlights, s
 from ..runs.messages import sentence
 from ..scene.built_object import BuiltObject, find_built, selection_problem
 from ..scene.copies import find_material, make_material_single_user
-from ..scene.sun import ensure_sun, relight
+from ..scene.sun import ensure_sun, hide_lamps, relight
 from ..scene.world import set_sun_mix
 from .live_edits import write_edits
 
@@ -404,6 +404,7 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
             raise InputError("the direction is zero: enter another")
         ensure_sun(obj[KEY], built.collection, direction / length, self.strength * irradiance)
         set_sun_mix(built.world, self.ambient * ambient, True)
+        hide_lamps(obj[KEY], True)
 
 
 def dichromatic_inputs(built: BuiltObject) -> Any:

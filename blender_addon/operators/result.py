@@ -3,6 +3,7 @@
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -329,7 +330,9 @@ def scene_before(scene: Any) -> Any:
 
 
 def _panel_request(scene: Any) -> DecomposeRequest:
-    return DecomposeRequest(build=build_options(scene.isc, ""), scene=scene.name_full)
+    # a folder holds one result, whatever the panel would do with a photo
+    build = replace(build_options(scene.isc, ""), each=False)
+    return DecomposeRequest(build=build, scene=scene.name_full)
 
 
 def _store_settings(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:

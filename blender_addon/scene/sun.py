@@ -130,10 +130,7 @@ def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
         )
     direction, strength, ambient = (np.array(value, float) for value in values)
     set_sun_mix(find_tagged(bpy.data.worlds, key, "world"), ambient, sun)
-    for role in _LAMPS:
-        lamp = find_tagged(bpy.data.objects, key, role)
-        if lamp is not None:  # the sun lights highlights itself
-            lamp.hide_render = lamp.hide_viewport = sun
+    hide_lamps(key, sun)
     if not sun:
         remove_sun(key)
         return None
@@ -141,6 +138,21 @@ def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
         iter(obj.users_collection), bpy.context.scene.collection
     )
     return ensure_sun(key, collection, direction, strength)
+
+
+def hide_lamps(key: str, hidden: bool) -> None:
+    """Hide or show the lamps that light highlights alone; the sun lights highlights itself.
+
+    Parameters
+    ----------
+    key : str
+        The photo's.
+    hidden : bool
+    """
+    for role in _LAMPS:
+        lamp = find_tagged(bpy.data.objects, key, role)
+        if lamp is not None:
+            lamp.hide_render = lamp.hide_viewport = hidden
 
 
 def remove_sun(key: str) -> None:

@@ -429,6 +429,7 @@ def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
 def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path) -> None:
     scene = addon.context.scene
     scene.isc.own_scene = False
+    scene.isc.each = True  # of photos; a folder is one result
     world, camera = scene.world, scene.camera
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
     built = find_built(addon.context.object)

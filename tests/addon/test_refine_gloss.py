@@ -60,6 +60,9 @@ def test_a_refined_object_has_lamps_and_the_message_says_so(addon: Any) -> None:
     assert len(lamps) == 1 and lamps[0].type == "LIGHT"
     obj = addon.context.object
     assert stored_request(obj, addon.context.scene, 64).method.refine, "Update refines again"
+    for light, hidden in (("OPTIMAL", True), ("RECOVERED", False)):
+        assert addon.ops.isc.relight(light=light) == {"FINISHED"}
+        assert lamps[0].hide_render == hidden, "the sun lights highlights itself"
 
 
 @pytest.mark.slow
