@@ -21,7 +21,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum, StrEnum
 from pathlib import Path
-from zlib import crc32
 
 import numpy as np
 import torch
@@ -33,7 +32,7 @@ from isc_core.errors import InputError
 from training.world.bodies.body import Source
 from training.world.camera import CameraDraw
 from training.world.environments import read_panoramas
-from training.world.files import Split, views_in
+from training.world.files import Split, half_of, views_in
 from training.world.lit_pictures import LitPictures, make_pictures
 from training.world.patterns.atlas import Atlas
 from training.world.patterns.canvas import FINER, averaged
@@ -200,7 +199,7 @@ def part_of(name: str, split: Split) -> Part | None:
         return Part.TRAINING
     if split != Split.UNSEEN_BODY:
         return None
-    return Part.TEST if crc32(name.encode()) // 8 % 2 else Part.VALIDATION
+    return Part.TEST if half_of(name) else Part.VALIDATION
 
 
 def _scene(

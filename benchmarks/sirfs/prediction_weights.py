@@ -114,10 +114,12 @@ def lit_bodies(
     if light is not None:
         shares = replace(shares, lights=tuple(float(kind.name == light) for kind in LightKind))
     bodies = [one for one in found.views[Split.UNSEEN_BODY] if half in (None, half_of(one.name))]
-    rng, made, store = np.random.default_rng(seed), list[Lit](), ViewStore(bodies)
+    rng, made, store = np.random.default_rng(seed), dict[str, Lit](), ViewStore(bodies)
     for k in rng.permutation(len(bodies)):
         if len(made) == count:
             break
+        if (name := bodies[k].name) in made:  # from another side
+            continue
         draw = draw_batch(
             bodies, np.array([k]), 1, found.atlas, found.held_out_environments, rng, shares
         )
@@ -128,8 +130,8 @@ def lit_bodies(
             for part in (sample.photo, sample.ratio, sample.normal, sample.log_shading)
         )
         if mask.sum() > _LEAST_PIXELS:
-            made.append(Lit(photo, photo * np.exp(-ratio), mask, normal, shading))
-    return made
+            made[name] = Lit(photo, photo * np.exp(-ratio), mask, normal, shading)
+    return list(made.values())
 
 
 def errors_of(

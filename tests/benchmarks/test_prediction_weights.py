@@ -1,5 +1,14 @@
-"""Halves of the held-out bodies, on which weights are chosen and reported."""
+"""Halves of the held-out bodies, on which weights are chosen and reported, and their photos."""
 
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("torch")
+
+from benchmarks.sirfs.prediction_weights import lit_bodies
+from tests.training.masks.test_held_out import HELD_OUT, world_folder
+from training.networks import scene_batches
 from training.world.files import Split, half_of, split_of
 
 
@@ -16,3 +25,13 @@ def test_parts_of_one_piece_of_furniture_lie_in_one_half() -> None:
         for k in "abcdefgh"
     ]
     assert all(len(halves) == 1 for halves in parts) and set.union(*parts) == {0, 1}
+
+
+@pytest.mark.slow
+def test_each_body_is_photographed_from_one_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scene_batches, "_PROCEDURAL", 0)
+    world = world_folder(tmp_path, HELD_OUT[:3], 6)
+    photos = lit_bodies(world, tmp_path / "hdri", 6, 0)
+    assert len(photos) == 3

@@ -4,8 +4,8 @@ Problem: thresholds and errors of the mask network need photos with known masks,
 backgrounds that no training run has used.
 
 The objects and panoramas that every training run leaves out are halved: part A is for choosing
-thresholds, part B is the test set. Masked photos of real objects, or photographs of cut-out things,
-can replace the rendered objects.
+thresholds, part B is the test set. No object or panorama, as background or as light, is in both.
+Masked photos of real objects, or photographs of cut-out things, can replace the rendered objects.
 
 Limits: objects are rendered at 160 pixels and panoramas have 512 columns: both are blurred.
 """
@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from torch.nn.functional import pad
 
+from isc_core.errors import InputError
 from isc_core.networks.mask_network import Count
 from isc_core.photo import read_photo
 
@@ -81,15 +82,21 @@ def held_out_ingredients(
     """
     half, rng = PARTS.index(part), np.random.default_rng([seed, 11, PARTS.index(part)])
     torch.manual_seed(seed)
+    kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
+    if not len(kept):
+        raise InputError(
+            f"{panoramas} has too few panoramas to hold one out for part {part}: twelve are enough"
+        )
     found = read_world([world], panoramas, (Split.UNSEEN_BODY,), seed)
     if photos is not None:
         cutouts = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
     else:
-        views = found.views[Split.UNSEEN_BODY]
-        views[:] = [view for view in views if half_of(view.name) == half]
-        light = found.held_out_environments[half::2]
+        bodies = found.views[Split.UNSEEN_BODY]
+        bodies[:] = [one for one in bodies if half_of(one.name) == half]
+        if not bodies:
+            raise InputError(f"{world} has no held-out bodies for part {part}: build more bodies")
+        light = found.held_out_environments[half::2]  # in the order of `kept`
         cutouts = list(lit_cutouts(found, Split.UNSEEN_BODY, light, rng, _CUTOUT_SIDE))
-    kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
     return Ingredients(np.stack(cutouts), kept, found.atlas.maps)
 
 

@@ -6,7 +6,8 @@
     DIR/CREDITS.txt           authors and licences of all bodies with views
 
 Splits: all views of a reference lie in one split. `UNSEEN_SOURCE` has sources that are not used for
-training, `UNSEEN_BODY` one in eight references of the others, chosen by a hash of the name.
+training, `UNSEEN_BODY` one in eight references of the others, chosen by a hash of the name. Where
+choices and reports need different bodies, `half_of` divides the held-out ones by another hash.
 
 Limits: views of another format are refused, not converted.
 """
@@ -100,6 +101,23 @@ def split_of(name: str) -> Split:
     if name.startswith(HELD_OUT_SOURCES):
         return Split.UNSEEN_SOURCE
     return Split.UNSEEN_BODY if crc32(name.encode()) % HELD_OUT_OF == 0 else Split.TRAIN
+
+
+def half_of(name: str) -> int:
+    """Return the half of the held-out bodies that a body belongs to.
+
+    Parameters
+    ----------
+    name : str
+        Of the body. What precedes its last "-" is common to the parts of one piece of furniture.
+
+    Returns
+    -------
+    int
+        0 or 1.
+    """
+    whole = name.rpartition("-")[0] or name
+    return crc32(whole.encode()) // HELD_OUT_OF % 2
 
 
 def claim_folder(folder: Path, settings: WorldSettings) -> None:

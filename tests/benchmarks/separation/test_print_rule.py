@@ -57,3 +57,9 @@ def test_no_body_is_fitted_that_a_network_has_learned_from() -> None:
     assert part_of("furniture/x/0500", Split.TRAIN) is None
     held = {part_of(f"furniture/{k}", Split.UNSEEN_BODY) for k in range(40)}
     assert held == {Part.VALIDATION, Part.TEST}
+
+
+def test_parts_of_one_piece_of_furniture_are_in_one_set() -> None:
+    for piece in range(8):
+        names = [f"furniture/{piece}-{k}" for k in range(12)]
+        assert len({part_of(name, Split.UNSEEN_BODY) for name in names}) == 1
