@@ -69,23 +69,6 @@ class WorldSettings:
         return {"format": FORMAT, **self.__dict__}
 
 
-def half_of(name: str) -> int:
-    """Return the half of the held-out bodies that a body belongs to.
-
-    Parameters
-    ----------
-    name : str
-        Of the body. What precedes its last "-" is common to the parts of one piece of furniture.
-
-    Returns
-    -------
-    int
-        0 or 1.
-    """
-    whole = name.rpartition("-")[0] or name
-    return crc32(whole.encode()) // HELD_OUT_OF % 2
-
-
 def split_of(name: str) -> Split:
     """Return the set of a reference.
 
