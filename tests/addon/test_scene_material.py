@@ -12,6 +12,7 @@ from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.addon.scene_render import pixels, render
+from tests.angles import degrees_between
 
 SOCKETS = {
     "Base Color",
@@ -186,7 +187,7 @@ def test_the_highlight_moves_with_a_lamp(
         layers = render(built.scene, tmp_path, samples=16)
         centre = highlight_centre(layers["Glossy Direct"] * layers["Glossy Color"], result.mask)
         half = (toward + view) / np.linalg.norm(toward + view)
-        angles.append(np.degrees(np.arccos(result.normal[centre] @ half)))
+        angles.append(degrees_between(result.normal[centre], half))
     assert max(angles) < 4
 
 

@@ -17,6 +17,7 @@ from isc_core.scene.diagnostics import LobeFitOutcome, LobeStatus, WarningKind
 from isc_core.separation import separate
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
+from tests.angles import degrees_between
 from tests.core.ball_scene import ball
 
 TO_LIGHT = np.array([-0.42, 0.5, 0.757])
@@ -80,7 +81,7 @@ def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     assert brdf.determined, brdf.outcome
     assert brdf.alpha == pytest.approx(0.15, rel=0.5)
     assert brdf.direction is not None
-    assert np.degrees(np.arccos(brdf.direction @ TO_LIGHT)) < 5
+    assert degrees_between(brdf.direction, TO_LIGHT) < 5
     assert brdf.model.startswith("ggx" if model == "mdr" else "blinn_phong")
 
 

@@ -24,6 +24,7 @@ from isc_core.shading.environment_map import directions, solid_angles
 from isc_core.shading.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
 from isc_core.shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
 from isc_core.shading.spherical_harmonics import real_sh
+from tests.angles import degrees_between
 from tests.core.ball_scene import LIGHT, ball
 
 
@@ -482,7 +483,7 @@ def test_a_new_highlight_has_the_direction_of_its_light_and_keeps_the_energy(
         luminance(scene.specular).sum(), rel=1e-4
     )
     found = explain_specular(replace(scene, specular=edit.specular))
-    assert np.rad2deg(np.arccos(found.light.direction @ light.direction)) < 1
+    assert degrees_between(found.light.direction, light.direction) < 1
     assert found.exponent == pytest.approx(60, rel=0.05)
     added = add_highlight(scene, light, level=0.5)
     assert (added.specular >= scene.specular).all()

@@ -14,6 +14,7 @@ from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import directions
 from isc_core.shading.lights import DirectionalLight, turn, turned_light
 from isc_core.shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
+from tests.angles import degrees_between
 from tests.core.perspective_scene import bump_before_camera
 
 LIGHT = DirectionalLight(np.array([-0.35, 0.35, 0.87]) / np.linalg.norm([-0.35, 0.35, 0.87]))
@@ -29,7 +30,7 @@ def angle_of_peak(d: Decomposition, layer: np.ndarray) -> float:
     level = np.where(d.mask, layer.sum(-1), 0)
     weight = np.where(level > 0.8 * level.max(), level, 0)[..., None]
     mean = (weight * mirrored(d)).sum((0, 1))
-    return float(np.degrees(np.arccos(mean @ LIGHT.direction / np.linalg.norm(mean))))
+    return float(degrees_between(mean, LIGHT.direction))
 
 
 def test_a_new_highlight_mirrors_its_light_to_the_camera() -> None:
@@ -45,7 +46,7 @@ def test_the_light_of_a_specular_layer_is_found_before_the_camera() -> None:
     seen = add_highlight(d, LIGHT, Lobe(100.0)).specular
     fit = explain_specular(replace(d, specular=seen))
     assert fit.determined
-    assert np.degrees(np.arccos(fit.light.direction @ LIGHT.direction)) < 4
+    assert degrees_between(fit.light.direction, LIGHT.direction) < 4
 
 
 def test_a_lobe_mirrors_the_environment_for_the_perspective_camera() -> None:

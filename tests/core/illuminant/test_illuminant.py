@@ -13,6 +13,7 @@ from isc_core.illuminant.illuminant import (
     tinted,
     whitened,
 )
+from tests.angles import degrees_between
 
 LIGHT = np.array([1.15, 1.0, 0.85])
 ALBEDOS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])
@@ -32,13 +33,7 @@ def ball(
 
 
 def angle(colour: np.ndarray, other: np.ndarray) -> float:
-    return float(
-        np.degrees(
-            np.arccos(
-                np.clip(colour @ other / np.linalg.norm(colour) / np.linalg.norm(other), -1, 1)
-            )
-        )
-    )
+    return float(degrees_between(colour, other))
 
 
 @pytest.mark.parametrize("light", [np.ones(3), LIGHT, LIGHT[::-1], np.array([0.9, 1.2, 0.9])])

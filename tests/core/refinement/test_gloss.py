@@ -20,6 +20,7 @@ from isc_core.shading.brdf.ggx import F0
 from isc_core.shading.lights import DirectionalLight
 from isc_core.shading.lobe_rendering import Lobe, lobe_under
 from isc_core.shading.spherical_harmonics import real_sh
+from tests.angles import degrees_between
 
 LIGHT = np.zeros((9, 3))
 LIGHT[0], LIGHT[1], LIGHT[2] = -1.0, 0.6, 0.9
@@ -129,8 +130,7 @@ def test_the_highlight_comes_to_lie_where_the_photo_shows_it() -> None:
     true = start.specular[start.mask]
     error = np.square(d.brdf.predicted[d.mask] - true).sum() / np.square(true).sum()
     assert error < 0.1
-    turn = np.degrees(np.arccos(d.brdf.direction @ LAMP))
-    assert turn < np.degrees(np.arccos(TURNED @ LAMP))
+    assert degrees_between(d.brdf.direction, LAMP) < degrees_between(TURNED, LAMP)
     assert 1 / 1.3 < d.brdf.alpha / ALPHA < 1.3  # type: ignore[operator]
     assert gloss_line(d.provenance.settings).startswith("gloss refined: 1 lamp explains")
     with pytest.raises(InputError, match="refined already"):

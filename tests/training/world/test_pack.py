@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip("torch")
 
 from isc_core.errors import InputError
+from tests.angles import degrees_between
 from tests.training.world.analytic_views import ellipsoid_view
 from tests.training.world.test_environments import photo, write
 from training.networks.scene_batches import read_world
@@ -52,11 +53,6 @@ ATLAS = Atlas(
 WORLD = PackedWorld({Split.TRAIN: VIEWS[:2], Split.UNSEEN_BODY: VIEWS[2:]}, PANORAMAS, ATLAS)
 
 
-def unit(vectors: np.ndarray) -> np.ndarray:
-    long = vectors.astype(float)
-    return np.asarray(long / (np.linalg.norm(long, axis=1, keepdims=True) + 1e-9))
-
-
 @pytest.fixture
 def pack(tmp_path: Path) -> Path:
     path = tmp_path / "world.isw"
@@ -73,7 +69,7 @@ def test_a_pack_gives_back_its_world(pack: Path) -> None:
         assert (seen.name, seen.source, seen.distance) == (view.name, view.source, view.distance)
         for exact in ("mask", "visible", "directions"):
             np.testing.assert_array_equal(getattr(seen, exact), getattr(view, exact))
-        assert np.degrees(np.arccos((unit(seen.normal) * unit(view.normal)).sum(1))).max() < 1
+        assert degrees_between(seen.normal, view.normal).max() < 1
         assert np.abs(seen.depth.astype(float) - view.depth).max() < 0.002
         assert np.abs(seen.thickness.astype(float) - view.thickness).max() < 0.012
     for seen_light, light in zip(found.panoramas, PANORAMAS, strict=True):
