@@ -11,6 +11,8 @@ Citation: B. Efron, "Bootstrap methods: another look at the jackknife", Annals o
 Limits: with few objects the interval is too narrow.
 """
 
+from collections.abc import Hashable, Iterator, Sequence
+
 import numpy as np
 
 
@@ -34,6 +36,39 @@ def bootstrap_samples(
     """
     rng = rng or np.random.default_rng(0)
     return values[rng.integers(len(values), size=(count, len(values)))]
+
+
+def cluster_samples(
+    values: np.ndarray,
+    clusters: Sequence[Hashable],
+    rng: np.random.Generator | None = None,
+    count: int = 2000,
+) -> Iterator[np.ndarray]:
+    """Draw sets of clusters with replacement: photos of one scene are not independent.
+
+    Parameters
+    ----------
+    values : (N, ...) ndarray
+        One row per photo.
+    clusters : sequence of N hashable objects
+        The scene of each photo.
+    rng : Generator, optional
+        By default one of seed 0.
+    count : int, optional
+        Number of sets.
+
+    Yields
+    ------
+    (M, ...) ndarray
+        The photos of the drawn clusters; M differs where clusters differ in size.
+    """
+    members = dict[Hashable, list[int]]()
+    for row, cluster in enumerate(clusters):
+        members.setdefault(cluster, []).append(row)
+    rows = [np.array(one) for one in members.values()]
+    rng = rng or np.random.default_rng(0)
+    for drawn in rng.integers(len(rows), size=(count, len(rows))):
+        yield values[np.concatenate([rows[k] for k in drawn])]
 
 
 def interval(figures: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

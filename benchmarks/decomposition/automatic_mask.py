@@ -29,7 +29,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from benchmarks.bootstrap import bootstrap_samples, interval
+from benchmarks.bootstrap import cluster_samples, interval
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.masking.confidence import mask_overlap
@@ -144,9 +144,11 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     for name, found in rows:
         overlap = np.array([one.overlap for one in found])
         kept = np.array([one.accepted for one in found])
-        pairs = [_with_interval(overlap, q) for q in (0.5, 0.1)]
+        scenes = _scenes(found)
+        pairs = [_with_interval(overlap, scenes, q) for q in (0.5, 0.1)]
         accepted = " / ".join(f"{np.quantile(overlap[kept], q):.3f}" for q in (0.5, 0.1))
-        refused = f"{_share(~kept)} | {_share(~kept[overlap >= _RIGHT])}"
+        right = overlap >= _RIGHT
+        refused = f"{_share(~kept, scenes)} | {_share(~kept[right], scenes[right])}"
         lines.append(
             f"| {name} | {len(found)} | {pairs[0]} | {pairs[1]} | {accepted} | {refused} |"
         )
@@ -161,7 +163,10 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     simple = [one for name in others if name not in apart for one in groups[name]]
     whole.append(("no single object, in focus", simple))
     for name, found in whole:
-        shares = [_share([getattr(one, key) for one in found]) for key in ("accepted", "harmful")]
+        shares = [
+            _share(np.array([getattr(one, key) for one in found]), _scenes(found))
+            for key in ("accepted", "harmful")
+        ]
         lines.append(f"| {name} | {len(found)} | {shares[0]} | {shares[1]} |")
         figures[name] = {"confidence": [round(one.found.confidence, 4) for one in found]}
     seconds = np.median([one.seconds for found in groups.values() for one in found])
@@ -169,14 +174,24 @@ def report(groups: dict[str, list[MaskScore]]) -> tuple[str, dict[str, object]]:
     return "\n".join(lines), figures
 
 
-def _with_interval(values: np.ndarray, quantile: float) -> str:
-    low, high = interval(np.quantile(bootstrap_samples(values), quantile, axis=1))
+def _scenes(found: list[MaskScore]) -> np.ndarray:
+    """A number (N,) for each photo, equal for photos of one scene."""
+    names = [one.photo.scene or f"photo {k}" for k, one in enumerate(found)]
+    return np.unique(names, return_inverse=True)[1]
+
+
+def _with_interval(values: np.ndarray, scenes: np.ndarray, quantile: float) -> str:
+    figures = [np.quantile(drawn, quantile) for drawn in cluster_samples(values, scenes.tolist())]
+    low, high = interval(np.array(figures))
     return f"{np.quantile(values, quantile):.3f} ({low:.2f}-{high:.2f})"
 
 
-def _share(chosen: np.ndarray | list[bool]) -> str:
-    values = np.asarray(chosen, float)
-    low, high = interval(bootstrap_samples(values).mean(axis=1))
+def _share(chosen: np.ndarray, scenes: np.ndarray) -> str:
+    values = chosen.astype(float)
+    if not len(values):
+        return "-"
+    figures = [drawn.mean() for drawn in cluster_samples(values, scenes.tolist())]
+    low, high = interval(np.array(figures))
     return f"{values.mean():.1%} ({low:.0%}-{high:.0%})"
 
 

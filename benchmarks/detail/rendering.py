@@ -20,6 +20,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial.transform import Rotation
 
+from isc_core.shading.environment_map import mean_radiance
 from synth.scene.meshes import Mesh
 from synth.scene.tracing import Hits, Tracer
 from training.world.patterns.canvas import filtered_noise
@@ -205,9 +206,10 @@ def _with_print(
 
 def _room(radiance: np.ndarray, lamps: bool, rng: np.random.Generator) -> Room:
     """Surroundings of grey mean 1, as a camera's white balance shows them, turned, and lamps."""
-    balanced = radiance / radiance.mean(axis=(0, 1))
-    angles = (rng.uniform(0, 360), rng.normal(0, 8), rng.normal(0, 4))
-    turn = Rotation.from_euler("yxz", angles, degrees=True).as_matrix()
+    balanced = radiance / mean_radiance(radiance)
+    yaw, pitch, roll = rng.uniform(0, 360), rng.normal(0, 8), rng.normal(0, 4)
+    # from the camera's frame to the room's, whose horizon stays level but for the roll
+    turn = Rotation.from_euler("zxy", (roll, pitch, yaw), degrees=True).as_matrix()
     made = []
     for _ in range(int(rng.integers(1, 3)) if lamps else 0):
         aside, up = rng.uniform(-70, 70), rng.uniform(-5, 65)

@@ -29,6 +29,7 @@ from scipy.spatial.transform import Rotation
 from torch.nn import functional
 
 from isc_core.errors import InputError
+from isc_core.shading.environment_map import mean_radiance
 from training.world.bodies.body import Source
 from training.world.camera import CameraDraw
 from training.world.environments import read_panoramas
@@ -162,7 +163,7 @@ def print_scenes(
 
 def _balanced(radiance: np.ndarray) -> np.ndarray:
     """A room of grey mean, as a camera's white balance shows it."""
-    mean = radiance.mean(axis=(0, 1))
+    mean = mean_radiance(radiance)
     return np.asarray(radiance * (mean.mean() / mean))
 
 

@@ -85,6 +85,21 @@ def solid_angles(rows: int) -> np.ndarray:
     ).copy()
 
 
+def mean_radiance(radiance: np.ndarray) -> np.ndarray:
+    """Compute the mean over all directions: a row near a pole counts less than one at the horizon.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, C) ndarray
+
+    Returns
+    -------
+    (C,) ndarray
+    """
+    weights = solid_angles(len(radiance))
+    return np.asarray(np.einsum("hw,hwc->c", weights, radiance) / (4 * np.pi))
+
+
 def shading_under(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Compute the shading of unshadowed Lambertian surfaces in an environment.
 

@@ -24,6 +24,7 @@ from isc_core.photo import read_linear
 from isc_core.shading.environment_map import (
     directions,
     environment_from_shading,
+    mean_radiance,
     resampled,
     solid_angles,
 )
@@ -126,7 +127,7 @@ def read_panorama(path: Path) -> np.ndarray:
             "twice as wide as high"
         )
     radiance = resampled(picture, _FINE if height >= _FINE else _COARSE)
-    mean = float((radiance.mean(-1) * solid_angles(len(radiance))).sum() / (4 * np.pi))
+    mean = float(mean_radiance(radiance).mean())
     if not mean > 0:
         raise InputError(f"{path} is black: it contains no light")
     return np.asarray(radiance / mean, np.float32)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from isc_core.shading.spherical_harmonics import reference_basis
 
@@ -43,6 +44,17 @@ def test_a_uniform_panorama_of_one_colour_lights_a_ball_evenly_in_it() -> None:
     np.testing.assert_allclose(colour_on_a_ball(radiance, turn), wanted, rtol=1e-6)
     picture, gain = camera_picture(radiance, turn, rng)
     np.testing.assert_allclose(picture, np.minimum(gain * LIGHT, 1) * np.ones_like(picture))
+
+
+def test_a_rolled_panorama_is_one_seen_after_a_turn_about_the_vertical() -> None:
+    """At every column, the seam behind the middle included; a pole is no seam."""
+    radiance = 1e-3 * np.random.default_rng(3).uniform(size=(16, 32, 3))
+    first, _ = camera_picture(radiance, np.eye(3), np.random.default_rng(4))
+    for columns in (5, 16):
+        turn = Rotation.from_euler("y", -360 * columns / 32, degrees=True).as_matrix()
+        rolled = np.roll(radiance, columns, axis=1)
+        again, _ = camera_picture(rolled, turn, np.random.default_rng(4))
+        np.testing.assert_allclose(again, first, rtol=1e-9)
 
 
 def test_a_photo_s_light_is_the_panorama_s_in_the_reference_s_convention() -> None:

@@ -51,11 +51,14 @@ class HeldOut:
     cover : (H, W) float32 ndarray
         Coverage by the target; by all objects if there are several.
     count : Count
+    scene : str
+        Equal for photos of the same objects; empty if there is one photo of them.
     """
 
     light: np.ndarray
     cover: np.ndarray
     count: Count
+    scene: str = ""
 
 
 def held_out_ingredients(
@@ -212,7 +215,7 @@ def held_out_tabletops(folder: Path, seed: int) -> Iterator[HeldOut]:
         light, frame = (pad(one, (0, -columns % BLOCK, 0, -rows % BLOCK)) for one in (light, frame))
         photo = as_photographed(light, frame, draw_cameras(rng, 1), light)
         whole = photo[0, :, :rows, :columns].permute(1, 2, 0).numpy()
-        yield HeldOut(whole, picture.cover, picture.count)
+        yield HeldOut(whole, picture.cover, picture.count, picture.scene)
 
 
 def composites_of_targets(

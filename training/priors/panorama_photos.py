@@ -129,12 +129,14 @@ def camera_picture(
     look = np.stack([right, up, -np.ones_like(right)], axis=-1)
     look = look / np.linalg.norm(look, axis=-1, keepdims=True) @ turn.T
     rows = len(radiance)
+    row = np.arccos(np.clip(look[..., 1], -1, 1)) * rows / np.pi - 0.5
     place = (
-        np.arccos(np.clip(look[..., 1], -1, 1)) * rows / np.pi - 0.5,
+        np.clip(row, 0, rows - 1),  # nothing lies beyond a pole
         np.arctan2(look[..., 0], -look[..., 2]) * rows / np.pi - 0.5,
     )
+    channels = [radiance[..., c] for c in range(3)]
     picture = np.stack(
-        [ndimage.map_coordinates(radiance[..., c], place, order=1, mode="wrap") for c in range(3)],
+        [ndimage.map_coordinates(one, place, order=1, mode="grid-wrap") for one in channels],
         axis=-1,
     )
     mean = float((np.minimum(picture, 20 * np.median(picture)) @ _LUMINANCE).mean())

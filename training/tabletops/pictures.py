@@ -48,10 +48,13 @@ class TabletopPicture:
         255 sqrt(light / 2), light of white 1.
     covers : (H, W, N) uint8 ndarray
         Coverage by each of the objects in front, 255 for all of a pixel; N may be 0.
+    scene : str
+        Name of the file: its pictures show the same objects from elsewhere.
     """
 
     codes: np.ndarray
     covers: np.ndarray
+    scene: str = ""
 
     @property
     def light(self) -> np.ndarray:
@@ -268,7 +271,7 @@ def read_pictures(folder: Path) -> Iterator[TabletopPicture]:
     for path in paths:
         with open_archive(path, "a file of pictures", "delete it and render again") as arrays:
             found = [
-                TabletopPicture(arrays[f"codes_{k}"], arrays[f"covers_{k}"])
+                TabletopPicture(arrays[f"codes_{k}"], arrays[f"covers_{k}"], path.stem)
                 for k in range(int(arrays["number"]))
             ]
         yield from found

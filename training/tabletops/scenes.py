@@ -21,6 +21,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.networks.mask_network import Count
+from isc_core.shading.environment_map import mean_radiance
 from synth.scene.meshes import Mesh, write_ply
 from synth.scene.variant import load_mitsuba
 
@@ -132,7 +133,7 @@ class TabletopScenes:
         turn = mi.ScalarTransform4f().rotate([0, 1, 0], float(rng.uniform(0, 360)))
         panoramas = self._sources.panoramas
         panorama = panoramas[int(rng.integers(len(panoramas)))].astype(np.float32)
-        bitmap = mi.Bitmap(panorama / panorama.mean())
+        bitmap = mi.Bitmap(panorama / mean_radiance(panorama).mean())
         return {"type": "envmap", "bitmap": bitmap, "to_world": turn}
 
     def _mesh(self, rng: np.random.Generator) -> Mesh:

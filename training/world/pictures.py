@@ -17,6 +17,8 @@ import numpy as np
 import torch
 from torch.nn import functional
 
+from isc_core.shading.environment_map import mean_radiance
+
 from .environments import smoothed_levels
 from .lighting import Lights, LitViews, Material, light_coefficients, light_views
 from .patterns import Atlas
@@ -61,10 +63,8 @@ def bank_of(environments: Sequence[np.ndarray], atlas: Atlas) -> Bank:
         On the CPU.
     """
     widths = (*ALPHAS, _WIDE)
-    levels = [
-        np.asarray(smoothed_levels(one / max(float(one.mean()), 1e-9), widths), np.float32)
-        for one in environments
-    ]
+    unit = (one / max(float(mean_radiance(one).mean()), 1e-9) for one in environments)
+    levels = [np.asarray(smoothed_levels(one, widths), np.float32) for one in unit]
     maps = torch.from_numpy(np.stack(levels)).permute(0, 1, 4, 2, 3).contiguous()
     return Bank(maps, torch.from_numpy(atlas.maps[:, None]).float() / 255)
 

@@ -214,10 +214,15 @@ def draw_recipe(
     parts: dict[str, Any] = {
         **_paint(atlas, kind, rng, shares),
         **_gloss(kind, rng, shares),
-        **_light(directions, up / max(np.linalg.norm(up), 1e-9), light, rng, shares),
+        **_light(_units(directions * stretch), _units(up), light, rng, shares),
     }
     environment = int(rng.choice(environments))
     return Recipe(kind=int(kind), environment=environment, stretch=stretch, **parts)
+
+
+def _units(vectors: np.ndarray) -> np.ndarray:
+    """Divide by lengths; a vector 0 stays."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-9))
 
 
 def _stretch(rng: np.random.Generator, shares: Shares) -> np.ndarray:

@@ -8,6 +8,7 @@ import pytest
 from isc_core.shading.environment_map import (
     directions,
     environment_from_shading,
+    mean_radiance,
     recovered_environment,
     resampled,
     shading_under,
@@ -106,3 +107,10 @@ def test_resampling_to_the_same_rows_changes_nothing_and_to_more_can_be_undone()
     np.testing.assert_allclose(resampled(env_map, 6), env_map, rtol=1e-12)
     np.testing.assert_allclose(resampled(resampled(env_map, 18), 6), env_map, rtol=1e-12)
     assert resampled(env_map.astype(np.float32), 3).dtype == np.float32
+
+
+def test_a_mean_radiance_is_over_directions() -> None:
+    """A polar cap of 60 degrees is a quarter of the sphere and a third of the rows."""
+    sky = np.zeros((48, 96, 3))
+    sky[:16] = (4, 8, 12)
+    np.testing.assert_allclose(mean_radiance(sky), (1, 2, 3))

@@ -113,6 +113,17 @@ def test_bodies_on_a_table_are_lit_from_above_it() -> None:
     assert not any(one.standing or one.table.any() for one in drawn(6, Shares()))
 
 
+def test_lamps_are_above_the_table_of_a_stretched_body() -> None:
+    up = np.array([0.1, 0.8, 0.5]) / np.linalg.norm([0.1, 0.8, 0.5])
+    for one in drawn(8, Shares(stretch=0.6), 200, tuple(up)):
+        if one.standing:
+            lamps = DIRECTIONS[one.lamp] * one.stretch
+            table = up / one.stretch
+            height = lamps @ table / np.linalg.norm(lamps, axis=1) / np.linalg.norm(table)
+            assert (height > 0).all()
+            np.testing.assert_allclose(one.table_light, height @ one.power)
+
+
 def test_a_table_shows_what_falls_on_it() -> None:
     up = (0.0, 0.8, 0.6)
     recipes = [one for one in drawn(7, Shares(), 60, up) if one.standing][:6]
