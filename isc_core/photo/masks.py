@@ -1,6 +1,7 @@
 """Finding the object's mask in a photo, and checking it."""
 
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 
@@ -19,6 +20,8 @@ BLACK = 2.0 / 255.0
 _LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
 _CHUNK = 1 << 16  # pixels compared at a time
 _HARD = 0.02  # of the largest value: lossy files differ from 0 and 1 by as much
+
+WholeFrame = bool | Literal["always"]  # whether all pixels may be used, or are
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
@@ -70,7 +73,7 @@ def find_mask(
     name: str,
     raster: Raster,
     linear: np.ndarray,
-    whole_frame: bool,
+    whole_frame: WholeFrame,
     finder: MaskFinder | None = None,
 ) -> tuple[np.ndarray | FoundMask, str]:
     """Find the object's mask in the photo itself, and name its source.
@@ -83,9 +86,9 @@ def find_mask(
         Of the photo.
     linear : (H, W, 1 or 3) ndarray
         Its linear light.
-    whole_frame : bool
+    whole_frame : bool or "always"
         Use all pixels where there is no alpha channel and no black border, and the finder's
-        confidence is too low.
+        confidence is too low; or in any case.
     finder : MaskFinder, optional
         Finds the object where there is no alpha channel and no black border.
 
@@ -100,8 +103,9 @@ def find_mask(
     InputError
         If no mask is found.
     """
+    always_whole = whole_frame == "always"
     looked_for = finder is not None and finder.always
-    if not looked_for:
+    if not (looked_for or always_whole):
         opaque = _opaque(raster)
         if opaque is not None:
             return opaque, "alpha"
@@ -114,6 +118,8 @@ def find_mask(
         raise InputError(
             f"{name}: the image is black: there is nothing to recover; use another photo"
         )
+    if always_whole:
+        return np.ones(linear.shape[:2], bool), "whole frame"
     # A float file has no peak value: use its 99th percentile as white.
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
     if finder is not None and finder.always:

@@ -23,7 +23,7 @@ from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import estimate_foreground
 from .found_mask import FoundMask, MaskFinder
-from .masks import check_mask, find_mask, mask_of, soft_cover
+from .masks import WholeFrame, check_mask, find_mask, mask_of, soft_cover
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
 from .soft_rim import soft_rim
@@ -40,7 +40,7 @@ def read_photo(
     mask_path: str | Path | None = None,
     transfer: str = "auto",
     *,
-    whole_frame: bool = False,
+    whole_frame: WholeFrame = False,
     limits: Limits = DEFAULT_LIMITS,
     finder: MaskFinder | None = None,
 ) -> Photo:
@@ -61,8 +61,9 @@ def read_photo(
     mask_path : str or Path, optional
     transfer : {"auto", "srgb", "linear"}
         "auto": the curve that the file states; without one, floats are linear, all others sRGB.
-    whole_frame : bool
-        Use all pixels where there is no mask, alpha channel or black border.
+    whole_frame : bool or "always"
+        Use all pixels where there is no mask, alpha channel or black border; or, without a mask, in
+        any case.
     limits : Limits
         Checked with the header, before the file is decoded.
     finder : MaskFinder, optional
@@ -98,7 +99,7 @@ def photo_from_raster(
     mask_name: str = "",
     *,
     transfer: str = "auto",
-    whole_frame: bool = False,
+    whole_frame: WholeFrame = False,
     finder: MaskFinder | None = None,
 ) -> Photo:
     """Make a photo of decoded files.
@@ -114,7 +115,7 @@ def photo_from_raster(
     mask_name : str
         Prefix of the error messages about it.
     transfer : {"auto", "srgb", "linear"}
-    whole_frame : bool
+    whole_frame : bool or "always"
     finder : MaskFinder, optional
         As for `read_photo`.
 
@@ -142,7 +143,7 @@ def _photo(
     mask_raster: Raster | None,
     mask_name: str,
     transfer: str,
-    whole_frame: bool,
+    whole_frame: WholeFrame,
     finder: MaskFinder | None,
 ) -> Photo:
     used = resolve_transfer(transfer, raster)

@@ -60,7 +60,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     add_mask(main)
     add_hints(main)
     main.add_argument(
-        "--whole", action="store_true", help="process the whole photo; do not search for an object"
+        "--whole",
+        action="store_true",
+        help="process the whole photo, without a search for an object, with its transparent pixels "
+        "and its black border",
     )
     main.add_argument(
         "--method",
@@ -117,11 +120,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises
     ------
     InputError
-        If --prior is given for a method other than `BEST`.
+        If --whole is given with a selection of the object, or --prior for a method other than
+        `BEST`.
     """
     given = hints_of(options)
-    if given and options.whole:
-        raise InputError("--whole processes the whole photo: leave out --box, --point and --not")
+    if options.whole and (given or options.mask is not None):
+        raise InputError(
+            "--whole processes the whole photo: leave out --mask, --box, --point and --not"
+        )
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior requires --method {BEST}: use it, or leave --prior out")
@@ -134,9 +140,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
             file,
             options.mask,
             options.transfer,
-            whole_frame=True,
+            whole_frame="always" if options.whole else True,
             limits=limits,
-            finder=None if options.whole else MaskSearch(given, lenient=True),
+            finder=MaskSearch(given, lenient=True),
         )
     prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits)
     monitor.report(f"separating ({options.method})", 0.1)

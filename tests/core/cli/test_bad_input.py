@@ -323,6 +323,7 @@ OPTIONS = [
     (("separate", "PHOTO", "-o", "OUT"), ("--method", "guess"), "shen_2013"),
     (("separate", "PHOTO", "-o", "OUT"), ("--prior", "nothing.png"), "no such file"),
     (("separate", "PHOTO", "-o", "OUT"), ("--prior",), "--prior"),
+    (("separate", "PHOTO", "-o", "OUT", "--mask", "PHOTO"), ("--whole",), "leave out --mask"),
     (
         ("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"),
         (),

@@ -13,6 +13,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from isc_core import __version__
 from isc_core.cli.commands import build_parser
@@ -22,7 +23,7 @@ from isc_core.cli.main import main
 from isc_core.datasets.mit_berkeley import load_object
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.runner import RunnerOptions, make_runner
-from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.numerics.kernel_library import shipped_library
 from isc_core.photo import read_photo
@@ -475,6 +476,23 @@ def test_separate_uses_the_whole_frame_without_a_mask(
     assert isc("separate", photo, "--whole", "--method", "none", "-o", tmp_path / "out") == 0
     assert "note: no mask: the whole image was processed" in capfd.readouterr().out
     assert read_channels(tmp_path / "out" / "separation.exr")["diffuse.G"].min() > 0
+
+
+@pytest.mark.parametrize("kind", ["alpha", "black border"])
+def test_whole_ignores_alpha_and_a_black_border(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], kind: str
+) -> None:
+    codes = (ball_codes() // 257).astype(np.uint8)
+    if kind == "alpha":
+        alpha = np.where(codes.max(-1) > 0, 255, 0).astype(np.uint8)
+        codes = np.dstack([codes // 2 + 30, alpha])
+    photo, out = tmp_path / "photo.png", tmp_path / "out"
+    Image.fromarray(codes).save(photo)
+    assert isc("separate", photo, "--whole", "--method", "none", "-o", out) == 0
+    assert "the whole image was processed" in capfd.readouterr().out
+    diffuse = read_channels(out / "separation.exr")["diffuse.G"]
+    light = srgb_to_linear(codes[..., 1] / 255)
+    assert np.allclose(diffuse, light, atol=1e-3)
 
 
 def test_mask_finds_the_ball_in_its_box(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
