@@ -104,6 +104,8 @@ def decompose(
     settings.check()
     _check_used(settings, inputs, prior_set)
     _check_marks(settings, photo)
+    if photo.problem:
+        raise InputError(photo.problem)
     if _is_black(photo):
         raise InputError(
             "the photo is black inside the mask: there is nothing to recover; use another photo"

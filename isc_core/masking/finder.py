@@ -19,7 +19,7 @@ from ..io.limits import DEFAULT_LIMITS, Limits
 from ..photo.found_mask import FoundMask
 from ..photo.masks import MIN_MASK_PIXELS, check_mask
 from ..photo.photo import Photo
-from ..photo.reading import photo_from_raster
+from ..photo.reading import constant_problem, photo_from_raster
 from .components import connected_components
 from .hints import Hints
 
@@ -142,7 +142,7 @@ def read_each_object(
     Returns
     -------
     list of Photo
-        One for each object, from left to right.
+        One for each object, from left to right. One that cannot be decomposed has a `problem`.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def photos_of_each_object(
     Returns
     -------
     list of Photo
-        From left to right.
+        From left to right. One that cannot be decomposed has a `problem`.
 
     Raises
     ------
@@ -188,7 +188,10 @@ def photos_of_each_object(
         photos = [_photo_of(photo, one) for one in search.found]
     for number, one in enumerate(photos, 1):
         check_mask(one.mask, f"{name}: the mask of object {number}")
-    return photos
+    inside = f"{name}: every pixel inside the mask"
+    return [
+        replace(one, problem=constant_problem(raster.values, inside, one.mask)) for one in photos
+    ]
 
 
 def _components_of(photo: Photo) -> list[Photo]:

@@ -86,6 +86,8 @@ class Photo:
         Coverage of the file's pixels by the object; None where all are 0 or 1, as in `mask`.
     marks : HighlightMarks
         Highlights and paint marked by the user.
+    problem : str
+        Why the object, one of several in a photo, cannot be decomposed; "" if it can.
     """
 
     image: np.ndarray
@@ -99,6 +101,7 @@ class Photo:
     found: FoundMask | None = None
     cover: np.ndarray | None = None
     marks: HighlightMarks = field(default_factory=HighlightMarks)
+    problem: str = ""
 
     @property
     def box(self) -> tuple[int, int, int, int]:

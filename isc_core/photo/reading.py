@@ -257,6 +257,27 @@ def read_linear(
 
 
 def _check_not_constant(values: np.ndarray, what: str, mask: np.ndarray | None = None) -> None:
+    if problem := constant_problem(values, what, mask):
+        raise InputError(problem)
+
+
+def constant_problem(values: np.ndarray, what: str, mask: np.ndarray | None = None) -> str:
+    """Say what is wrong with an image, or a part of it, that has one colour.
+
+    Parameters
+    ----------
+    values : (H, W, C) ndarray
+        Stored values.
+    what : str
+        Prefix of the message.
+    mask : (H, W) bool ndarray, optional
+        The part; by default all of it.
+
+    Returns
+    -------
+    str
+        The message; "" if there are several colours.
+    """
     first = None
     for block in row_blocks(values.shape, pixels=_CHUNK):
         part = values[block.rows] if mask is None else values[block.rows][mask[block.rows]]
@@ -264,9 +285,9 @@ def _check_not_constant(values: np.ndarray, what: str, mask: np.ndarray | None =
         if first is None and len(part):
             first = part[0]
         if len(part) and (part != first).any():  # in most photos, already in the first block
-            return
+            return ""
     black = first is None or not first.any()
-    raise InputError(
+    return (
         f"{what} is {'black' if black else 'the same'}: there is nothing to recover; use another "
         "photo"
     )

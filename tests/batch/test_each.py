@@ -97,6 +97,27 @@ def test_an_object_that_fails_stops_no_other(shelf: Path, tmp_path: Path) -> Non
     assert run_batch(given) == Counter({DONE: 1, SKIPPED: 1})
 
 
+def test_an_object_of_one_colour_fails_as_it_does_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ball = ball_codes(12.0)
+    disc = np.where(ball.max(-1, keepdims=True) > 0, 30000, 0) * np.ones(3, int)
+    photo = write_image(tmp_path / "shelf.png", np.hstack([disc.astype("uint16"), ball]))
+    alone = write_image(tmp_path / "alone.png", disc.astype("uint16"))
+    words = ["--model", "retinex", "--engine", "numpy", "-q"]
+    assert main(["decompose", str(alone), "-o", str(tmp_path / "alone"), *words]) == 2
+    reason = "every pixel inside the mask is the same: there is nothing to recover"
+    assert reason in capsys.readouterr().err
+    out = tmp_path / "out"
+    assert main(["decompose", str(photo), "--each", "-o", str(out), *words]) == 1
+    assert f"object 1 of 2: {photo}: {reason}" in capsys.readouterr().err
+    assert [path.name for path in out.iterdir()] == ["2"]
+    given = batch(photo, output=tmp_path / "batch", recipe=EACH)
+    assert run_batch(given) == Counter({FAILED: 1, DONE: 1})
+    (failure,) = rows(tmp_path / "batch" / "failures.jsonl")
+    assert failure["name"] == "shelf/1" and reason in str(failure["reason"])
+
+
 def test_results_of_objects_that_are_no_longer_there_go(shelf: Path, out: Path) -> None:
     given = batch(shelf / "shelf.png", output=out, recipe=EACH)
     write_image(shelf / "shelf.png", ball_codes(12.0))
