@@ -105,7 +105,7 @@ def _one(file: Path, given: Hints, options: argparse.Namespace) -> list[str]:
     photo = read_photo(file, None, options.transfer, limits=limits, finder=finder)
     line = _write(photo, options.output)
     if options.overlay is not None:
-        write_mask_overlay(options.overlay, photo.image, photo.mask)
+        write_mask_overlay(options.overlay, photo)
     return [line]
 
 

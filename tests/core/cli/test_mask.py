@@ -66,6 +66,20 @@ def test_a_large_photo_has_a_small_overlay() -> None:
     assert abs(picture.shape[1] - 171) <= 1
 
 
+@pytest.mark.parametrize("exposure", [0.01, 1.0, 50.0])
+def test_the_overlay_of_a_float_photo_shows_it_at_any_exposure(
+    tmp_path: Path, exposure: float
+) -> None:
+    light, _ = balls(ONE)
+    np.save(tmp_path / "photo.npy", exposure * light)
+    files = ("-o", tmp_path / "mask.png", "--overlay", tmp_path / "overlay.png")
+    assert isc("mask", tmp_path / "photo.npy", "--auto", *files) == 0
+    inside = mask_in(tmp_path / "mask.png")
+    shown = np.asarray(Image.open(tmp_path / "overlay.png"))[inside].max(-1)
+    assert np.percentile(shown, 99) > 230 and np.percentile(shown, 50) < 200
+    assert np.ptp(np.percentile(shown, (5, 95))) > 90
+
+
 def test_each_object_gets_a_mask(tmp_path: Path) -> None:
     path, truth = photo(tmp_path, TWO)
     assert isc("mask", path, "--each", "-o", tmp_path / "mask.png") == 0
