@@ -106,7 +106,7 @@ def find_mask(
     always_whole = whole_frame == "always"
     looked_for = finder is not None and finder.always
     if not (looked_for or always_whole):
-        opaque = _opaque(raster)
+        opaque = opaque_part(raster)
         if opaque is not None:
             return opaque, "alpha"
     dark = float(srgb_to_linear(BLACK))
@@ -144,8 +144,18 @@ def find_mask(
     return tidy_mask(bright), "black border"
 
 
-def _opaque(raster: Raster) -> np.ndarray | None:
-    """Where the alpha channel is at least .5; None without a channel that leaves something out."""
+def opaque_part(raster: Raster) -> np.ndarray | None:
+    """Return where the alpha channel is at least .5.
+
+    Parameters
+    ----------
+    raster : Raster
+
+    Returns
+    -------
+    (H, W) bool ndarray or None
+        None without a channel that leaves something out.
+    """
     if raster.transparency is None:
         return None
     opaque = raster.transparency >= 0.5
@@ -173,7 +183,7 @@ def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:
         0 to 1: the alpha channel if it leaves something out, else the values over that of most of
         the object. None where all are practically 0 or 1, or where most of the background is not 0.
     """
-    alpha = None if _opaque(raster) is None else raster.transparency
+    alpha = None if opaque_part(raster) is None else raster.transparency
     values = largest(raster.values) if alpha is None else alpha
     full = 1.0 if alpha is not None else float(np.median(finite_or_zero(values[mask])))
 
@@ -236,7 +246,7 @@ def mask_of(raster: Raster, name: str, photo: Raster) -> np.ndarray:
             f"{name}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: use a "
             "mask of the photo's size"
         )
-    opaque = _opaque(raster)
+    opaque = opaque_part(raster)
     if opaque is not None:
         return opaque
     values = _brightest(raster.values)

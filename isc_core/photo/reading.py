@@ -23,7 +23,7 @@ from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import estimate_foreground
 from .found_mask import FoundMask, MaskFinder
-from .masks import WholeFrame, check_mask, find_mask, mask_of, soft_cover
+from .masks import WholeFrame, check_mask, find_mask, mask_of, opaque_part, soft_cover
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
 from .soft_rim import soft_rim
@@ -160,8 +160,9 @@ def _photo(
     cover = None if found is None else found.cover
     if mask_from in ("alpha", "file"):
         cover = soft_cover(raster if mask_raster is None else mask_raster, mask)
-    # Colours of an image with an alpha channel are already those of the object.
-    mixed = found is not None or (mask_from == "file" and _is_soft(cover, mask))
+    mixed = found is not None or (
+        mask_from == "file" and _is_soft(cover, mask) and not _has_soft_alpha(raster)
+    )
     height, width = mask.shape
     lens = raster.focal_length
     cropped = lens is not None and lens.cropped
@@ -192,6 +193,12 @@ def _photo(
         exposed=raster.peak is not None,
         camera=None if lens is None or cropped else Camera.of_frame(lens.pixels, (width, height)),
     )
+
+
+def _has_soft_alpha(raster: Raster) -> bool:
+    """Whether the colours of the object's rim are already its own, without the background's."""
+    opaque = opaque_part(raster)
+    return opaque is not None and soft_cover(raster, opaque) is not None
 
 
 def _is_soft(cover: np.ndarray | None, mask: np.ndarray) -> bool:

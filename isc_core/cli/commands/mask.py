@@ -123,7 +123,7 @@ def _each(file: Path, options: argparse.Namespace) -> list[str]:
 
 def _write(photo: Photo, path: Path) -> str:
     """Write the mask of a photo; return the line to print."""
-    write_mask(path, photo.mask if photo.found is None else photo.found.cover)
+    write_mask(path, photo.mask if photo.cover is None else photo.cover)
     pixels, source = int(photo.mask.sum()), photo.original
     if source.confidence is None:
         found = _SOURCES[source.mask_from]

@@ -9,6 +9,7 @@ from PIL import Image
 
 from isc_core.cli.main import main
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.photo import read_photo
 from isc_core.photo.mask_overlay import mask_overlay
 from tests.core.command_line import write_image
 from tests.core.masking.ball_photos import ONE, TWO, balls, overlap
@@ -64,6 +65,27 @@ def test_a_large_photo_has_a_small_overlay() -> None:
     picture = mask_overlay(np.full((900, 600, 3), 0.5, np.float32), mask)
     assert picture.shape[0] == 256 and picture.dtype == np.uint8
     assert abs(picture.shape[1] - 171) <= 1
+
+
+def soft_alpha(folder: Path) -> tuple[Path, np.ndarray]:
+    """A photo of noise with a disc that fades out over many pixels, and its alpha channel."""
+    row, column = np.indices((120, 120)) - 60
+    alpha = np.rint(255 * np.clip(0.5 - (np.hypot(row, column) - 40) / 20, 0, 1)).astype(np.uint8)
+    colour = np.random.default_rng(0).integers(90, 160, (120, 120, 3)).astype(np.uint8)
+    colour[alpha == 0] = 0
+    Image.fromarray(np.dstack([colour, alpha])).save(folder / "soft.png")
+    return folder / "soft.png", alpha
+
+
+def test_the_mask_of_an_alpha_channel_is_as_soft_as_that(tmp_path: Path) -> None:
+    path, alpha = soft_alpha(tmp_path)
+    mask = tmp_path / "mask.png"
+    assert isc("mask", path, "--auto", "-o", mask) == 0
+    assert np.array_equal(np.asarray(Image.open(mask)), alpha)
+    own, given = read_photo(path), read_photo(path, mask)
+    assert own.cover is not None and given.cover is not None
+    assert np.allclose(given.cover, own.cover)
+    assert np.array_equal(given.image, own.image), "the colours are the object's own"
 
 
 @pytest.mark.parametrize("exposure", [0.01, 1.0, 50.0])
