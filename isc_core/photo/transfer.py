@@ -159,8 +159,9 @@ def encode_like(
     Raster
     """
     coloured = bool((np.ptp(image[changed], axis=-1) > 0).any())
-    if raster.peak is not None and not _fits_png(raster, transfer, coloured):
-        raster, transfer = _as_srgb(raster, transfer), "srgb"
+    if raster.peak is not None:
+        channels = 3 if coloured or raster.alpha is not None else raster.values.shape[2]
+        raster, transfer = _for_png(raster, transfer, channels)
     values = raster.values
     if values.shape[2] == 1 and coloured:
         values = as_rgb(values)
@@ -174,14 +175,20 @@ def encode_like(
     return replace(raster, values=result)
 
 
-def _fits_png(raster: Raster, transfer: str, coloured: bool) -> bool:
-    """Whether a PNG can represent the codes: with their own profile, or as plain sRGB."""
+def _for_png(raster: Raster, transfer: str, channels: int) -> tuple[Raster, str]:
+    """The raster in a space that a PNG of so many channels can represent, with its own profile or
+    as sRGB, and its curve.
+    """
     space = raster.space
-    if space is None or (to_rec709(space) is None and transfer == _curve_of(space) == "srgb"):
-        return True
-    return (
-        bool(space.profile) and not space.is_table and (raster.values.shape[2] == 3 or not coloured)
-    )
+    if space is None:
+        return raster, transfer
+    # A PNG may have a grey profile for grey pixels only, and one of RGB for the others only.
+    fits = space.profile[16:20] == (b"RGB " if channels == 3 else b"GRAY")
+    if to_rec709(space) is None and transfer == _curve_of(space) == "srgb":
+        return (raster if fits else replace(raster, space=None)), transfer
+    if fits and not space.is_table and raster.values.shape[2] == channels:
+        return raster, transfer
+    return _as_srgb(raster, transfer), "srgb"
 
 
 def _as_srgb(raster: Raster, transfer: str) -> Raster:

@@ -351,6 +351,32 @@ def test_an_edit_of_a_table_of_colours_is_srgb(tmp_path: Path) -> None:
     assert off(read_linear(tmp_path / "b.png"), expected).max() < 0.05
 
 
+@pytest.mark.parametrize("curve", ["gamma", "srgb"])
+@pytest.mark.parametrize("kind", ["grey", "grey and alpha", "grey in colour"])
+def test_an_edit_of_a_grey_photo_has_no_grey_profile_in_colour(
+    tmp_path: Path, curve: str, kind: str
+) -> None:
+    """PNG permits a grey profile for grey pixels alone, and no other for them."""
+    profile = grey_profile(SRGB if curve == "srgb" else gamma_curve(1.8))
+    grey = np.rint(255 * light()[..., 0] ** (1 / 1.8)).astype(np.uint8)
+    codes = np.dstack([grey, np.full_like(grey, 200)]) if kind == "grey and alpha" else grey
+    Image.fromarray(codes).save(tmp_path / "a.png", icc_profile=profile)
+    raster, image = read_raster(tmp_path / "a.png"), read_linear(tmp_path / "a.png")
+    changed = np.zeros((H, W), bool)
+    changed[10:20] = True
+    factor = np.array([0.7, 0.6, 0.5] if kind == "grey in colour" else [0.7, 0.7, 0.7])
+    edited = np.where(changed[..., None], factor * image, image).astype(np.float32)
+    transfer = "srgb" if curve == "srgb" else "profile"
+    write_png(tmp_path / "b.png", encode_like(raster, transfer, edited, changed))
+    with Image.open(tmp_path / "b.png") as written:
+        stored = written.info.get("icc_profile")
+    assert stored == (profile if kind == "grey" else None)
+    assert off(read_linear(tmp_path / "b.png"), edited).max() < 1
+    if curve == "srgb":
+        again = read_raster(tmp_path / "b.png").values
+        assert (again[~changed] == raster.values[~changed]).all(), "other codes are kept"
+
+
 # --- maps -----------------------------------------------------------------------------------------
 
 
