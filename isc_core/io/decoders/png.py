@@ -89,16 +89,15 @@ def _plain_png(data: bytes, kinds: tuple[bytes, ...]) -> tuple[bytes, dict[bytes
 
 
 def _with_alpha(codes: np.ndarray, transparent: bytes) -> np.ndarray:
-    """Codes of 16 bits, with grey and alpha expanded to RGBA and a transparent colour to alpha.
-
-    A transparent grey level is ignored.
-    """
-    if codes.ndim == 3 and codes.shape[2] == 2:
-        return codes[..., [0, 0, 0, 1]]
-    if codes.ndim == 2 or codes.shape[2] == 4 or len(transparent) != 6:
+    """Codes of 16 bits, with grey and alpha expanded to RGBA and a transparent colour to alpha."""
+    planes = codes if codes.ndim == 3 else codes[..., None]
+    channels = planes.shape[2]
+    if channels == 2:
+        return planes[..., [0, 0, 0, 1]]
+    if channels == 4 or len(transparent) != 2 * channels:
         return codes
-    alpha = np.where((codes == np.frombuffer(transparent, ">u2")).all(axis=2), 0, 65535)
-    return np.dstack([codes, alpha.astype(np.uint16)])
+    alpha = np.where((planes == np.frombuffer(transparent, ">u2")).all(axis=2), 0, 65535)
+    return np.dstack([as_rgb(planes), alpha.astype(np.uint16)])
 
 
 def write_png(path: Path, raster: Raster) -> None:

@@ -16,8 +16,9 @@ from .tiff_samples import sample_type, tiff_samples
 
 # Number and default of BitsPerSample, SamplesPerPixel, PhotometricInterpretation, ExtraSamples and
 # Orientation.
-_TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (338, 0), (274, 1))
+_TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (338, -1), (274, 1))
 _PROFILE = 34675
+_PREMULTIPLIED, _UNSPECIFIED = 1, 0  # extra samples
 _GREY_OR_RGB = {1: (1,), 2: (3, 4)}  # samples by PhotometricInterpretation
 
 
@@ -66,10 +67,12 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         )
     pixels = tiff_samples(data, tags)
     pixels = pixels.astype(np.float32 if pixels.dtype.kind == "f" else np.uint16, copy=False)
+    if samples == 4 and extra == _UNSPECIFIED:
+        pixels = pixels[..., :3]
     space, notes = (
         space_of_profile(bytes(tags[_PROFILE]), 1 if samples == 1 else 3)
         if _PROFILE in tags
         else (None, ())
     )
-    raster = raster_of_codes(pixels, 65535, orientation, extra == 1, space, notes)
+    raster = raster_of_codes(pixels, 65535, orientation, extra == _PREMULTIPLIED, space, notes)
     return with_focal_length(raster, data)

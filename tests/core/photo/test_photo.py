@@ -173,6 +173,21 @@ def test_eight_bit_kinds_of_png_agree(tmp_path: Path) -> None:
         assert (photo.mask == object_mask()).all(), name
 
 
+@pytest.mark.parametrize("bits", [8, 16])
+@pytest.mark.parametrize("colour", [0, 2])
+def test_a_transparent_colour_of_a_png_is_the_background(
+    tmp_path: Path, bits: int, colour: int
+) -> None:
+    peak, channels = 2**bits - 1, 3 if colour else 1
+    stored = np.where(object_mask()[..., None], codes(peak, channels) // 2, peak)
+    clear = chunk(b"tRNS", struct.pack(f">{channels}H", *[peak] * channels))
+    path = write(tmp_path / "a.png", png(stored, bits, colour, clear))
+    photo = read_photo(path, transfer="linear")
+    assert photo.original.mask_from == "alpha" and (photo.mask == object_mask()).all()
+    inside = np.broadcast_to(stored / peak, (H, W, 3))[object_mask()]
+    assert photo.image[object_mask()] == pytest.approx(inside, abs=1e-7)
+
+
 def test_one_bit_png_as_a_mask(tmp_path: Path) -> None:
     photo = write(tmp_path / "a.png", png(codes() + 9, 8, 2))
     mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
@@ -247,6 +262,20 @@ def test_16_bit_and_float_tiff(tmp_path: Path) -> None:
     )
     with_alpha = np.dstack([stored, np.where(object_mask(), 65535, 0).astype(np.uint16)])
     assert read_photo(opencv(tmp_path / "r.tif", with_alpha)).original.mask_from == "alpha"
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.uint16, np.float32])
+def test_the_fourth_channel_of_a_tiff_is_alpha_if_the_file_says_so(
+    tmp_path: Path, kind: type
+) -> None:
+    import tifffile
+
+    peak = 1 if kind is np.float32 else np.iinfo(kind).max
+    stored = np.dstack([0.6 * codes(255) + 50, np.where(object_mask(), 255, 0)]) / 255 * peak
+    for extra, source in (("unassalpha", "alpha"), ("unspecified", "whole frame")):
+        path = tmp_path / f"{extra}.tif"
+        tifffile.imwrite(path, stored.astype(kind), photometric="rgb", extrasamples=[extra])
+        assert read_photo(path, whole_frame=True).original.mask_from == source
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32])
