@@ -91,7 +91,10 @@ def declare(parser: argparse.ArgumentParser) -> None:
     fine = parser.add_argument_group("base colour at the photo's resolution")
     fine.add_argument("--photo", type=Path, metavar="PHOTO", help="the photo that was decomposed")
     fine.add_argument(
-        "--mask", type=Path, metavar="MASK", help="the mask that it was decomposed with"
+        "--mask",
+        type=Path,
+        metavar="MASK",
+        help="the mask that it was decomposed with (default: mask.png of the result)",
     )
     fine.add_argument(
         "--texture-size",

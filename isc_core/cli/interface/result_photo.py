@@ -28,7 +28,8 @@ def photo_of_result(
         Of the result.
     photo : Path
     mask : Path or None
-        Required if the result was made with a separate mask.
+        Required if the result was made with a separate mask that has no grey pixels: others are in
+        the result.
     transfer : str or None
         Replaces the curve of the result.
     limits : Limits
@@ -45,10 +46,13 @@ def photo_of_result(
     """
     given = d.provenance.input
     curve = transfer or str(given.get("transfer", "auto"))
-    if given.get("mask_from") == "file" and mask is None:
-        raise InputError("the result was made with a separate mask: give the same one with --mask")
-    if given.get("mask_from") in FOUND and mask is None:
+    source = given.get("mask_from")
+    if mask is None and (source == "file" or source in FOUND):
         mask = folder / MASK
+        if not mask.is_file() and source == "file":
+            raise InputError(
+                "the result was made with a separate mask: give the same one with --mask"
+            )
         if not mask.is_file():
             raise InputError(
                 f"{folder} has no {MASK}, the mask that was found in its photo: give the mask with "

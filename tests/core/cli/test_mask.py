@@ -178,8 +178,9 @@ def test_decompose_finds_the_mask_and_prints_a_note(
     mask = tmp_path / "out" / "mask.png"
     assert isc("decompose", path, "--mask", mask, "-o", again, *QUICK) == 0
     assert np.array_equal(mask_in(again / "mask.png"), mask_in(mask)), "its rim has greys"
-    edit = ("edit", tmp_path / "out", "gloss", "--gain", "0.5", "--photo", path)
-    assert isc(*edit, "-o", tmp_path / "edit") == 0, "an edit finds the mask in the result"
+    for result in (tmp_path / "out", again):
+        edit = ("edit", result, "gloss", "--gain", "0.5", "--photo", path)
+        assert isc(*edit, "-o", tmp_path / "edit") == 0, "an edit finds the mask in the result"
 
 
 @pytest.mark.slow
@@ -189,6 +190,9 @@ def test_each_object_is_decomposed(tmp_path: Path, capsys: pytest.CaptureFixture
     words = ("decompose", path, "--mask", tmp_path / "mask.png", *QUICK)
     assert isc(*words, "-o", tmp_path / "one") == 0
     assert "the mask has 2 separate parts" in capsys.readouterr().out
+    edit = ("edit", tmp_path / "one", "gloss", "--gain", "0.5", "--photo", path)
+    assert isc(*edit, "-o", tmp_path / "edit") == 2, "a mask without greys is not in the result"
+    assert "give the same one with --mask" in capsys.readouterr().err
     assert isc(*words, "--each", "-o", tmp_path / "out") == 0
     boxes = [
         json.loads((tmp_path / "out" / name / "decomposition.json").read_text())["input"][

@@ -31,7 +31,10 @@ def add_common(parser: argparse.ArgumentParser) -> None:
         help="the photo that was decomposed: the edit is applied to it",
     )
     photo.add_argument(
-        "--mask", type=Path, metavar="MASK", help="the mask that it was decomposed with"
+        "--mask",
+        type=Path,
+        metavar="MASK",
+        help="the mask that it was decomposed with (default: mask.png of the result)",
     )
     photo.add_argument(
         "--transfer",
