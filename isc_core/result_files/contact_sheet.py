@@ -352,7 +352,7 @@ def _title(d: Decomposition, shape: tuple[int, ...]) -> tuple[str, str]:
     if d.brdf is not None:
         parts.append(_gloss(d.brdf, diagnostics.lobe))
     if diagnostics.warnings:
-        parts.append("unreliable, see status.warnings")
+        parts.append(f"note: {', '.join(one.kind for one in diagnostics.warnings)}")
     return name, "   ·   ".join(parts)
 
 

@@ -359,8 +359,8 @@ def test_the_title_has_the_fitted_lobe() -> None:
         d.provenance,
         diagnostics=Diagnostics(warnings=(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.8),)),
     )
-    assert "unreliable" in drawn_subtitle(replace(d, provenance=uncertain))
-    assert "unreliable" not in drawn_subtitle(d)
+    assert "note: mirror or glass" in drawn_subtitle(replace(d, provenance=uncertain))
+    assert "note" not in drawn_subtitle(d)
     assert drawn_subtitle(replace(d, brdf=replace(fit, outcome=LobeFitOutcome.NARROW))).endswith(
         f"roughness at most {fit.blender_roughness:.2f}"
     )
