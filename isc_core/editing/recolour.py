@@ -5,15 +5,18 @@ Oklab (L, a, b) with hue h and chroma C: h' = h + shift, C' = saturation C; or, 
 the target's hue and the chroma C_target L / L_target, which is the target in more or less light. In
 linear light the result is scaled to Y(r') = value Y(r), so that texture and shading are preserved.
 A colour outside the gamut at that luminance is desaturated just until it is inside. diffuse' = ((1
-- w) r + w r') shading, with w the region's weight; the specular layer does not change.
+- w) r + w r') shading, with w the region's weight; the specular layer does not change. Where r'
+shading would exceed both white and the brightest channel of the old diffuse light, it is
+desaturated at its own luminance, too, so that it does not clip; floats have no white.
 
 Citation: B. Ottosson 2020 (Oklab, see `chroma`); H. Akbar 2016 (recolouring).
 
-Limits: highlights that remain in the diffuse layer are recoloured, too. Black and pure white can
-hardly be coloured.
+Limits: an object that becomes brighter than white, by `value` or a brighter target, is clipped, and
+a note says so. Highlights on bright colours may clip. Highlights that remain in the diffuse layer
+are recoloured, too. Black and pure white can hardly be coloured.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +26,8 @@ from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
 from .chroma import from_oklab, to_oklab
 from .edited import Edited, edited, light_color
+
+_MOST_CLIPPED = 0.01  # of the object's pixels: below it there is no note
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,9 +110,27 @@ def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = N
     tint = light_color(d)
     old = np.maximum(d.reflectance[inside] * tint, 0)
     new = change_colours(old, change, _max_level(d, tint), share)
-    diffuse = d.diffuse.copy()
-    diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * (d.shading[inside] / tint)
-    return edited(d, diffuse)
+    diffuse, light = d.diffuse.copy(), new * (d.shading[inside] / tint)
+    if not _is_float(d):
+        most = np.maximum(d.diffuse[inside].max(-1), 1)
+        light = _at_luminance(light, luminance(light), most)
+    diffuse[inside] = (1 - share) * d.diffuse[inside] + share * light
+    result = edited(d, diffuse)
+    return replace(result, notes=_notes(d, result))
+
+
+def _notes(d: Decomposition, result: Edited) -> tuple[str, ...]:
+    """Whether a part of the object became brighter than white."""
+    if _is_float(d):
+        return ()
+    clipped = (luminance(result.diffuse) > 1) & (luminance(d.diffuse) <= 1)
+    share = float(clipped[d.mask].mean())
+    if share < _MOST_CLIPPED:
+        return ()
+    return (
+        f"{share:.0%} of the object is brighter than white and is clipped: use a smaller --value "
+        "or a darker colour",
+    )
 
 
 def change_colours(
@@ -153,12 +176,16 @@ def change_colours(
     )
 
 
+def _is_float(d: Decomposition) -> bool:
+    """Whether the photo is of floats, which have no white."""
+    return bool(d.provenance.input.get("bit_depth", 8) == 32)
+
+
 def _max_level(d: Decomposition, tint: np.ndarray) -> float:
     """Largest value of a new colour: the object's brightest, or that which is the photo's white in
     the object's brightest light.
     """
-    float_photo = d.provenance.input.get("bit_depth", 8) == 32
-    white = white_of(d.image, d.mask) if float_photo else 1.0
+    white = white_of(d.image, d.mask) if _is_float(d) else 1.0
     return max(white_of(d.reflectance * tint, d.mask), white / white_of(d.shading / tint, d.mask))
 
 

@@ -172,6 +172,55 @@ def test_no_colour_is_brighter_than_the_original_or_the_white_of_the_photo(
         assert luminance(new) == pytest.approx(luminance(seen[scene.mask]), rel=1e-4)
 
 
+def pale(scene: Decomposition, bits: int, level: float) -> Decomposition:
+    """The scene in grey, pale in the shadow; its brightest diffuse light is `level`."""
+    lit = scene.shading[..., 1:2] > np.median(scene.shading[scene.mask, 1])
+    grey = np.where(lit, 0.45, 0.95).astype(np.float32)
+    reflectance = np.where(scene.mask[..., None], grey, 0) * np.ones(3, np.float32)
+    gain = level / float((reflectance * scene.shading).max())
+    diffuse = (gain * reflectance * scene.shading).astype(np.float32)
+    return replace(
+        scene,
+        reflectance=reflectance,
+        shading=(gain * scene.shading).astype(np.float32),
+        diffuse=diffuse,
+        image=diffuse + scene.specular,
+        residual=0 * diffuse,
+        provenance=replace(scene.provenance, input={"bit_depth": bits}),
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ColourEdit(target=np.array([0.02, 0.05, 0.6])),
+        ColourEdit(target=np.array([0.02, 0.05, 0.6]), saturation=2.0),
+    ],
+)
+def test_a_new_colour_becomes_paler_instead_of_clipping(
+    scene: Decomposition, change: ColourEdit
+) -> None:
+    given = pale(scene, bits=8, level=0.98)
+    edit, inside = recolour(given, change), given.mask
+    new, old = edit.diffuse[inside], given.diffuse[inside]
+    assert new.max() <= 1.0001
+    assert luminance(new) == pytest.approx(luminance(old), rel=0.1), "as bright in the picture"
+    level, bluer = old.max(-1), (new[:, 2] / new[:, 0]) / (old[:, 2] / old[:, 0])
+    assert bluer.min() > 0.95, "no other hue"
+    assert np.median(bluer[level < np.median(level)]) > 1.5, "the colour is there in less light"
+    assert not edit.notes
+    floats = recolour(pale(scene, bits=32, level=0.98), change)
+    assert floats.diffuse.max() > 1.2, "floats have no white"
+
+
+def test_a_value_that_makes_the_object_brighter_than_white_is_noted(scene: Decomposition) -> None:
+    given = pale(scene, bits=8, level=0.98)
+    (note,) = recolour(given, ColourEdit(value=1.8)).notes
+    assert "of the object is brighter than white and is clipped" in note
+    assert not recolour(given, ColourEdit(value=0.8)).notes
+    assert not recolour(pale(scene, bits=32, level=0.98), ColourEdit(value=1.8)).notes
+
+
 def test_evenly_grey_paint_takes_colour(scene: Decomposition) -> None:
     grey = np.where(scene.mask[..., None], 0.2, 0).astype(np.float32) * np.ones(3, np.float32)
     diffuse = (grey * scene.shading).astype(np.float32)
