@@ -17,7 +17,7 @@ from ..filters.distance import nearest_pixels
 from ..io.decoders import Raster, read_raster
 from ..io.limits import DEFAULT_LIMITS, Limits
 from ..photo.found_mask import FoundMask
-from ..photo.masks import MIN_MASK_PIXELS, check_mask
+from ..photo.masks import MIN_MASK_PIXELS, mask_problem
 from ..photo.photo import Photo
 from ..photo.reading import constant_problem, photo_from_raster
 from .components import connected_components
@@ -186,11 +186,14 @@ def photos_of_each_object(
         photos = _components_of(photo)
     else:
         photos = [_photo_of(photo, one) for one in search.found]
-    for number, one in enumerate(photos, 1):
-        check_mask(one.mask, f"{name}: the mask of object {number}")
     inside = f"{name}: every pixel inside the mask"
     return [
-        replace(one, problem=constant_problem(raster.values, inside, one.mask)) for one in photos
+        replace(
+            one,
+            problem=mask_problem(one.mask, f"{name}: the mask of object {number}")
+            or constant_problem(raster.values, inside, one.mask),
+        )
+        for number, one in enumerate(photos, 1)
     ]
 
 

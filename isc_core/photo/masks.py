@@ -33,20 +33,39 @@ def check_mask(mask: np.ndarray, what: str) -> None:
     what : str
         Prefix of the error message.
     """
+    if problem := mask_problem(mask, what):
+        raise InputError(problem)
+
+
+def mask_problem(mask: np.ndarray, what: str) -> str:
+    """Say what is wrong with a mask.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    what : str
+        Prefix of the message.
+
+    Returns
+    -------
+    str
+        The message of `check_mask`; "" if the mask can be used.
+    """
     count = int(mask.sum())
     if count == 0:
-        raise InputError(f"{what} is empty: mark the object in white on black")
+        return f"{what} is empty: mark the object in white on black"
     if count < MIN_MASK_PIXELS:
-        raise InputError(
+        return (
             f"{what} has only {count} pixels: at least {MIN_MASK_PIXELS} are required; use a "
             "larger photo or mask"
         )
     width, height = mask_box(mask)[2:]
     if min(width, height) < MIN_SIDE:
-        raise InputError(
+        return (
             f"{what} is only {width} x {height} pixels: each side needs at least {MIN_SIDE}; "
             "use a larger photo or mask"
         )
+    return ""
 
 
 def tidy_mask(mask: np.ndarray) -> np.ndarray:

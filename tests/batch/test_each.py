@@ -118,6 +118,19 @@ def test_an_object_of_one_colour_fails_as_it_does_alone(
     assert failure["name"] == "shelf/1" and reason in str(failure["reason"])
 
 
+def test_an_object_that_is_too_thin_stops_no_other(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ball = ball_codes(12.0)
+    rod = np.zeros_like(ball)
+    rod[4:-4, 10:16] = 30000 + 100 * np.arange(6)[:, None]
+    photo = write_image(tmp_path / "shelf.png", np.hstack([rod, ball]))
+    words = ["--model", "retinex", "--engine", "numpy", "-q", "-o", str(tmp_path / "out")]
+    assert main(["decompose", str(photo), "--each", *words]) == 1
+    assert "object 1 of 2" in (said := capsys.readouterr().err) and "at least 8" in said
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["2"]
+
+
 def test_results_of_objects_that_are_no_longer_there_go(shelf: Path, out: Path) -> None:
     given = batch(shelf / "shelf.png", output=out, recipe=EACH)
     write_image(shelf / "shelf.png", ball_codes(12.0))
