@@ -21,7 +21,7 @@ from .runs.worker_run import RunState
 from .scene.build import LIGHT_AND_CAMERA
 from .scene.built_object import BuiltObject, find_built
 from .scene.collection import find_layer_collection
-from .scene.copies import objects_sharing_material
+from .scene.copies import has_other_material, objects_sharing_material
 from .settings.usage import unused_reason
 
 _EDITORS = ("VIEW_3D", "IMAGE_EDITOR")
@@ -205,6 +205,9 @@ class _Edit(_Panel):
             row.prop(entry, "exclude", text="Photo's Light and Camera", emboss=False)
 
     def _draw_material(self, built: BuiltObject) -> None:
+        if has_other_material(built.object, built.material):
+            self.layout.label(text=f"Edits need the material {built.material.name}", icon="INFO")
+            return
         node = dichromatic_node(built.material)
         if node is None:
             self.layout.label(text="The node ISC Dichromatic is missing", icon="INFO")

@@ -20,7 +20,7 @@ from ..materials.material import set_specular_gain
 from ..materials.photo_highlights import can_show_highlights, hide_highlights, show_highlights
 from ..runs.messages import sentence
 from ..scene.built_object import BuiltObject, find_built, selection_problem
-from ..scene.copies import find_material, make_material_single_user
+from ..scene.copies import find_material, has_other_material, make_material_single_user
 from ..scene.sun import ensure_sun, hide_lamps, relight
 from ..scene.world import set_sun_mix
 from .live_edits import write_edits
@@ -423,8 +423,13 @@ def dichromatic_inputs(built: BuiltObject) -> Any:
     Raises
     ------
     InputError
-        If the node is missing, or the material is linked from another file.
+        If the node is missing, the object has another material, or the material is linked from
+        another file.
     """
+    if has_other_material(built.object, built.material):
+        raise InputError(
+            f"{built.object.name} has another material: assign {built.material.name} to it first"
+        )
     node = dichromatic_node(built.material)
     if node is None:
         raise InputError("the material has no node group ISC Dichromatic: create the object again")

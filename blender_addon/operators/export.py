@@ -26,7 +26,7 @@ from ..datablocks.provenance import KEY, ROLE
 from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
 from ..runs.messages import reason_line, sentence
 from ..scene.built_object import BuiltObject
-from ..scene.copies import is_copy
+from ..scene.copies import has_other_material, is_copy
 from .edit import NeedsObject, require_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
@@ -399,8 +399,15 @@ def _only_selected(obj: bpy.types.Object) -> Iterator[None]:
 
 @contextmanager
 def _exportable(built: BuiltObject) -> Iterator[None]:
-    """Give the object a material that exporters can read while the context lasts."""
+    """Give the object a material that exporters can read while the context lasts.
+
+    Materials that the user has assigned in place of ISC's are exported as they are.
+    """
     material = built.material
+    if has_other_material(built.object, material):
+        with _settled():
+            yield
+        return
     if surface_node(material) is None:
         with export_material(built.object, material):
             yield
@@ -453,7 +460,8 @@ def _textures_beside(obj: bpy.types.Object, folder: Path) -> Iterator[None]:
 def _packed_textures(obj: bpy.types.Object) -> set[bpy.types.Image]:
     """The images of an object's materials that are packed as PNG."""
     materials = (slot.material for slot in obj.material_slots if slot.material is not None)
-    nodes = (node for material in materials for node in material.node_tree.nodes)
+    trees = (material.node_tree for material in materials if material.node_tree is not None)
+    nodes = (node for tree in trees for node in tree.nodes)
     images = {node.image for node in nodes if node.type == "TEX_IMAGE"}
     return {
         image

@@ -21,6 +21,7 @@ from ..datablocks.painted_images import pack_images
 from ..datablocks.provenance import KEY, require_local
 from .built_object import BuiltObject
 from .collection import use_standard_view
+from .copies import has_other_material
 
 CATALOG = "5d1b3c5e-6a0f-4b57-9d0b-1c5a3f0e8a11"
 # Blender adds a parent that is missing in the file, and then asks to save its catalogs.
@@ -40,7 +41,8 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
     Parameters
     ----------
     built : BuiltObject
-        The object; object and material are marked as assets in this file, too.
+        The object; it and its material are marked as assets in this file, too. A material that the
+        user has assigned in place of it is not marked.
     library : Path
         Folder of the asset library, created if missing.
     overwrite : bool, optional
@@ -68,21 +70,27 @@ def save_asset(built: BuiltObject, library: Path, overwrite: bool = False) -> Pa
             f"the asset library {library} cannot be written to: choose another, or add a folder of "
             "your own in Preferences > File Paths > Asset Libraries"
         ) from error
-    for block in (built.object, built.material):
+    shown = _shown_blocks(built)
+    for block in shown:
         _mark(block)
     if hasattr(bpy.types.Scene, "cycles"):
         _set_preview(built)
     else:  # Cycles is an add-on, which may be disabled
-        for block in (built.object, built.material):
+        for block in shown:
             block.asset_generate_preview()
     pack_images(built.object, [built.material], files=True)
     if entries := _missing_entries(catalogs):
         with new_file(library / _CATALOGS) as partial:
             partial.write_text((catalogs or _HEADER) + entries, encoding="utf-8")
     with new_file(path) as partial:
-        blocks = {built.object, built.material}
-        bpy.data.libraries.write(str(partial), blocks, fake_user=True, compress=True)
+        bpy.data.libraries.write(str(partial), set(shown), fake_user=True, compress=True)
     return path
+
+
+def _shown_blocks(built: BuiltObject) -> list[Any]:
+    """The object, and its material unless the user has assigned another."""
+    material = [] if has_other_material(built.object, built.material) else [built.material]
+    return [built.object, *material]
 
 
 def _free_file(library: Path, name: str, overwrite: bool) -> Path:
@@ -133,7 +141,7 @@ def _set_preview(built: BuiltObject) -> None:
     path.unlink(missing_ok=True)
     for image in set(bpy.data.images) - before:  # Blender's render result, if it had none
         bpy.data.images.remove(image)
-    for block in (built.object, built.material):
+    for block in _shown_blocks(built):
         preview = block.preview_ensure()
         preview.image_size = _SIZE, _SIZE
         preview.image_pixels_float.foreach_set(pixels)

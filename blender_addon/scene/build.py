@@ -49,7 +49,7 @@ from .collection import (
     link_object,
     use_standard_view,
 )
-from .copies import OBJECT
+from .copies import OBJECT, keep_material
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
 from .placement import free_location, world_matrix
@@ -275,6 +275,7 @@ def _place(
     world = ensure_world(key, images[ImageRole.ENVIRONMENT_MAP], result.sun_ambient, options.sun)
     # So that the light is saved and appended with the object even if no scene uses it.
     obj["isc_world"] = world
+    keep_material(obj, material)
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))
     lamps = options.own_scene and options.specular_from != "none"

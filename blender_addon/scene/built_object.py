@@ -25,7 +25,7 @@ class BuiltObject:
     scene : bpy.types.Scene
         Scene of the object; the current one if it is in several.
     material : bpy.types.Material
-        Material of the object.
+        Material of ISC; the user may have assigned another.
     """
 
     collection: bpy.types.Collection

@@ -22,6 +22,8 @@ from ..datablocks.provenance import (
 )
 
 OBJECT, MATERIAL, COPY = "object", "material", "copy"
+# Of an object: its material, so that the file keeps it where another one is assigned.
+_OWN_MATERIAL = "isc_material"
 
 
 def find_original(obj: bpy.types.Object) -> bpy.types.Object | None:
@@ -79,7 +81,7 @@ def is_copy(obj: bpy.types.Object) -> bool:
 
 
 def find_material(obj: bpy.types.Object) -> bpy.types.Material | None:
-    """Find the material of ISC that is assigned to an object.
+    """Find the material of ISC that belongs to an object.
 
     Parameters
     ----------
@@ -89,7 +91,8 @@ def find_material(obj: bpy.types.Object) -> bpy.types.Material | None:
     Returns
     -------
     bpy.types.Material or None
-        For an original without one, the material that was built for it.
+        The assigned one; for an original that has none or the user's, the material that was built
+        for it.
     """
     assigned = (slot.material for slot in obj.material_slots)
     found = next(
@@ -102,7 +105,39 @@ def find_material(obj: bpy.types.Object) -> bpy.types.Material | None:
     )
     if found is not None or is_copy(obj):
         return found
-    return find_tagged(bpy.data.materials, obj[KEY], MATERIAL)
+    return obj.get(_OWN_MATERIAL) or find_tagged(bpy.data.materials, obj[KEY], MATERIAL)
+
+
+def keep_material(obj: bpy.types.Object, material: bpy.types.Material) -> None:
+    """Store the material of an object in it: it stays in the file while another one is assigned.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+    material : bpy.types.Material
+        The material that was built for it.
+    """
+    obj[_OWN_MATERIAL] = material
+
+
+def has_other_material(obj: bpy.types.Object, material: bpy.types.Material) -> bool:
+    """Return whether an object has materials, but not a certain one.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+    material : bpy.types.Material
+        The material.
+
+    Returns
+    -------
+    bool
+        False for an object without materials.
+    """
+    assigned = {slot.material for slot in obj.material_slots} - {None}
+    return bool(assigned) and material not in assigned
 
 
 def objects_sharing_material(

@@ -108,6 +108,20 @@ def test_an_asset_has_what_was_painted(
         assert tuple(image.pixels[:4]) == pytest.approx((0, 1, 0, 1), abs=0.01), name
 
 
+def test_an_asset_has_the_users_material(
+    addon: Any, built: BuiltObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(asset, "_set_preview", lambda _: None)
+    built.object.material_slots[0].material = addon.data.materials.new("Gold")
+    path = asset.save_asset(built, tmp_path)
+    assert built.object.asset_data is not None and built.material.asset_data is None
+    addon.ops.wm.read_factory_settings(use_empty=True)
+    with addon.data.libraries.load(str(path)) as (_, wanted):
+        wanted.objects = ["bump"]
+    (obj,) = wanted.objects
+    assert obj.material_slots[0].material.name == "Gold" and find_built(obj) is not None
+
+
 def test_a_library_that_cannot_be_written_is_reported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:

@@ -305,6 +305,24 @@ def test_a_foreign_material_of_a_copy_is_not_edited(addon: Any, built: BuiltObje
     assert find_built(copy.object) is None and not addon.ops.isc.recolour.poll()
 
 
+def test_the_users_material_of_an_object_is_exported_and_its_own_is_kept(
+    addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
+) -> None:
+    name = built.material.name
+    built.object.material_slots[0].material = addon.data.materials.new("Gold")
+    assert "bump has another material: assign bump to it first" in error_of(addon.ops.isc.recolour)
+    for kind in ("GLB", "OBJ"):
+        assert addon.ops.isc.export(directory=str(tmp_path), file_format=kind) == {"FINISHED"}
+    assert surface(tmp_path / "bump" / "bump.glb")["name"] == "Gold"
+    assert "newmtl Gold" in (tmp_path / "bump" / "bump.mtl").read_text()
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    addon.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    again = find_built(addon.data.objects["bump"])
+    assert again is not None and again.material.name == name
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    assert [slot.material.name for slot in again.object.material_slots] == ["Gold"]
+
+
 def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject) -> None:
     """The panel offers this instead of sliders that would change both."""
     copy = copied(addon, built)
