@@ -18,9 +18,8 @@ from .operators.result import scene_before
 from .runs.active_run import active_run
 from .runs.messages import NOTE, is_about_mask
 from .runs.worker_run import RunState
-from .scene.build import LIGHT_AND_CAMERA
 from .scene.built_object import BuiltObject, find_built
-from .scene.collection import find_layer_collection
+from .scene.collection import LIGHT_AND_CAMERA, find_layer_collection
 from .scene.copies import has_other_material, objects_sharing_material
 from .settings.usage import unused_reason
 

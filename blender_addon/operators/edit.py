@@ -21,7 +21,7 @@ from ..materials.photo_highlights import can_show_highlights, hide_highlights, s
 from ..runs.messages import sentence
 from ..scene.built_object import BuiltObject, find_built, selection_problem
 from ..scene.copies import find_material, has_other_material, make_material_single_user
-from ..scene.sun import ensure_sun, hide_lamps, relight
+from ..scene.sun import ensure_sun, hide_lamps, relight, sun_collection
 from ..scene.world import set_sun_mix
 from .live_edits import write_edits
 
@@ -391,7 +391,7 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
         """
         obj = built.object
         if self.light == "RECOVERED":
-            relight(obj, sun=False)
+            relight(obj, False, built.scene)
             return
         direction, irradiance, ambient = (
             _stored_vector(obj, f"isc_sun_{name}") for name in ("direction", "strength", "ambient")
@@ -402,7 +402,8 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
             raise InputError("the direction is zero: enter another")
-        ensure_sun(obj[KEY], built.collection, direction / length, self.strength * irradiance)
+        collection = sun_collection(obj, built.scene or bpy.context.scene)
+        ensure_sun(obj[KEY], collection, direction / length, self.strength * irradiance)
         set_sun_mix(built.world, self.ambient * ambient, True)
         hide_lamps(obj[KEY], True)
 

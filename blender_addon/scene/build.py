@@ -42,6 +42,7 @@ from ..materials.photo_highlights import reset_view
 from .built_object import BuiltObject
 from .camera import ensure_camera, set_background_photo, set_render_size
 from .collection import (
+    LIGHT_AND_CAMERA,
     ensure_collection,
     ensure_optional_part,
     ensure_scene,
@@ -56,8 +57,6 @@ from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ensure_lamps, ensure_sun, relight
 from .world import ensure_world
-
-LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 
 _NO_LAMPS = np.zeros((0, 3))
 # Textures that only some builds have.
@@ -280,7 +279,7 @@ def _place(
         write_provenance(block, result, json.dumps(asdict(options)))
     lamps = options.own_scene and options.specular_from != "none"
     ensure_lamps(key, collection, *_lamps(result) if lamps else (_NO_LAMPS, _NO_LAMPS))
-    relight(obj, options.sun)
+    relight(obj, options.sun, scene)
     camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
     photo = photo or images.get(ImageRole.PHOTO)
     if camera is not None and photo is not None:

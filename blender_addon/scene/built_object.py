@@ -67,13 +67,24 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
         object=built,
         camera=find_tagged(bpy.data.objects, key, "camera"),
         world=find_tagged(bpy.data.worlds, key, "world"),
-        scene=_scene_of(built),
+        scene=scene_of(built),
         material=material,
     )
 
 
-def _scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
-    """The current scene if it has the object, else the object's own, else any that has it."""
+def scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
+    """Return the scene in which an object is edited.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+
+    Returns
+    -------
+    bpy.types.Scene or None
+        The current scene if it has the object, else the object's own, else any that has it.
+    """
     scenes = obj.users_scene
     if bpy.context.scene in scenes:
         return bpy.context.scene

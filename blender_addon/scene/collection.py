@@ -1,10 +1,13 @@
 """The collection with everything that ISC builds of one photo, and the scene that shows it."""
 
+from collections.abc import Iterable
 from contextlib import suppress
 
 import bpy
 
 from ..datablocks.provenance import datablock_name, find_tagged, tag
+
+LIGHT_AND_CAMERA = "light and camera"  # role of the part of a collection with these
 
 _PREVIEW_SAMPLES = 32
 
@@ -129,6 +132,57 @@ def find_layer_collection(
         return entry
     below = (find_layer_collection(child, collection) for child in entry.children)
     return next((found for found in below if found is not None), None)
+
+
+def is_included(collection: bpy.types.Collection, scene: bpy.types.Scene) -> bool:
+    """Return whether a view layer of a scene includes a collection.
+
+    Parameters
+    ----------
+    collection : bpy.types.Collection
+        The collection.
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    bool
+    """
+    roots = (layer.layer_collection for layer in scene.view_layers)
+    entries = (find_layer_collection(root, collection) for root in roots if root is not None)
+    return any(entry is not None and not entry.exclude for entry in entries)
+
+
+def first_local(
+    collections: Iterable[bpy.types.Collection | None], scene: bpy.types.Scene
+) -> bpy.types.Collection:
+    """Return the first collection of a scene to which objects can be linked.
+
+    Parameters
+    ----------
+    collections : iterable of bpy.types.Collection or None
+        Collections in the order of preference. One of another scene, of another file or with a
+        library override is passed over.
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    bpy.types.Collection
+        The scene's own if none is left.
+    """
+    in_scene = {scene.collection, *scene.collection.children_recursive}
+    return next(
+        (
+            one
+            for one in collections
+            if one is not None
+            and one in in_scene
+            and one.library is None
+            and one.override_library is None
+        ),
+        scene.collection,
+    )
 
 
 def is_in_scene(obj: bpy.types.Object, scene: bpy.types.Scene) -> bool:

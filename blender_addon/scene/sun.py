@@ -16,7 +16,8 @@ from isc_core.errors import InputError
 
 from ..datablocks.mesh import to_blender
 from ..datablocks.provenance import KEY, datablock_name, find_tagged, tag
-from .collection import link_object
+from .built_object import scene_of
+from .collection import LIGHT_AND_CAMERA, first_local, is_included, link_object
 from .world import set_sun_mix
 
 _LAMPS = ("lamp1", "lamp2", "lamp3")
@@ -100,7 +101,9 @@ def ensure_lamps(
     return lamps
 
 
-def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
+def relight(
+    obj: bpy.types.Object, sun: bool = True, scene: bpy.types.Scene | None = None
+) -> bpy.types.Object | None:
     """Light an object by a sun and uniform light, or by its recovered environment map.
 
     The light is stored in the object's properties, so this works in any file.
@@ -111,6 +114,8 @@ def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
         An object made by ISC.
     sun : bool, optional
         Whether to use the sun.
+    scene : bpy.types.Scene, optional
+        Scene with the object; as `scene_of` if None.
 
     Returns
     -------
@@ -131,13 +136,44 @@ def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
     direction, strength, ambient = (np.array(value, float) for value in values)
     set_sun_mix(find_tagged(bpy.data.worlds, key, "world"), ambient, sun)
     hide_lamps(key, sun)
-    if not sun:
-        remove_sun(key)
+    scene = scene or scene_of(obj) or bpy.context.scene
+    if sun:
+        return ensure_sun(key, sun_collection(obj, scene), direction, strength)
+    part = find_tagged(bpy.data.collections, key, LIGHT_AND_CAMERA)
+    current = find_tagged(bpy.data.objects, key, "sun")
+    if current is None or part not in current.users_collection or is_included(part, scene):
+        _remove(key, "sun")
         return None
-    collection = find_tagged(bpy.data.collections, key, "collection") or next(
-        iter(obj.users_collection), bpy.context.scene.collection
-    )
-    return ensure_sun(key, collection, direction, strength)
+    # The part keeps its sun for when it is included.
+    ensure_sun(key, part, direction, strength)
+    for collection in current.users_collection:
+        if collection != part:
+            collection.objects.unlink(current)
+    return None
+
+
+def sun_collection(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """Return the collection for the sun that lights an object in a scene.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object made by ISC.
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    bpy.types.Collection
+        That of an existing sun, of the photo or of the object, if it is in the scene and can be
+        changed; otherwise the scene's own. Never the part with light and camera, which view layers
+        may exclude.
+    """
+    key, sun = obj[KEY], find_tagged(bpy.data.objects, obj[KEY], "sun")
+    part = find_tagged(bpy.data.collections, key, LIGHT_AND_CAMERA)
+    present = [one for one in (sun.users_collection if sun else ()) if one != part]
+    of_photo = find_tagged(bpy.data.collections, key, "collection")
+    return first_local([*present, of_photo, *obj.users_collection], scene)
 
 
 def hide_lamps(key: str, hidden: bool) -> None:
@@ -153,17 +189,6 @@ def hide_lamps(key: str, hidden: bool) -> None:
         lamp = find_tagged(bpy.data.objects, key, role)
         if lamp is not None:
             lamp.hide_render = lamp.hide_viewport = hidden
-
-
-def remove_sun(key: str) -> None:
-    """Remove the sun of a photo, if there is one.
-
-    Parameters
-    ----------
-    key : str
-        Name of the photo.
-    """
-    _remove(key, "sun")
 
 
 def _remove(key: str, role: str) -> None:

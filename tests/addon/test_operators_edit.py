@@ -25,6 +25,7 @@ from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # 
 from blender_addon.operators.export import export_object  # noqa: E402
 from blender_addon.scene.build import build_object  # noqa: E402
 from blender_addon.scene.built_object import BuiltObject, find_built  # noqa: E402
+from blender_addon.scene.collection import find_layer_collection  # noqa: E402
 from blender_addon.scene.copies import (  # noqa: E402
     find_original,
     is_copy,
@@ -143,6 +144,69 @@ def test_the_sun_takes_a_custom_direction(addon: Any, built: BuiltObject) -> Non
     assert "direction is zero" in error_of(
         addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0)
     )
+
+
+def shared(addon: Any, folder: Path) -> BuiltObject:
+    """The bump in the scene of the user."""
+    addon.context.scene.isc.own_scene = False
+    addon.ops.isc.import_result(directory=str(folder))
+    found = find_built(addon.context.object)
+    assert found is not None
+    return found
+
+
+def test_the_sun_shines_in_the_scene_that_is_edited(addon: Any, bump_folder: Path) -> None:
+    made = shared(addon, bump_folder)
+    first, other = addon.context.scene, addon.data.scenes.new("other")
+    other.collection.objects.link(made.object)
+    addon.context.window.scene = other
+    addon.context.view_layer.objects.active = made.object
+    assert addon.ops.isc.relight(light="OPTIMAL") == {"FINISHED"}
+    sun = addon.data.objects["bump sun"]
+    assert set(sun.users_scene) == {first, other}, "there it waits with the camera"
+    lights = addon.data.collections.new("lights")
+    other.collection.children.link(lights)
+    other.collection.objects.unlink(sun)
+    lights.objects.link(sun)
+    addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0))
+    assert sun.name not in other.collection.objects, "the user moved it"
+
+
+def test_the_photos_light_stays_when_the_sun_is_removed(addon: Any, bump_folder: Path) -> None:
+    made = shared(addon, bump_folder)
+    part = addon.data.collections["bump light and camera"]
+    sun = addon.data.objects["bump sun"]
+    before = sun.rotation_quaternion.copy(), sun.data.energy
+    addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), strength=3)
+    assert sun.name in made.collection.objects and sun.rotation_quaternion != before[0]
+    addon.ops.isc.relight(light="RECOVERED")
+    assert sun.users_collection == (part,)
+    assert sun.rotation_quaternion == before[0] and sun.data.energy == pytest.approx(before[1])
+    entry = find_layer_collection(addon.context.view_layer.layer_collection, part)
+    assert entry is not None
+    entry.exclude = False
+    addon.ops.isc.relight(light="RECOVERED")
+    assert "bump sun" not in addon.data.objects, "it was in sight"
+
+
+def test_a_library_override_has_its_sun_in_the_scene(
+    addon: Any, bump_folder: Path, tmp_path: Path
+) -> None:
+    shared(addon, bump_folder)
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with addon.data.libraries.load(str(tmp_path / "a.blend"), link=True) as (_, wanted):
+        wanted.collections = ["bump"]
+    scene, layer = addon.context.scene, addon.context.view_layer
+    scene.collection.children.link(wanted.collections[0])
+    wanted.collections[0].override_hierarchy_create(scene, layer, do_fully_editable=True)
+    layer.objects.active = next(
+        obj for obj in addon.data.objects if obj.name == "bump" and obj.library is None
+    )
+    assert addon.ops.isc.relight(light="OPTIMAL") == {"FINISHED"}
+    assert [obj.type for obj in scene.collection.objects] == ["LIGHT"]
+    assert addon.ops.isc.relight(light="RECOVERED") == {"FINISHED"}
+    assert not scene.collection.objects
 
 
 def test_the_recovered_light_is_restored(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
