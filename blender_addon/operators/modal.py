@@ -98,11 +98,11 @@ class WorkerOperator:
             `execute`.
         """
         del event
+        if bpy.app.background or context.window is None:
+            return self.execute(context)
         run = self._begin(context)
         if run is None:
             return {"CANCELLED"}
-        if bpy.app.background or context.window is None:
-            return self._wait(context, run)
         manager = context.window_manager
         self._run = run
         self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
@@ -122,8 +122,12 @@ class WorkerOperator:
         -------
         set of str
             {"FINISHED"} if the run is done; {"CANCELLED"} if it is impossible, failed or was
-            cancelled.
+            cancelled. It is impossible in another mode than Object Mode, which nobody could leave
+            while Blender waits.
         """
+        if context.mode != "OBJECT":
+            self.report({"ERROR"}, "Return to Object Mode first")
+            return {"CANCELLED"}
         run = self._begin(context)
         return {"CANCELLED"} if run is None else self._wait(context, run)
 
@@ -227,7 +231,7 @@ def start_operator(operator: Any, start: Callable[..., object], **options: Any) 
 def advance_run(context: Any, run: WorkerRun) -> bool:
     """Advance a run by one tick.
 
-    The result is imported as soon as the user is in no edit mode.
+    The result is imported as soon as the user is in Object Mode.
 
     Parameters
     ----------
@@ -243,9 +247,10 @@ def advance_run(context: Any, run: WorkerRun) -> bool:
     """
     began = time.perf_counter()
     ready = run.step().state == RunState.READY
-    # Undo in an edit mode covers that mode alone: one step could not undo what is built then.
-    editing = context.mode.startswith("EDIT")
-    remark = "leave Edit Mode to import the result" if ready and editing else ""
+    # Undo in an edit mode covers that mode alone: one step could not undo what is built then. And
+    # what is built becomes active, which would end sculpting, painting or posing.
+    editing = context.mode != "OBJECT"
+    remark = "return to Object Mode to import the result" if ready and editing else ""
     update_display(context, run, remark)
     run.record_call(time.perf_counter() - began)
     if ready and not editing:

@@ -448,17 +448,26 @@ def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
     ]
 
 
-def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path) -> None:
+@pytest.mark.parametrize("mode", ["EDIT", "SCULPT", "TEXTURE_PAINT", "POSE"])
+def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path, mode: str) -> None:
     """Undo in Edit Mode covers that mode alone: the result would not be one step."""
-    mesh = addon.data.objects.new("cube", addon.data.meshes.new("cube"))
-    addon.context.scene.collection.objects.link(mesh)
-    addon.context.view_layer.objects.active = mesh
-    addon.ops.object.mode_set(mode="EDIT")
+    if mode == "POSE":
+        addon.ops.object.armature_add()
+    else:
+        addon.ops.mesh.primitive_cube_add()
+    addon.ops.object.mode_set(mode=mode)
     run = begin_run(WorkerRun("Decompose cup", script(0, folder), take, folder))
     assert not advance_run(addon.context, run) and not advance_run(addon.context, run)
-    assert addon.context.window_manager.isc.stage == "leave Edit Mode to import the result"
+    assert addon.context.window_manager.isc.stage == "return to Object Mode to import the result"
     addon.ops.object.mode_set(mode="OBJECT")
     assert advance_run(addon.context, run) and run.status.state == "done"
+
+
+def test_a_script_does_not_wait_for_object_mode(addon: Any, bump_folder: Path) -> None:
+    addon.ops.mesh.primitive_cube_add()
+    addon.ops.object.mode_set(mode="SCULPT")
+    with pytest.raises(RuntimeError, match="Return to Object Mode first"):
+        addon.ops.isc.import_result(directory=str(bump_folder))
 
 
 def test_loading_another_file_ends_the_run(addon: Any, folder: Path) -> None:
