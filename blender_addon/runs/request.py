@@ -3,7 +3,9 @@ the object.
 """
 
 import json
+import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import PurePath
 from typing import Any
@@ -192,7 +194,7 @@ def request_from_settings(scene: Any) -> DecomposeRequest:
             camera=_camera(settings),
             light_colour=_light_colour(settings),
         ),
-        build=build_options(settings, object_key(settings.image)),
+        build=build_options(settings, object_key(settings.image, each=settings.each)),
         scene=scene.name_full,
     )
 
@@ -329,25 +331,45 @@ def track_names(request: DecomposeRequest) -> Callable[[], DecomposeRequest]:
     return renamed
 
 
-def object_key(image: Any) -> str:
+def object_key(image: Any, *, each: bool = False) -> str:
     """Return the name of the object built from an image.
 
     Parameters
     ----------
     image : bpy.types.Image
         The photo.
+    each : bool, optional
+        Whether it is the common name of several objects.
 
     Returns
     -------
     str
-        The image's name without its suffix; with it, if another image's object has that name.
+        The name that was given before, as the image may have been renamed. At first the image's
+        name without its suffix, or with it, if another image's object has that name. Blender's
+        number of the image is no part of it.
     """
-    name = PurePath(image.name.replace("/", "_").replace("\\", "_"))
-    plain = name.stem if name.suffix.lower() in _SUFFIXES else str(name)
+    if given := _given_name(image, each):
+        return given
+    whole = image.name.replace("/", "_").replace("\\", "_")
+    unnumbered = PurePath(re.sub(r"\.\d{3,}$", "", whole))
+    numbered = str(unnumbered) != whole and unnumbered.suffix.lower() in _SUFFIXES
+    name = unnumbered if numbered else PurePath(whole)
+    plain = name.stem if name.suffix.lower() in _SUFFIXES else whole
     taken = any(
         obj.get(KEY) == plain and obj.get(_IMAGE) not in (None, image) for obj in bpy.data.objects
     )
-    return image.name if taken else plain
+    return whole if taken and not numbered else plain
+
+
+def _given_name(image: Any, each: bool) -> str:
+    """The name of what was built from an image; "" if nothing was."""
+    for obj in bpy.data.objects:
+        if obj.library is None and obj.get(_IMAGE) == image and KEY in obj:
+            with suppress(InputError):
+                build = request_from_json(obj.get(_REQUEST, "")).build
+                if build.each == each:
+                    return build.name if each else str(obj[KEY])
+    return ""
 
 
 def store_request(obj: Any, request: DecomposeRequest) -> None:

@@ -251,6 +251,21 @@ def test_objects_of_two_photos_have_different_keys(addon: Any, tmp_path: Path) -
     obj["isc_key"] = "cup"
     requests.store_request(obj, requests.DecomposeRequest(image="cup.png"))
     assert (requests.object_key(first), requests.object_key(second)) == ("cup", "cup.jpg")
+    second.name = "cup.png"
+    assert second.name == "cup.png.001"
+    assert requests.object_key(second) == "cup", "it is numbered when it is built"
+
+
+def test_a_photo_that_was_renamed_keeps_the_name_of_its_object(addon: Any) -> None:
+    image = photo("cup.png")
+    for number, each in enumerate((True, False)):
+        obj = addon.data.objects.new("any", None)
+        obj["isc_key"] = ("cup 1", "cup-2")[number]
+        build = BuildOptions(name="cup", each=each)
+        requests.store_request(obj, requests.DecomposeRequest(image="cup.png", build=build))
+    image.name = "my cup.png"
+    assert requests.object_key(image) == "cup-2"
+    assert requests.object_key(image, each=True) == "cup"
 
 
 def test_kept_results_go_to_the_cache_folder(addon: Any, tmp_path: Path) -> None:
