@@ -26,7 +26,7 @@ from ..datablocks.provenance import KEY, ROLE
 from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
 from ..runs.messages import reason_line, sentence
 from ..scene.built_object import BuiltObject
-from ..scene.copies import has_other_material, is_copy
+from ..scene.copies import has_other_material
 from .edit import NeedsObject, require_built
 from .export_material import export_material, temporarily_assigned
 from .live_edits import finish_export, prepare_export
@@ -320,7 +320,7 @@ def export_object(
 @contextmanager
 def _object_folder(built: BuiltObject, parent: Path) -> Iterator[Path]:
     """Create the folder of an object; raises `InputError` if it cannot be written to."""
-    name = built.object.name if is_copy(built.object) else str(built.object[KEY])
+    name = built.object.name
     letters = (letter if letter.isalnum() or letter in " -_." else "_" for letter in name)
     folder = parent / ("".join(letters).strip(" .") or "object")
     try:

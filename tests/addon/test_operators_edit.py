@@ -610,6 +610,17 @@ def places(built: BuiltObject) -> np.ndarray:
     return values.reshape(-1, 3)
 
 
+def test_files_have_the_present_name_of_the_object(
+    addon: Any, built: BuiltObject, tmp_path: Path
+) -> None:
+    built.object.name = "Mug: red"
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    assert addon.ops.isc.export_textures(directory=str(tmp_path)) == {"FINISHED"}
+    names = {path.name for path in (tmp_path / "Mug_ red").iterdir()}
+    assert {"Mug_ red.glb", "Mug_ red_basecolor.png"} <= names
+    assert [path.name for path in tmp_path.iterdir()] == ["Mug_ red"]
+
+
 def test_a_folder_that_cannot_be_written_is_reported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
