@@ -4,6 +4,7 @@ the photo's size.
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
+import zlib
 from collections.abc import Callable
 from math import ceil, floor
 from pathlib import Path
@@ -28,7 +29,8 @@ from .modal import NeedsPhoto, WorkerOperator, start_operator
 from .photo_canvas import PhotoCanvas
 from .photo_operators import DragOnPhoto
 
-_SHOWN_ON = "isc_shown_on"
+# Of a mask with a preview: the photo, and the checksum of the packed file that it shows.
+_SHOWN_ON, _SHOWN_FILE = "isc_shown_on", "isc_shown_crc32"
 _MIN_SIDE = 8
 
 
@@ -296,7 +298,12 @@ def _set_overlay(mask: Any, photo: Any, path: Path) -> None:
     preview = mask.preview_ensure()
     preview.image_size = width, height
     preview.image_pixels_float.foreach_set(pixels)
-    mask[_SHOWN_ON] = photo
+    mask[_SHOWN_ON], mask[_SHOWN_FILE] = photo, _checksum(mask)
+
+
+def _checksum(mask: Any) -> str:
+    """Of the packed file; "" if there is none."""
+    return "" if mask.packed_file is None else f"{zlib.crc32(mask.packed_file.data):08x}"
 
 
 def mask_shown_on(mask: Any) -> Any:
@@ -312,7 +319,10 @@ def mask_shown_on(mask: Any) -> Any:
     bpy.types.Image or None
         None where the preview shows something else, as after the mask was painted on.
     """
-    return None if mask.is_dirty else mask.get(_SHOWN_ON)
+    photo = mask.get(_SHOWN_ON)
+    # It was painted on, perhaps saved or packed since.
+    changed = photo is None or mask.is_dirty or mask.get(_SHOWN_FILE) != _checksum(mask)
+    return None if changed else photo
 
 
 def load_mask(path: Path, image: str, scene: str) -> None:

@@ -12,13 +12,14 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402 (after the skip)
 from blender_addon.operators import decompose  # noqa: E402
-from blender_addon.operators.mask import load_mask, mask_run  # noqa: E402
+from blender_addon.operators.mask import load_mask, mask_run, mask_shown_on  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
 from blender_addon.runs import request as requests  # noqa: E402
 from blender_addon.runs.request import request_from_settings  # noqa: E402
 from blender_addon.runs.worker_run import RunOutput  # noqa: E402
 from blender_addon.scene.build import build_object  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from blender_addon.worker.commands import overlay_of  # noqa: E402
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from tests.addon.test_operators import mask_image, photo  # noqa: E402
@@ -100,6 +101,23 @@ def test_a_found_mask_is_not_used_for_the_next_photo(addon: Any, tmp_path: Path)
     settings.image = photo("other.png")
     assert settings.mask is None and settings.mask_source == "ALPHA"
     assert not request_from_settings(addon.context.scene).mask
+
+
+def test_a_mask_that_was_painted_is_not_shown_by_its_old_preview(
+    addon: Any, tmp_path: Path
+) -> None:
+    settings = addon.context.scene.isc
+    settings.image = photo()
+    path = white_mask(tmp_path)
+    Image.new("RGB", (32, 32)).save(overlay_of(path))
+    load_mask(path, settings.image.name_full, addon.context.scene.name_full)
+    mask = settings.mask
+    assert mask_shown_on(mask) == settings.image
+    mask.pixels.foreach_set(np.ones(len(mask.pixels), np.float32))
+    mask.update()
+    assert mask.is_dirty and mask_shown_on(mask) is None
+    mask.pack()
+    assert not mask.is_dirty and mask_shown_on(mask) is None
 
 
 def test_a_mask_that_the_user_chose_is_kept_with_the_next_photo(addon: Any) -> None:
