@@ -2,7 +2,7 @@
 
 import argparse
 import textwrap
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NoReturn
 
 from ...errors import InputError
@@ -58,6 +58,34 @@ class Parser(argparse.ArgumentParser):
 
     def __init__(self, **options: Any) -> None:
         super().__init__(allow_abbrev=False, add_help=False, formatter_class=_Help, **options)
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[Any, list[str]]:
+        """Parse arguments, of which none may be unknown; called by argparse for sub-commands, too.
+
+        argparse itself leaves unknown options of a sub-command to the main parser, whose help does
+        not list the options.
+
+        Parameters
+        ----------
+        args, namespace
+            As in argparse.
+
+        Returns
+        -------
+        namespace, unknown
+            As in argparse; `unknown` is empty.
+
+        Raises
+        ------
+        InputError
+            For invalid and unknown arguments.
+        """
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return options, unknown
 
     def error(self, message: str) -> NoReturn:
         """Raise the error of a command line as `InputError`.

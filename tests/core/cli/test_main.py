@@ -71,6 +71,21 @@ def test_every_command_explains_itself_with_an_example(
     assert all(len(line) <= 140 for line in text.splitlines())
 
 
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        ("decompose cup.png -o cup", "isc decompose"),
+        ("edit cup relight -o cup", "isc edit RESULT relight"),
+    ],
+)
+def test_an_unknown_option_refers_to_the_help_of_its_command(
+    capsys: pytest.CaptureFixture[str], words: str, place: str
+) -> None:
+    assert isc(*words.split(), "--unknown") == 2
+    error = capsys.readouterr().err
+    assert error == f"isc: error: unrecognized arguments: --unknown (see `{place} --help`)\n"
+
+
 @pytest.mark.slow
 def test_the_examples_in_the_help_are_commands(capsys: pytest.CaptureFixture[str]) -> None:
     """An example whose options no longer exist would not parse."""
@@ -463,7 +478,7 @@ def test_a_prior_of_another_size_is_refused(
     assert isc("separate", disc_photo(tmp_path), "--prior", prior, "-o", tmp_path / "out") == 2
     error = capfd.readouterr().err
     assert (
-        "prior.png: the prior must have the photo's size (96, 120), not (96, 119)" in error
+        "prior.png: the prior is 119 x 96 pixels, the photo 120 x 96: use a prior of" in error
         and error.count("\n") == 1
     )
     assert not (tmp_path / "out").exists()
