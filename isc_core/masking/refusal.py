@@ -17,7 +17,10 @@ from .components import shows_several
 from .hints import Hints
 
 MIN_CONFIDENCE = 0.4  # of a mask that is used without hints
-REMEDY = "mark it with --box x,y,width,height or --point x,y, or give a mask with --mask"
+REMEDY = (
+    "mark the object with --box x,y,width,height or --point x,y, or make a mask by hand and "
+    "give it with --mask"
+)
 
 
 def refusal_reason(

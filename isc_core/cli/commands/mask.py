@@ -19,7 +19,7 @@ from ..interface.standard_input import photo_file
 _SOURCES = {
     "alpha": "from the alpha channel",
     "black border": "all pixels that are not black",
-    "each": "one of several objects",
+    "each": "one object",
     "file": "part of a mask",
 }
 _EXAMPLES = """  isc mask photo.jpg --auto -o mask.png

@@ -206,5 +206,9 @@ def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray
     """
     prior: np.ndarray = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
     if prior.shape != size:
-        raise InputError(f"{path}: the prior must have the photo's size {size}, not {prior.shape}")
+        (height, width), (h, w) = size, prior.shape
+        raise InputError(
+            f"{path}: the prior is {w} x {h} pixels, the photo {width} x {height}: use a prior of "
+            "the photo's size"
+        )
     return prior
