@@ -46,11 +46,14 @@ _PRESET_ITEMS = numbered(
 
 
 def _get_preset(settings: Any) -> int:
+    if settings.is_custom:
+        return _PRESET_NAMES.index(CUSTOM)
     return _PRESET_NAMES.index(matching_preset(settings.max_size, settings.model, settings.samples))
 
 
 def _set_preset(settings: Any, value: int) -> None:
     preset = PRESETS.get(_PRESET_NAMES[value])
+    settings.is_custom = preset is None
     if preset is not None:
         settings.max_size, settings.model = preset.max_size, preset.model
         settings.samples = preset.samples
@@ -149,6 +152,12 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         get=_get_preset,
         set=_set_preset,
         options={"SKIP_SAVE"},
+    )
+    is_custom: BoolProperty(
+        name="Custom",
+        description="Whether the preset Custom was chosen, with whatever values",
+        default=False,
+        options={"HIDDEN"},
     )
     model: EnumProperty(
         name="Model",

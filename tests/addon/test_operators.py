@@ -209,6 +209,11 @@ def test_presets_set_their_values(addon: Any) -> None:
     assert settings.preset == "CUSTOM"
     settings.preset = "CUSTOM"
     assert settings.samples == presets.PRESETS["ULTRA"].samples + 1
+    settings.preset = "DRAFT"
+    assert settings.preset == "DRAFT"
+    settings.preset = "CUSTOM"
+    assert settings.preset == "CUSTOM", "with the values of the preset before"
+    assert settings.samples == presets.PRESETS["DRAFT"].samples
 
 
 def test_settings_are_saved_with_the_file(addon: Any, tmp_path: Path) -> None:
