@@ -17,6 +17,7 @@ from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor
 from isc_core.result_files.object_folders import object_folders
 
+from .datablocks.images import COLOR, SRGB
 from .datablocks.provenance import find_tagged
 from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
@@ -33,6 +34,7 @@ from .worker.commands import DecomposeJob, start_arrays, start_decompose
 from .worker.process import WorkerProcess, WorkerState
 
 _POLL_SECONDS = 0.05
+_COLOR_SPACES = {"srgb": SRGB, "linear": COLOR}  # of the values of --transfer
 _RENDER_FORMATS = {".png": ("PNG", "16"), ".exr": ("OPEN_EXR", "32")}
 
 
@@ -265,15 +267,20 @@ def _create_request(source: Source, options: argparse.Namespace) -> DecomposeReq
         name=source.name,
         each=_each(source, options),
     )
-    photo = "" if source.is_result else _load_image(source.path)
+    photo = "" if source.is_result else _load_image(source.path, options.transfer)
     mask = "" if source.mask is None or not photo else _load_image(source.mask)
     return DecomposeRequest(image=photo, mask=mask, method=method, build=build)
 
 
-def _load_image(path: Path) -> str:
-    """The name of the packed image of a file, "" if Blender cannot read the file."""
+def _load_image(path: Path, transfer: str = "auto") -> str:
+    """The name of the packed image of a file, "" if Blender cannot read the file.
+
+    The panel, and Update Object, take the transfer curve from the color space of the image.
+    """
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=True)
+        if transfer in _COLOR_SPACES:
+            image.colorspace_settings.name = _COLOR_SPACES[transfer]
         image.pack()
     except RuntimeError:
         return ""

@@ -331,6 +331,21 @@ def test_signal_handlers_set_in_c_are_tolerated(monkeypatch: pytest.MonkeyPatch)
             original(number, handler)
 
 
+@pytest.mark.parametrize("transfer", ["auto", "linear"])
+def test_an_update_reads_the_photo_with_the_same_transfer_curve(
+    blender: Any, tmp_path: Path, transfer: str
+) -> None:
+    from blender_addon.files.image_source import inspect_image
+    from blender_addon.headless_batch import _create_request
+    from blender_addon.headless_command import _parser
+    from blender_addon.headless_sources import Source
+
+    source = Source(photo(tmp_path), "bump")
+    words = [str(source.path), "--transfer", transfer, "-o", str(tmp_path / "a.blend")]
+    request = _create_request(source, _parser().parse_args(words))
+    assert inspect_image(blender.data.images[request.image]).transfer == transfer
+
+
 def test_an_internal_error_has_a_nonzero_exit_code(tmp_path: Path) -> None:
     """Blender itself ends with 0 after a script that raised."""
     code = "import runpy, sys, blender_addon.headless_command as c; c.main = None; "
