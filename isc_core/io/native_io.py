@@ -13,6 +13,7 @@ import contextlib
 import io
 import os
 import tempfile
+import threading
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -46,9 +47,49 @@ def memory_file(content: bytes = b"") -> Iterator[Path]:
         yield path
 
 
-@contextlib.contextmanager
+@contextmanager
 def suppress_native_output() -> Iterator[None]:
-    """Mute warnings and all output within the block."""
+    """Mute warnings and all output of the process within the block.
+
+    Blocks of several threads may overlap: the output returns at the end of the last.
+    """
+    _MUTE.begin()
+    try:
+        yield
+    finally:
+        _MUTE.end()
+
+
+class _Mute:
+    """Mutes the process while at least one block runs.
+
+    If each block restored what it found, the end of the second of two overlapping blocks would
+    restore the muted output of the first, for good.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._blocks = 0
+        self._restore = contextlib.ExitStack()
+
+    def begin(self) -> None:
+        with self._lock:
+            if not self._blocks:
+                self._restore.enter_context(_muted_process())
+            self._blocks += 1
+
+    def end(self) -> None:
+        with self._lock:
+            self._blocks -= 1
+            if not self._blocks:
+                self._restore.close()
+
+
+_MUTE = _Mute()
+
+
+@contextmanager
+def _muted_process() -> Iterator[None]:
     with (
         warnings.catch_warnings(),
         contextlib.redirect_stdout(io.StringIO()),
