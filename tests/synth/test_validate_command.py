@@ -269,6 +269,15 @@ def test_a_shading_that_is_wrong_by_a_few_per_cent_is_rejected_with_its_maps(
     assert not found.passed and {"difference.R", "variance.G", "again.B"} <= set(found.maps)
 
 
+def test_a_scene_with_interreflections_agrees_with_its_new_render(tmp_path: Path) -> None:
+    """A white object would light its hollows more."""
+    arguments = ["--count", "1", "--size", "24", "--samples", "32", "--bounces", "1"]
+    chosen = ["--shapes", "height_field", "--materials", "lambert", "--lights", "sh"]
+    assert main(["synth", "-o", str(tmp_path / "s"), *arguments, *chosen, "--quiet"]) == 0
+    found = check_shading(next((tmp_path / "s").glob("*/*/scene.json")).parent, 0.01)
+    assert found.passed, found.text
+
+
 def test_text_from_outside_cannot_become_markup() -> None:
     evil = '<script>alert("x")</script>&'
     rng = np.random.default_rng(2)
