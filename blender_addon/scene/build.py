@@ -55,7 +55,7 @@ from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
 from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
-from .sun import ensure_lamps, ensure_sun, relight
+from .sun import ShownLight, ensure_lamps, ensure_sun, restore_light, shown_light
 from .world import ensure_world
 
 _NO_LAMPS = np.zeros((0, 3))
@@ -246,6 +246,7 @@ def _place(
         scene = ensure_scene(key)
     existing = find_tagged(bpy.data.objects, key, OBJECT)
     collection = ensure_collection(key, scene, existing)
+    light = _light_before(existing, options)
     images = {
         role: replace_image(image, key, role)
         for role in prepared.files
@@ -279,8 +280,9 @@ def _place(
         write_provenance(block, result, json.dumps(asdict(options)))
     lamps = options.own_scene and options.specular_from != "none"
     ensure_lamps(key, collection, *_lamps(result) if lamps else (_NO_LAMPS, _NO_LAMPS))
-    relight(obj, options.sun, scene)
-    camera = _ensure_camera_and_light(key, collection, obj, result, options, scene)
+    restore_light(obj, light, scene)
+    keep_sun = light.ambient is not None
+    camera = _ensure_camera_and_light(key, collection, obj, result, options, scene, keep_sun)
     photo = photo or images.get(ImageRole.PHOTO)
     if camera is not None and photo is not None:
         set_background_photo(camera, photo)
@@ -288,6 +290,15 @@ def _place(
     _set_scene(built, options, result)
     reset_view(material)  # the layer of highlights is valid for the present view
     return built
+
+
+def _light_before(existing: bpy.types.Object | None, options: BuildOptions) -> ShownLight:
+    """The light of an object that is updated, unless another one is requested than before."""
+    if existing is not None:
+        before = json.loads(existing.get("isc_options", "{}"))
+        if before.get("sun", options.sun) == options.sun:
+            return shown_light(existing)
+    return ShownLight(options.sun)
 
 
 def _lamps(result: ResultArrays) -> tuple[np.ndarray, np.ndarray]:
@@ -381,6 +392,7 @@ def _ensure_camera_and_light(
     result: ResultArrays,
     options: BuildOptions,
     scene: bpy.types.Scene,
+    keep_sun: bool,
 ) -> bpy.types.Object | None:
     """The photo's camera; in a shared scene, in a collection with a sun, if requested."""
     if not options.own_scene and not (options.light_and_camera or options.set_camera):
@@ -388,7 +400,7 @@ def _ensure_camera_and_light(
     if not options.own_scene:
         shown = options.set_camera or options.sun
         collection = ensure_optional_part(key, collection, scene, LIGHT_AND_CAMERA, shown)
-        if options.light_and_camera and not options.sun:
+        if options.light_and_camera and not options.sun and not keep_sun:
             ensure_sun(key, collection, result.sun_direction, result.sun_strength)
     place = world_matrix(obj)
     return ensure_camera(

@@ -8,6 +8,8 @@ already contains their diffuse light, so they contribute specular light alone. R
 its highlight.
 """
 
+from dataclasses import dataclass
+
 import bpy
 import numpy as np
 from mathutils import Vector
@@ -18,9 +20,10 @@ from ..datablocks.mesh import to_blender
 from ..datablocks.provenance import KEY, datablock_name, find_tagged, tag
 from .built_object import scene_of
 from .collection import LIGHT_AND_CAMERA, first_local, is_included, link_object
-from .world import set_sun_mix
+from .world import set_sun_mix, sun_mix
 
 _LAMPS = ("lamp1", "lamp2", "lamp3")
+_SAME_DIRECTION = 1 - 1e-6  # cosine of .08 degrees
 
 
 def ensure_sun(
@@ -150,6 +153,73 @@ def relight(
         if collection != part:
             collection.objects.unlink(current)
     return None
+
+
+@dataclass(frozen=True, eq=False)
+class ShownLight:
+    """How an object is lit before it is updated.
+
+    Attributes
+    ----------
+    sun : bool
+        Whether by a sun and uniform light instead of the environment map.
+    ambient : (3,) ndarray or None
+        The uniform light, if it or the sun is no longer the estimated one.
+    """
+
+    sun: bool
+    ambient: np.ndarray | None = None
+
+
+def shown_light(obj: bpy.types.Object) -> ShownLight:
+    """Return how an object is lit.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object made by ISC.
+
+    Returns
+    -------
+    ShownLight
+    """
+    sun = find_tagged(bpy.data.objects, obj[KEY], "sun")
+    mix = sun_mix(find_tagged(bpy.data.worlds, obj[KEY], "world"))
+    stored = [obj.get(f"isc_sun_{name}") for name in ("direction", "strength", "ambient")]
+    if sun is None or mix is None or any(value is None for value in stored):
+        return ShownLight(False)
+    direction, strength, ambient = (np.array(value, float) for value in stored)
+    toward = np.array(sun.matrix_basis.to_quaternion() @ Vector((0, 0, 1)))
+    same = (
+        toward @ to_blender(direction) > _SAME_DIRECTION * np.linalg.norm(direction)
+        and np.allclose(sun.data.energy * np.array(sun.data.color), strength, rtol=1e-3, atol=1e-6)
+        and (not mix.sun or np.allclose(mix.ambient, ambient, rtol=1e-3, atol=1e-6))
+    )
+    return ShownLight(mix.sun, None if same else mix.ambient)
+
+
+def restore_light(obj: bpy.types.Object, light: ShownLight, scene: bpy.types.Scene) -> None:
+    """Light an updated object as before: by the new estimate, or by the sun as the user left it.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object made by ISC.
+    light : ShownLight
+        Of the time before the update.
+    scene : bpy.types.Scene
+        Scene with the object.
+
+    Raises
+    ------
+    InputError
+        If the object stores no light.
+    """
+    if light.ambient is None:
+        relight(obj, light.sun, scene)
+        return
+    set_sun_mix(find_tagged(bpy.data.worlds, obj[KEY], "world"), light.ambient, light.sun)
+    hide_lamps(obj[KEY], light.sun)
 
 
 def sun_collection(obj: bpy.types.Object, scene: bpy.types.Scene) -> bpy.types.Collection:

@@ -9,7 +9,9 @@ of the recovered light, in degrees about Z.
 "Sun" in the Mix node: 0 is the environment map, 1 the uniform light that complements a sun.
 """
 
+from dataclasses import dataclass
 from math import radians
+from typing import Any
 
 import bpy
 import numpy as np
@@ -76,6 +78,41 @@ def ensure_world(
     return world
 
 
+@dataclass(frozen=True, eq=False)
+class SunMix:
+    """What a world shows.
+
+    Attributes
+    ----------
+    sun : bool
+        Whether the uniform light that complements a sun, instead of the environment map.
+    ambient : (3,) ndarray
+        That light, shown or not.
+    """
+
+    sun: bool
+    ambient: np.ndarray
+
+
+def sun_mix(world: bpy.types.World | None) -> SunMix | None:
+    """Return what a world shows.
+
+    Parameters
+    ----------
+    world : bpy.types.World or None
+
+    Returns
+    -------
+    SunMix or None
+        None where the world or its Mix node is missing.
+    """
+    mix = _mix_node(world)
+    if mix is None:
+        return None
+    factor, ambient = _mix_inputs(mix)
+    return SunMix(factor.default_value > 0.5, np.array(ambient.default_value[:3]))
+
+
 def set_sun_mix(world: bpy.types.World | None, ambient: np.ndarray, sun: bool) -> None:
     """Show the environment map, or the uniform light that complements a sun.
 
@@ -90,8 +127,19 @@ def set_sun_mix(world: bpy.types.World | None, ambient: np.ndarray, sun: bool) -
     sun : bool
         Whether to show the uniform light.
     """
-    mix = world.node_tree.nodes.get(SUN) if world else None
-    if mix is not None and mix.type == "MIX":
-        factor = next(socket for socket in mix.inputs if socket.type == "VALUE")
-        _, second = (socket for socket in mix.inputs if socket.type == "RGBA")
+    mix = _mix_node(world)
+    if mix is not None:
+        factor, second = _mix_inputs(mix)
         factor.default_value, second.default_value = float(sun), (*map(float, ambient), 1.0)
+
+
+def _mix_node(world: bpy.types.World | None) -> bpy.types.Node | None:
+    mix = world.node_tree.nodes.get(SUN) if world and world.node_tree else None
+    return mix if mix is not None and mix.type == "MIX" else None
+
+
+def _mix_inputs(mix: bpy.types.Node) -> tuple[Any, Any]:
+    """The sockets of the factor and of the uniform light."""
+    factor = next(socket for socket in mix.inputs if socket.type == "VALUE")
+    _, ambient = (socket for socket in mix.inputs if socket.type == "RGBA")
+    return factor, ambient

@@ -32,6 +32,7 @@ from blender_addon.scene.copies import (  # noqa: E402
     objects_sharing_material,
 )
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from blender_addon.scene.world import sun_mix  # noqa: E402
 from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 
@@ -144,6 +145,38 @@ def test_the_sun_takes_a_custom_direction(addon: Any, built: BuiltObject) -> Non
     assert "direction is zero" in error_of(
         addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0)
     )
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_an_update_keeps_the_light(addon: Any, bump_folder: Path, own: bool) -> None:
+    """The sun as it was left, or the new estimate of one that was not changed, or none."""
+    result, options = read_result(bump_folder), BuildOptions(own_scene=own)
+    brighter = replace(result, sun_strength=2 * result.sun_strength)
+
+    def light(built: BuiltObject) -> tuple[Any, ...]:
+        sun, mix = addon.data.objects.get("bump sun"), sun_mix(built.world)
+        assert mix is not None
+        lit = None if sun is None else (tuple(sun.rotation_quaternion), sun.data.energy)
+        return mix.sun, lit, *mix.ambient
+
+    built = build_object(result, options)
+    addon.context.window.scene = built.scene
+    addon.context.view_layer.objects.active = built.object
+    recovered = light(built)
+    assert not recovered[0] and light(build_object(result, options)) == recovered
+    addon.ops.isc.relight(light="OPTIMAL")
+    estimated = light(built)
+    assert estimated[0]
+    updated = light(build_object(brighter, options))
+    assert updated[1][1] == pytest.approx(2 * estimated[1][1]) and updated[0]
+    addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0.5)
+    chosen = light(built)
+    assert light(build_object(result, options)) == chosen != updated
+    addon.data.objects["bump sun"].data.energy = 7
+    assert light(build_object(brighter, options))[1] == (chosen[1][0], 7)
+    assert light(build_object(result, replace(options, sun=True))) == estimated, "as requested"
+    addon.ops.isc.relight(light="RECOVERED")
+    assert not light(build_object(result, replace(options, sun=True)))[0]
 
 
 def shared(addon: Any, folder: Path) -> BuiltObject:
