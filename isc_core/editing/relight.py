@@ -252,7 +252,7 @@ def _highlights(
         note = (
             ""
             if choice.highlights == "scale"
-            else "no lobe is known, so the highlights follow the shading and do not move"
+            else "the gloss is unknown, so the highlights follow the shading and do not move"
         )
         scale = choice.exposure * np.minimum(ratio / choice.exposure, _MAX_SCALE)
         return as_map(present[d.mask] * scale, d.mask), note

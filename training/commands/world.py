@@ -16,7 +16,7 @@ from ..world.pack import all_views, pack_worlds
 SUMMARY = "ray trace objects from random sides"
 
 _EXAMPLES = """  isc world build -o WORLD --count 50
-  isc world build -o WORLD --furniture SH3F --urdfs URDFS --scans PLY --built 1200 --families 600
+  isc world build -o WORLD --furniture SH3F --urdfs URDFS --scans PLY --built 1200 --families 400
 
 An interrupted build continues in the same folder. Each object is traced once: where its surface is,
 and which of 64 directions see past it. Training lights it anew for every photo."""

@@ -35,8 +35,8 @@ def add_photo(parser: argparse.ArgumentParser, *, several: bool = False) -> None
         metavar="PHOTO",
         type=Path,
         nargs="+" if several else None,
-        help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy; - reads standard "
-        "input",
+        help="PNG, JPEG, TIFF, HEIC, AVIF, camera raw, EXR, HDR, BMP, PPM, PGM or NumPy .npy; - "
+        "reads standard input",
     )
 
 
