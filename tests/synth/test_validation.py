@@ -182,6 +182,21 @@ def test_on_a_diffuse_scene_only_removed_light_counts() -> None:
     assert robbed.taken == pytest.approx(0.1, rel=1e-5) and robbed.mse_ratio is None
 
 
+def test_noise_is_no_highlight() -> None:
+    """A photo with noise of a diffuse scene stays a diffuse scene."""
+    truth = sphere(share=0.0)
+    noise = np.random.default_rng(0).normal(0, 0.01, truth.image.shape).astype(np.float32)
+    noise[~truth.mask] = 0
+    photo = replace(truth, image=truth.image + noise, residual=noise)
+    left = Separation(
+        photo.image,
+        np.zeros_like(photo.image),
+        np.zeros_like(photo.image),
+        np.ones(truth.mask.shape, np.float32),
+    )
+    assert score_separation(photo, left) == SeparationScores(taken=0.0)
+
+
 def test_the_exact_answer_has_no_error() -> None:
     truth = sphere()
     inputs = stage_inputs(truth, TRUTHS)

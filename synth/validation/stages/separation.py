@@ -22,7 +22,7 @@ from .pictures import exposure, lit, signed_error
 from .types import Metric, Stage, StageInputs, StageOptions, StagePicture
 
 _EQUAL = 120.0  # dB, for equal images: near the precision of float32
-_LEAST = 1e-12  # mean square error of the photo below which there is no highlight to remove
+_LEAST = 1e-12  # mean square of the specular layer below which there is no highlight to remove
 _DROPPED = 0.2
 
 
@@ -112,13 +112,12 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
         For an empty mask.
     """
     mask = truth.mask
+    black = np.zeros_like(truth.image)
+    # Not the photo less the diffuse layer: the sensor's noise is no highlight.
+    if mse(black, truth.specular, mask) <= _LEAST:
+        changed, light = (mse(truth.image, other, mask) for other in (answer.diffuse, black))
+        return SeparationScores(taken=math.sqrt(changed / max(light, _LEAST)))
     nothing, wrong = mse(truth.diffuse, truth.image, mask), mse(truth.diffuse, answer.diffuse, mask)
-    if nothing <= _LEAST:
-        return SeparationScores(
-            taken=math.sqrt(
-                wrong / max(float(np.square(truth.image[mask].astype(float)).mean()), _LEAST)
-            )
-        )
     squared = np.square(answer.diffuse[mask].astype(float) - truth.diffuse[mask]).mean(axis=1)
     confidence = answer.confidence[mask]
     sortable = wrong > _LEAST
@@ -129,7 +128,7 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
         lmse_specular=_local(truth.specular, answer.specular, mask),
         psnr_diffuse=min(_EQUAL, psnr(truth.diffuse, answer.diffuse, mask)),
         psnr_specular=min(_EQUAL, psnr(truth.specular, answer.specular, mask)),
-        mse_ratio=wrong / nothing,
+        mse_ratio=wrong / max(nothing, _LEAST),
         removed=sparsification(squared, confidence).removed(_DROPPED) if sortable else None,
         rank=rank_correlation(confidence, squared) if sortable and np.ptp(confidence) > 0 else None,
     )
