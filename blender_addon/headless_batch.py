@@ -111,7 +111,7 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
             try:
                 folder, problem = _make_result(plan.source, parent, options, part.part(0.0, 0.9))
                 if problem:
-                    report.failures.append(f"{plan.source.path}: {problem}")
+                    report.failures.append(_failure(plan.source.path, problem))
                 folders = object_folders(folder) if _each(plan.source, options) else [folder]
                 lines = [note for result in folders for note in result_notes(result)]
                 if notes := join_notes(dict.fromkeys(lines)):
@@ -121,8 +121,14 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
                     _write_outputs(folder, plan, options, part.part(0.9, 1.0), new_file_needed)
                     previous = plan.blend
             except InputError as error:
-                report.failures.append(f"{plan.source.path}: {error}")
+                report.failures.append(_failure(plan.source.path, str(error)))
     return report
+
+
+def _failure(path: Path, reason: str) -> str:
+    """A line that names the source once: most messages on a file begin with its path."""
+    named = reason.startswith((str(path), str(path.resolve())))
+    return reason if named else f"{path}: {reason}"
 
 
 def plan_outputs(options: argparse.Namespace) -> list[OutputPlan]:
