@@ -25,7 +25,7 @@ import numpy as np
 from ..datasets.mit_berkeley import MitBerkeleyObject, check_request, list_objects, load_object
 from ..errors import InputError
 from ..progress import Monitor
-from .metrics import Scores, geometric_mean, score
+from .metrics import Scores, geometric_mean, require_truth, score
 
 _HEADINGS = (
     "light",
@@ -264,7 +264,7 @@ def evaluate(
     Raises
     ------
     InputError
-        If a name or option is unknown; before the first run.
+        If a name or option is unknown, or an object cannot be read or scored; before the first run.
     Cancelled
         If the monitor cancels; between objects.
     """
@@ -279,6 +279,8 @@ def evaluate(
         raise InputError("nothing to evaluate: name at least one object and one illumination")
     for light, name in jobs:
         check_request(root, name, light, input)
+    for light, name in jobs:
+        require_truth(load_object(root, name, light, input))
     results = []
     for done, (light, name) in enumerate(jobs):
         part = monitor.part(done / len(jobs), (done + 1) / len(jobs))

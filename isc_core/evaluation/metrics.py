@@ -23,6 +23,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from ..datasets.mit_berkeley import MitBerkeleyObject
+from ..errors import InputError
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
 from ..shading.surface_stencils import normals
 
@@ -95,19 +96,18 @@ def score(
 
     Raises
     ------
+    InputError
+        As `require_truth`.
     ValueError
         If a shape is wrong, or an estimate is not finite where it is used.
     """
+    require_truth(truth)
     if light.shape != truth.light.shape or not np.isfinite(light).all():
         raise ValueError(f"{truth.name}: the light must be {truth.light.shape} finite coefficients")
     _require(truth, height=height, normal=normal, shading=shading, reflectance=reflectance)
     true_normal = truth_normal(truth.height)
     known = np.isfinite(true_normal[..., 2])
-    compared = known & truth.valid
-    compared[[0, -1], :] = False
-    compared[:, [0, -1]] = False
-    if not compared.any():
-        raise ValueError(f"{truth.name}: no pixel has both a valid input and a known height")
+    compared = _compared(truth, known)
     return Scores(
         height=height_error(truth.height, height),
         normal=angular_error(true_normal[known], normal[known]),
@@ -119,6 +119,34 @@ def score(
         / 2,
         light=light_error(light_from_reference(truth.light), light),
     )
+
+
+def require_truth(truth: MitBerkeleyObject) -> None:
+    """Check that the errors of an object are defined, whatever the estimate.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        The object.
+
+    Raises
+    ------
+    InputError
+        If no pixel can be compared, or shading, reflectance or light cannot be.
+    """
+    name = f"{truth.name}, {truth.illumination}"
+    compared = _compared(truth, np.isfinite(truth_normal(truth.height)[..., 2]))
+    if not compared.any():
+        raise InputError(f"{name}: no pixel inside the crop has both an image and a known height")
+    for layer, values in (("shading", truth.shading), ("reflectance", truth.reflectance)):
+        if not np.isfinite(values[compared]).all():
+            raise InputError(f"{name}: its {layer} has values that are not finite")
+        if not values[compared].any(axis=0).all():
+            raise InputError(f"{name}: its {layer} has a channel that is zero everywhere")
+    with np.errstate(over="ignore", invalid="ignore"):
+        brightness = np.square(np.exp(_probe_basis() @ light_from_reference(truth.light))).sum()
+    if not np.isfinite(brightness):
+        raise InputError(f"{name}: its light has coefficients that are not finite, or too large")
 
 
 def truth_normal(height: np.ndarray) -> np.ndarray:
@@ -209,12 +237,7 @@ def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
     float
         Mean square difference.
     """
-    axis = (np.arange(1, _LIGHT_PROBE + 1) - _LIGHT_PROBE / 2) / (_LIGHT_PROBE / 2)
-    down, right = np.meshgrid(axis, axis, indexing="ij")
-    squared = 1 - down * down - right * right
-    front = squared > 0
-    probe = np.stack([down[front], right[front], np.sqrt(squared[front])], axis=-1)
-    basis = real_sh(normal_from_reference(probe))
+    basis = _probe_basis()
     return scaled_mse(np.exp(basis @ truth), np.exp(basis @ estimate))
 
 
@@ -328,6 +351,24 @@ def geometric_mean(values: Iterable[float]) -> float:
     if not numbers or min(numbers) < 0:
         raise ValueError("a geometric mean needs at least one number, and none below 0")
     return 0.0 if min(numbers) == 0 else math.exp(math.fsum(map(math.log, numbers)) / len(numbers))
+
+
+def _compared(truth: MitBerkeleyObject, known: np.ndarray) -> np.ndarray:
+    """The pixels (h, w) of the image errors: valid, with a known normal, not at the border."""
+    compared = known & truth.valid
+    compared[[0, -1], :] = False
+    compared[:, [0, -1]] = False
+    return compared
+
+
+def _probe_basis() -> np.ndarray:
+    """The basis functions (N, 9) at the normals of the light probe."""
+    axis = (np.arange(1, _LIGHT_PROBE + 1) - _LIGHT_PROBE / 2) / (_LIGHT_PROBE / 2)
+    down, right = np.meshgrid(axis, axis, indexing="ij")
+    squared = 1 - down * down - right * right
+    front = squared > 0
+    probe = np.stack([down[front], right[front], np.sqrt(squared[front])], axis=-1)
+    return real_sh(normal_from_reference(probe))
 
 
 def _window_sums(image: np.ndarray) -> np.ndarray:

@@ -261,6 +261,35 @@ def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
             evaluate(root, model="never", runner=never, **options)
 
 
+@pytest.mark.parametrize(
+    ("file", "values", "told"),
+    [
+        ("laboratory/bowl/Z.mat", {"depth": np.full((40, 44), np.nan)}, "known height"),
+        ("natural/bowl/L.mat", {"L": np.full((9, 3), np.nan)}, "its light"),
+        ("natural/bowl/L.mat", {"L": np.full((9, 3), 500.0)}, "its light"),
+        ("laboratory/bowl/reflectance.png", None, "reflectance has a channel"),
+        (
+            "laboratory/bowl/shading_corrected_color.mat",
+            {"shading_correct": np.full((40, 44, 3), np.nan)},
+            "shading has values that are not finite",
+        ),
+    ],
+)
+def test_truth_that_cannot_be_scored_is_found_before_the_first_run(
+    tmp_path: Path, file: str, values: dict[str, np.ndarray] | None, told: str
+) -> None:
+    def never(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
+        raise AssertionError("must not run")
+
+    path = write_set(tmp_path) / file
+    if values is None:
+        assert cv2.imwrite(str(path), np.zeros((40, 44, 3), np.uint16))
+    else:
+        scipy.io.savemat(path, values)
+    with pytest.raises(InputError, match=f"^bowl, .*{told}"):
+        evaluate(tmp_path, model="never", runner=never)
+
+
 def test_a_name_given_twice_counts_once(root: Path) -> None:
     assert (
         len(
