@@ -2,8 +2,9 @@
 
 A `.glb` and a `.usdz` contain all data. Next to an `.obj` (with its `.mtl`) and a `.usd`, `.usda`
 or `.usdc` are the textures NAME_basecolor.png, NAME_mesh_normal.png (where the mesh has fewer
-vertices than pixels), NAME_specular.png (where the level varies) and NAME_alpha.png (where the rim
-is soft), NAME being that of the file.
+vertices than pixels), for the specular level, where it varies, NAME_specular.png (sRGB) or, of USD,
+NAME_ior.png, and where the rim is soft NAME_alpha.png or, of USD, NAME_opacity.png. NAME is that of
+the file.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -4,9 +4,10 @@ Format: lines of vertices (`v`), texture coordinates (`vt`, v from the bottom), 
 faces (`f`), whose indices begin at 1. The material's roughness `Pr`, metallic `Pm` and normal map
 `norm` are the extension for physically based materials (R. Mach, exocortex, 2013), which Blender
 and others read; `Ns` and `Ks` are what Blender writes for the same roughness and specular level, .5
-being plastic. Blender reads the normal map from `map_Bump`, which programs that support `norm`
-ignore. It imports that image as sRGB, and the format has no way to say otherwise: users must set
-its colour space to Non-Color.
+being plastic. A level above 1 raises the index of refraction `Ni` instead. Blender reads the normal
+map from `map_Bump`, which programs that support `norm` ignore. It imports all images as sRGB, and
+the format has no way to say otherwise: `map_Ks`, a colour, is stored as sRGB; for the normal map,
+users must set the colour space to Non-Color.
 
 Citation: M. Ramey et al., "Object files (.obj)", Wavefront Technologies 1995 (no DOI).
 
@@ -18,8 +19,9 @@ from pathlib import Path
 
 import numpy as np
 
+from ...imaging.srgb import srgb_codes
 from ..mesh.result import MeshResult
-from .textures import PLASTIC, MeshTextures, plain_stem
+from .textures import PLASTIC, MeshTextures, plain_stem, refraction
 
 _ROWS = 1 << 14  # formatted at a time
 
@@ -64,19 +66,29 @@ def _rows(line: str, values: np.ndarray) -> Iterator[str]:
 
 
 def _material(built: MeshResult, name: str, textures: MeshTextures) -> str:
-    level = 1.0 if textures.specular else min(PLASTIC * built.specular, 1.0)
+    variation, alpha = built.gloss.variation, built.alpha
+    level = PLASTIC * built.specular
+    largest = level if variation is None else level * float(variation.max())
+    strength = min(level, 1.0)
+    maps = [f"map_Kd {textures.base_color}"]
+    if textures.normal:
+        maps += [f"norm {textures.normal}", f"map_Bump -bm 1 {textures.normal}"]
+    if variation is not None:
+        strength = 1.0
+        share = level / max(largest, 1.0) * variation
+        maps.append(f"map_Ks {textures.add('specular', srgb_codes(share))}")
+    if alpha is not None:
+        # Some programs read the grey value, others, such as Blender, the alpha channel.
+        maps.append(f"map_d {textures.add('alpha', np.dstack([alpha] * 4))}")
     lines = [
         f"newmtl {name}",
         "Kd 1 1 1",
-        f"Ks {level:.6g} {level:.6g} {level:.6g}",
+        f"Ks {strength:.6g} {strength:.6g} {strength:.6g}",
         f"Ns {1000 * (1 - built.roughness) ** 2:.6g}",
+        f"Ni {refraction(max(largest, 1.0)):.6g}",
         "illum 2",
         f"Pr {built.roughness:.6g}",
         f"Pm {built.options.metallic:.6g}",
-        f"map_Kd {textures.base_color}",
-        *([f"norm {textures.normal}"] if textures.normal else []),
-        *([f"map_Bump -bm 1 {textures.normal}"] if textures.normal else []),
-        *([f"map_Ks {textures.specular}"] if textures.specular else []),
-        *([f"map_d {textures.alpha}"] if textures.alpha else []),
+        *maps,
     ]
     return "\n".join(["# ISC", *lines, ""])

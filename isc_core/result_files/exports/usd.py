@@ -2,7 +2,7 @@
 
 Layout: the default prim is named after the file and contains the mesh and its material. The Y axis
 points up, the unit is the metre. A specular level becomes the index of refraction with f0 = .04
-level; where it varies, the material uses the specular workflow, with f0 in a texture.
+level, in a texture where it varies: Blender and others do not support the specular workflow.
 
 Reference: Pixar, "UsdPreviewSurface specification", version 2.6,
 https://openusd.org/release/spec_usdpreviewsurface.html.
@@ -14,17 +14,15 @@ texture coordinates.
 import os
 import re
 import tempfile
-from math import sqrt
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
 from ...extras import install_command
-from ...shading.brdf.ggx import F0
+from ...imaging.srgb import share_codes
 from ..mesh.result import MeshResult
-from .textures import PLASTIC, MeshTextures, plain_stem
-
-_MOST = 0.96  # of f0, so that the index of refraction is finite
+from .textures import MeshTextures, plain_stem, refraction
 
 
 def encode_usd(built: MeshResult, path: Path) -> dict[str, bytes]:
@@ -50,19 +48,19 @@ def encode_usd(built: MeshResult, path: Path) -> dict[str, bytes]:
     from pxr import Sdf, UsdUtils
 
     name, packed = plain_stem(path), path.suffix.lower() == ".usdz"
-    textures = MeshTextures.of(built, name)
+    material = _Material.of(built, name)
     with tempfile.TemporaryDirectory(prefix="isc-usd-") as place:
         folder = Path(place)
-        for file, content in textures.files.items():
+        for file, content in material.textures.files.items():
             (folder / file).write_bytes(content)
         scene = folder / f"scene{'.usdc' if packed else path.suffix.lower()}"
-        _write_stage(built, textures, scene, name)
+        _write_stage(built, material, scene, name)
         if packed:
             package = folder / "scene.usdz"
             if not UsdUtils.CreateNewUsdzPackage(Sdf.AssetPath(os.fspath(scene)), str(package)):
                 raise InputError(f"{path}: usd-core cannot write the package: choose .usdc")
             return {path.name: package.read_bytes()}
-        return {path.name: scene.read_bytes(), **textures.files}
+        return {path.name: scene.read_bytes(), **material.textures.files}
 
 
 def require_usd(path: Path) -> None:
@@ -87,7 +85,29 @@ def require_usd(path: Path) -> None:
         ) from error
 
 
-def _write_stage(built: MeshResult, textures: MeshTextures, path: Path, name: str) -> None:
+@dataclass(frozen=True)
+class _Material:
+    """What the material refers to; `refraction` is the largest index of refraction, and `opacity`
+    and `variation` of the index are files, or None.
+    """
+
+    textures: MeshTextures
+    refraction: float
+    opacity: str | None
+    variation: str | None
+
+    @staticmethod
+    def of(built: MeshResult, name: str) -> "_Material":
+        textures, variation = MeshTextures.of(built, name), built.gloss.variation
+        opacity = None if built.alpha is None else textures.add("opacity", built.alpha)
+        index = refraction(built.specular * (1.0 if variation is None else variation))
+        largest, file = float(index.max()), None
+        if variation is not None and largest > 1:
+            file = textures.add("ior", share_codes((index - 1) / (largest - 1)))
+        return _Material(textures, largest, opacity, file)
+
+
+def _write_stage(built: MeshResult, material: _Material, path: Path, name: str) -> None:
     from pxr import Kind, Usd, UsdGeom
 
     stage = Usd.Stage.CreateNew(os.fspath(path))
@@ -97,7 +117,7 @@ def _write_stage(built: MeshResult, textures: MeshTextures, path: Path, name: st
     stage.SetDefaultPrim(root.GetPrim())
     Usd.ModelAPI(root).SetKind(Kind.Tokens.component)
     mesh = _mesh(stage, f"{root.GetPath()}/mesh", built)
-    _bind_material(stage, f"{root.GetPath()}/material", mesh, built, textures)
+    _bind_material(stage, f"{root.GetPath()}/material", mesh, built, material)
     stage.GetRootLayer().Save()
 
 
@@ -131,12 +151,10 @@ def _mesh(stage: Any, path: str, built: MeshResult) -> Any:
     return mesh
 
 
-def _bind_material(
-    stage: Any, path: str, mesh: Any, built: MeshResult, textures: MeshTextures
-) -> None:
+def _bind_material(stage: Any, path: str, mesh: Any, built: MeshResult, given: _Material) -> None:
     from pxr import Gf, Sdf, UsdShade
 
-    kinds = Sdf.ValueTypeNames
+    kinds, textures = Sdf.ValueTypeNames, given.textures
     material = UsdShade.Material.Define(stage, path)
     surface = UsdShade.Shader.Define(stage, f"{path}/surface")
     surface.CreateIdAttr("UsdPreviewSurface")
@@ -164,18 +182,11 @@ def _bind_material(
     texture("diffuseColor", textures.base_color, "sRGB", kinds.Color3f, 1, 0)
     if textures.normal:
         texture("normal", textures.normal, "raw", kinds.Normal3f, 2, -1)
-    if textures.alpha:
-        texture("opacity", textures.alpha, "raw", kinds.Float, 1, 0)
-    if textures.specular:
-        surface.CreateInput("useSpecularWorkflow", kinds.Int).Set(1)
-        texture("specularColor", textures.specular, "raw", kinds.Color3f, F0 / PLASTIC, 0)
+    if given.opacity:
+        texture("opacity", given.opacity, "raw", kinds.Float, 1, 0)
+    if given.variation:
+        texture("ior", given.variation, "raw", kinds.Float, given.refraction - 1, 1)
     else:
-        surface.CreateInput("ior", kinds.Float).Set(_refraction(built.specular))
+        surface.CreateInput("ior", kinds.Float).Set(given.refraction)
     material.CreateSurfaceOutput().ConnectToSource(surface.ConnectableAPI(), "surface")
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
-
-
-def _refraction(level: float) -> float:
-    """The index of refraction whose f0 is that of a specular level."""
-    amplitude = sqrt(min(F0 * level, _MOST))
-    return (1 + amplitude) / (1 - amplitude)

@@ -295,9 +295,25 @@ def test_a_soft_rim_in_other_formats(fur: Path, tmp_path: Path) -> None:
         assert exported(fur, "--format", kind, "-o", tmp_path / file) == 0
     assert "map_d a_alpha.png" in (tmp_path / "a.mtl").read_text()
     assert "inputs:opacity.connect" in (tmp_path / "b.usda").read_text()
-    with Image.open(tmp_path / "b_alpha.png") as image:
-        alpha = np.asarray(image)
+    alpha = np.asarray(Image.open(tmp_path / "b_opacity.png"))
     assert alpha.ndim == 2 and (alpha[:, :60] == 255).all() and (alpha == 0).any()
+    # Programs read the opacity of an OBJ from the grey value or from the alpha channel.
+    assert (np.asarray(Image.open(tmp_path / "a_alpha.png")) == alpha[..., None]).all()
+
+
+def test_blender_reads_the_opacity_of_an_obj(fur: Path, tmp_path: Path) -> None:
+    bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")
+    assert exported(fur, "--format", "obj", "-o", tmp_path / "a.obj") == 0
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert bpy.ops.wm.obj_import(filepath=str(tmp_path / "a.obj")) == {"FINISHED"}
+    tree = bpy.data.objects[0].data.materials[0].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    link = shader.inputs["Alpha"].links[0]
+    image = link.from_node.image
+    values = np.empty(4 * image.size[0] * image.size[1], np.float32)
+    image.pixels.foreach_get(values)
+    channel = 3 if link.from_socket.name == "Alpha" else 0
+    assert values[channel::4].min() == 0 and values[channel::4].max() == 1
 
 
 @pytest.mark.parametrize("kind", ["fur", "smooth"])

@@ -166,17 +166,65 @@ def test_a_level_that_varies_is_a_texture_of_usd_and_obj(tmp_path: Path) -> None
 
     built = glossy(varying())
     write_mesh_file(built, tmp_path / "ball.usdc", "usd")
-    found = codes(tmp_path / "ball_specular.png") / 255
-    assert np.abs(found - 0.5 * built.specular * varying()).max() < 0.003
     stage = stage_of(tmp_path / "ball.usdc")
     surface = UsdShade.Shader(stage.GetPrimAtPath("/ball/material/surface"))
-    assert surface.GetInput("useSpecularWorkflow").Get() == 1
-    reader = UsdShade.Shader(
-        surface.GetInput("specularColor").GetConnectedSources()[0][0].source.GetPrim()
-    )
-    assert reader.GetInput("scale").Get()[0] == pytest.approx(0.08)
+    assert not surface.GetInput("useSpecularWorkflow")
+    reader = UsdShade.Shader(surface.GetInput("ior").GetConnectedSources()[0][0].source.GetPrim())
+    scale, bias = (reader.GetInput(name).Get()[0] for name in ("scale", "bias"))
+    index = scale * codes(tmp_path / "ball_ior.png") / 255 + bias
+    level = built.specular * varying()
+    assert np.abs(((index - 1) / (index + 1)) ** 2 - 0.04 * level).max() < 0.001
     write_mesh_file(built, tmp_path / "ball.obj", "obj")
     assert "Ks 1 1 1\n" in (tmp_path / "ball.mtl").read_text()
+    assert np.abs(obj_reflectance(tmp_path / "ball.mtl") - 0.04 * level).max() < 0.001
+
+
+def obj_reflectance(library: Path) -> np.ndarray:
+    """The reflectance along the normal that Blender takes from a material library."""
+    lines = (line.split() for line in library.read_text().splitlines())
+    values = {words[0]: words[-1] for words in lines if words}
+    strength = np.asarray(float(values["Ks"]))
+    if "map_Ks" in values:
+        strength = srgb_to_linear(codes(library.parent / values["map_Ks"]) / 255)
+    index = float(values["Ni"])
+    return 2 * strength * ((index - 1) / (index + 1)) ** 2
+
+
+@pytest.mark.parametrize("variation", [None, varying()])
+def test_a_level_above_the_range_of_an_obj_raises_the_index(
+    tmp_path: Path, variation: np.ndarray | None
+) -> None:
+    built = glossy(variation)
+    high = replace(built.gloss, specular=3.0 / built.reflectance_scale)
+    write_mesh_file(replace(built, gloss=high), tmp_path / "ball.obj", "obj")
+    wanted = 0.12 * (1.0 if variation is None else variation)
+    assert np.abs(obj_reflectance(tmp_path / "ball.mtl") - wanted).max() < 0.001
+
+
+@pytest.mark.parametrize("suffix", ["obj", "usdc"])
+def test_blender_reads_a_level_that_varies(tmp_path: Path, suffix: str) -> None:
+    bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")
+    pytest.importorskip("pxr.Usd", reason="needs usd-core (extra `usd`)")
+    path = tmp_path / f"ball.{suffix}"
+    write_mesh_file(glossy(varying()), path, suffix[:3])
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    read = bpy.ops.wm.obj_import if suffix == "obj" else bpy.ops.wm.usd_import
+    assert read(filepath=str(path)) == {"FINISHED"}
+    thing = next(one for one in bpy.data.objects if one.type == "MESH")
+    tree = thing.data.materials[0].node_tree
+    shader = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
+    linked = {"obj": "Specular IOR Level", "usdc": "IOR"}[suffix]
+    assert shader.inputs[linked].is_linked and not shader.inputs["Specular Tint"].is_linked
+    space = {"obj": ("specular", "sRGB"), "usdc": ("ior", "Non-Color")}[suffix]
+    image = bpy.data.images[f"ball_{space[0]}.png"]
+    assert image.colorspace_settings.name == space[1]
+
+
+def test_names_begin_with_no_option(tmp_path: Path) -> None:
+    write_mesh_file(glossy(), tmp_path / "-cup.obj", "obj")
+    lines = (tmp_path / "_cup.mtl").read_text().splitlines()
+    assert "map_Kd _cup_basecolor.png" in lines
+    assert "mtllib _cup.mtl" in (tmp_path / "-cup.obj").read_text()
 
 
 def test_blender_reads_the_usd(tmp_path: Path) -> None:
