@@ -138,7 +138,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     d, part = stored.result, stored.part
     name = safe_name(options.name or _name_of(d, options.result))
     if options.textures is not None:
-        require_writable(output, texture_files(name), (options.result / MASK,))
+        inputs = (options.result / MASK, options.photo, options.mask)
+        require_writable(output, texture_files(name), inputs)
     monitor.report("building the mesh", 0.2)
     seen = read_cover(options.result / MASK, stored.result.provenance.input)
     cover = object_cover(stored, seen)

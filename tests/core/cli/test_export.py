@@ -150,6 +150,22 @@ def test_a_texture_does_not_replace_the_photo(
     assert photo.read_bytes() == before and not (tmp_path / "cup.obj").exists()
 
 
+def test_a_texture_set_does_not_replace_the_photo(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo = ball_photo(tmp_path)
+    words = ["decompose", str(photo), "-q", "--model", "naive", "--max-size", "24"]
+    assert main([*words, "-o", str(tmp_path / "result")]) == 0
+    given = [tmp_path / "result", "--textures", "generic", "--roughness", "0.5", "-q"]
+    assert exported(*given, "--name", "cup", "-o", tmp_path / "set") == 0
+    photo = photo.rename(tmp_path / "set" / "cup_basecolor.png")
+    before = photo.read_bytes()
+    again = [*given, "--name", "cup", "--photo", photo, "-o", tmp_path / "set"]
+    assert exported(*again) == 2
+    assert "choose another folder" in capsys.readouterr().err
+    assert photo.read_bytes() == before
+
+
 def test_another_photo_is_refused(
     result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
