@@ -1,12 +1,16 @@
 """The photo of a result, read again at its own resolution."""
 
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from ...errors import InputError
 from ...io.limits import Limits
 from ...photo import Photo, read_photo
 from ...photo.found_mask import FOUND
 from ...photo.transfer import PROFILE
+from ...result_files.mesh.object_cover import read_cover
 from ...result_files.result_folder import MASK
 from ...scene.decomposition import Decomposition
 
@@ -58,4 +62,15 @@ def photo_of_result(
                 f"{folder} has no {MASK}, the mask that was found in its photo: give the mask with "
                 "--mask, or decompose the photo again"
             )
-    return read_photo(photo, mask, "auto" if curve == PROFILE else curve, limits=limits)
+    read = read_photo(photo, mask, "auto" if curve == PROFILE else curve, limits=limits)
+    if mask is None and given.get("mask_from") == "alpha":
+        return _own_object(read, read_cover(folder / MASK, given))
+    return read
+
+
+def _own_object(photo: Photo, cover: np.ndarray | None) -> Photo:
+    """The photo with the mask of one object, where the alpha channel shows several."""
+    if cover is None or cover.shape != photo.mask.shape:
+        return photo
+    mask = photo.mask & (cover >= 0.5)
+    return replace(photo, mask=mask, cover=cover) if mask.any() else photo

@@ -79,6 +79,25 @@ def two_balls(folder: Path) -> Path:
     return write_image(folder / "shelf.png", both)
 
 
+@pytest.mark.slow
+def test_an_edit_of_one_of_several_objects_changes_it_only(tmp_path: Path) -> None:
+    """The alpha channel shows all objects; `mask.png` of the result says which."""
+    with Image.open(two_balls(tmp_path)) as image:
+        color = np.asarray(image.convert("RGB"))
+    alpha = np.where(color.any(-1), np.uint8(255), np.uint8(0))
+    photo = tmp_path / "balls.png"
+    Image.fromarray(np.dstack([color, alpha])).save(photo)
+    assert isc("decompose", photo, "--each", *NAIVE, "-q", "-o", tmp_path / "out") == 0
+    for number in (1, 2):
+        given = ("edit", tmp_path / "out" / str(number), "recolour", "--value", "0.5")
+        assert isc(*given, "--photo", photo, "-q", "-o", tmp_path / "edit") == 0
+        after = np.asarray(Image.open(tmp_path / "edit" / "edited.png"))
+        columns = np.nonzero((after[..., :3] != color).any((0, 2)))[0]
+        half = color.shape[1] / 2
+        assert len(columns) > 20
+        assert columns.max() < half if number == 1 else columns.min() > half
+
+
 def test_a_failing_object_does_not_stop_the_others(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
