@@ -178,8 +178,10 @@ def load_rendered(folder: str | Path) -> SeparationTruth:
         _same_size(image, diffuse, folder)
         mask = read_linear(_image(folder, "mask"))[..., 0] > 0.2
         _same_size(image, mask, folder)
+    # A sensor clips at exactly 1; above it, an EXR file was rendered without a sensor.
+    clipped = mask & (image == 1).any(axis=2)
     return SeparationTruth(
-        folder.name, image, mask, diffuse, np.maximum(image - diffuse, 0), np.zeros_like(mask)
+        folder.name, image, mask, diffuse, np.maximum(image - diffuse, 0), clipped
     )
 
 

@@ -14,6 +14,7 @@ from isc_core.imaging.framing import continued_height
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.shading.spherical_harmonics import real_sh
+from synth.capture.sensor import Sensor, observe
 from synth.capture.truth import GroundTruth
 from synth.dataset.reading import SceneFacts
 from synth.validation.checks.render_checks import check_identities
@@ -195,6 +196,20 @@ def test_noise_is_no_highlight() -> None:
         np.ones(truth.mask.shape, np.float32),
     )
     assert score_separation(photo, left) == SeparationScores(taken=0.0)
+
+
+@pytest.mark.parametrize("bits", [0, 8, 16])
+def test_only_what_the_sensor_clips_is_clipped(bits: int) -> None:
+    """Not light above 1 in a photo without clipping, whose residual is rounding or noise."""
+    truth = sphere(share=2.0).brightened(1.1)
+    bright = truth.mask & (truth.image > 1.05).any(axis=2)
+    rng = np.random.default_rng(0)
+    for noise in (0.0, 0.001):
+        whole = observe(truth, Sensor(clip=False, noise=noise), rng)
+        assert not stage_inputs(whole, ()).clipped.any()
+        cut = observe(truth, Sensor(clip=True, noise=noise, bits=bits), rng)
+        assert stage_inputs(cut, ()).clipped[bright].all()
+        assert not stage_inputs(cut, ()).clipped[(truth.image < 0.95).all(axis=2)].any()
 
 
 def test_the_exact_answer_has_no_error() -> None:

@@ -217,7 +217,8 @@ def stage_inputs(
         The inputs.
     """
     mask = truth.mask
-    clipped = mask & (truth.image >= 1).any(axis=2) & (truth.residual < 0).any(axis=2)
+    # A sensor clips at exactly 1; above it, the photo was rendered without clipping.
+    clipped = mask & (truth.image == 1).any(axis=2)
     return StageInputs(
         truth.image,
         mask,

@@ -80,6 +80,16 @@ def test_rendered_scenes_are_read_in_both_forms(tmp_path: Path) -> None:
         assert np.allclose(truth.specular, scene.specular, atol=1e-6)
 
 
+def test_pixels_at_full_scale_are_clipped_and_brighter_ones_are_not(tmp_path: Path) -> None:
+    image = np.full((4, 4, 3), 0.5)
+    image[0, 0, 1], image[1, 1] = 1, 3
+    layers = {
+        f"{name}.{c}": image[..., i] for name in ("image", "diffuse") for i, c in enumerate("RGB")
+    }
+    write_channels(tmp_path / "maps.exr", layers | {"mask.A": np.ones((4, 4))})
+    assert np.argwhere(load_rendered(tmp_path).clipped).tolist() == [[0, 0]]
+
+
 def test_what_is_no_scene_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="not a rendered scene"):
         load_rendered(tmp_path)
