@@ -22,6 +22,7 @@ _EXAMPLES = """  isc synth --count 60 --size 128 -o scenes
   isc validate scenes -o shen --separator shen_2013 --bounds none
   isc validate scenes -o validation --update-bounds bounds.json"""
 _NO_BOUNDS = "none"
+_RENDERS = 3
 
 
 def declare(parser: argparse.ArgumentParser) -> None:
@@ -119,9 +120,9 @@ def _add_checks(parser: argparse.ArgumentParser) -> None:
     checks.add_argument(
         "--renders",
         type=count,
-        default=3,
+        default=_RENDERS,
         metavar="N",
-        help="number of scenes to render again as a check (default: 3)",
+        help="number of scenes to render again as a check (default: %(default)s)",
     )
 
 
@@ -192,6 +193,7 @@ def _command(options: argparse.Namespace) -> str:
         ("separator", BEST),
         ("illumination", ILLUMINATIONS[0]),
         ("bounds", None),
+        ("renders", _RENDERS),
     ):
         if (value := getattr(options, name)) != default:
             words += [f"--{name}", str(value)]

@@ -1,6 +1,7 @@
 """`isc validate` on small rendered scenes: its output, acceptance and rejection, and bad input."""
 
 import json
+import shlex
 import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
@@ -210,6 +211,11 @@ def test_a_split_and_a_drawn_sample(dataset: Path, tmp_path: Path) -> None:
         content[name] = json.loads((tmp_path / name / "report.json").read_text(encoding="utf-8"))
     assert {scene["facts"]["split"] for scene in content["split"]["scenes"]} == {"train"}
     assert len(content["drawn"]["scenes"]) == 3
+    words = shlex.split(content["drawn"]["command"])
+    assert words[0] == "isc" and main([*words[1:], "--quiet"]) == 0, "the command repeats the run"
+    again = json.loads((tmp_path / "drawn" / "report.json").read_text(encoding="utf-8"))
+    for name in ("figures", "checks", "command"):
+        assert again[name] == content["drawn"][name]
 
 
 def test_bad_input_is_refused_and_nothing_is_written(
