@@ -9,8 +9,8 @@ the textures. Base colour, roughness, specular and occlusion are also for the me
 same texture coordinates, with `mesh_normal` instead of `normal`, which is written if the mesh needs
 one.
 
-    basecolor             sRGB, 8 bits: k * reflectance under the gloss, as in the mesh; alpha is
-                          the object's cover
+    basecolor             sRGB, 8 bits: k * reflectance under the gloss that the program shows;
+                          alpha is the object's cover
     normal, mesh_normal   (n + 1) / 2, 8 bits; green upward (OpenGL) or downward (DirectX)
     roughness             8 bits, linear as all that follow
     specular              8 bits; .5 is plastic, f0 = .08 * specular = .04
@@ -33,12 +33,13 @@ alpha) and "Normal map" (green upward); Unity HDRP manual, "Mask and detail maps
 "Normal Map Node" (green upward) and "Node Wrangler" (recognises the names above).
 
 Limits: 8 bits clip base colours above 1 (.5 % of the pixels) and specular levels above that of f0 =
-.08. Unity's metallic materials have no specular level. Metallic is 0. Farther than 16 pixels from
-the object, textures have the mean colour or a flat surface. Upsampling adds no detail.
+.08. Unity's metallic materials have no specular level: they show that of plastic. Metallic is 0.
+Farther than 16 pixels from the object, textures have the mean colour or a flat surface. Upsampling
+adds no detail.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -116,7 +117,8 @@ def write_texture_set(
     if target not in TARGETS:
         raise InputError(f'unknown target "{target}": choose {", ".join(TARGETS)}')
     monitor, wanted = monitor or Monitor(), TARGETS[target]
-    layers = _Layers(d, built, cover, *known_roughness(built), wanted.green_down)
+    shown = _shown(built, "specular" in wanted.textures)
+    layers = _Layers(d, shown, cover, *known_roughness(built), wanted.green_down)
     textures = [one for one in wanted.textures if one != "mesh_normal" or built.needs_normal_map]
     with new_folder(folder, texture_files(name)) as partial:
         for number, texture in enumerate(textures):
@@ -124,9 +126,34 @@ def write_texture_set(
             picture = Image.fromarray(getattr(layers, texture))
             picture.save(partial / f"{name}_{texture}.png", compress_level=_COMPRESSION)
         write_channels(partial / f"{name}_height.exr", {"Y": layers.fine(layers.metres)})
-        text = json.dumps(_description(d, layers, target, textures, name), indent=2)
+        text = json.dumps(_description(d, built, layers, target, textures, name), indent=2)
         (partial / f"{name}_textures.json").write_text(text + "\n", encoding="utf-8")
         monitor.report("writing textures", 1.0)
+
+
+def _shown(built: MeshResult, has_texture: bool) -> MeshResult:
+    """The mesh with the specular level that a program shows: at most that of f0 = .08, or that of
+    plastic where it reads no texture.
+    """
+    gloss, coated = built.gloss, built.coated
+    if coated is None or not gloss.specular:
+        return built
+    plastic = 1 / built.reflectance_scale
+    if not has_texture:
+        return replace(
+            built,
+            gloss=replace(gloss, specular=plastic, variation=None),
+            coated=replace(coated, variation=None),
+        )
+    most = plastic / PLASTIC
+    if gloss.variation is None:
+        return replace(built, gloss=replace(gloss, specular=min(gloss.specular, most)))
+    variation = np.minimum(gloss.variation, most / gloss.specular)
+    return replace(
+        built,
+        gloss=replace(gloss, variation=variation),
+        coated=replace(coated, variation=variation / variation.max()),
+    )
 
 
 def known_roughness(built: MeshResult) -> tuple[float, str]:
@@ -269,9 +296,13 @@ def _code(value: float) -> int:
 
 
 def _description(
-    d: Decomposition, layers: _Layers, target: str, textures: list[str], name: str
+    d: Decomposition,
+    built: MeshResult,
+    layers: _Layers,
+    target: str,
+    textures: list[str],
+    name: str,
 ) -> dict[str, Any]:
-    built = layers.built
     described = built.describe()
     return {
         "target": target,

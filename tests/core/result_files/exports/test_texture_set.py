@@ -117,6 +117,30 @@ def test_a_level_that_varies_is_in_the_specular_texture(tmp_path: Path) -> None:
     assert np.abs(found - 0.5 * built.specular * variation)[d.mask].max() < 0.003
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("target", "shown"), [("unreal", 2.0), ("unity", 1.0)])
+@pytest.mark.parametrize("varies", [False, True])
+def test_the_base_color_is_under_the_gloss_that_the_program_shows(
+    tmp_path: Path, target: str, shown: float, varies: bool
+) -> None:
+    """Textures hold levels up to 2; Unity has none, and shows plastic."""
+    d = ball()
+    stored, options = ResultPart.of(d), MeshOptions(triangles=3000)
+    variation = np.where(np.indices(d.mask.shape)[1] > 66, 1.0, 0.25) if varies else None
+    k = glossy(d).reflectance_scale
+
+    def of(level: float, variation: np.ndarray | None) -> MeshResult:
+        fit = SpecularFit(0.3, level / k, FITTED, FITTED, variation)
+        return mesh_of(stored, options, gloss=fit)
+
+    folder = written(target, tmp_path / "set", of(4.0, variation))
+    found = codes(folder / "ball_basecolor.png")[..., :3]
+    limited = None if variation is None or shown == 1 else np.minimum(variation / 0.5, 1.0)
+    wanted = of(shown, limited).base_color_codes
+    assert np.abs(found.astype(int) - wanted)[d.mask].max() <= 1
+    assert np.abs(found.astype(int) - of(4.0, variation).base_color_codes).max() > 5
+
+
 def test_height_has_its_scale_in_the_description(generic: Path) -> None:
     d, built = ball(), glossy(ball())
     whole, exact = codes(generic / "ball_height.png"), floats(generic / "ball_height.exr")
