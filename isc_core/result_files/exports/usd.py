@@ -48,7 +48,8 @@ def encode_usd(built: MeshResult, path: Path) -> dict[str, bytes]:
     from pxr import Sdf, UsdUtils
 
     name, packed = plain_stem(path), path.suffix.lower() == ".usdz"
-    material = _Material.of(built, name)
+    # USD does not mark names in an archive as UTF-8: some viewers would not find the textures.
+    material = _Material.of(built, _identifier(name) if packed else name)
     with tempfile.TemporaryDirectory(prefix="isc-usd-") as place:
         folder = Path(place)
         for file, content in material.textures.files.items():

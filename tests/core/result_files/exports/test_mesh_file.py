@@ -2,6 +2,7 @@
 
 import errno
 import sys
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -158,6 +159,19 @@ def test_the_material_of_usd_is_complete(written: tuple[MeshResult, Path]) -> No
         assert reader.GetInput("sourceColorSpace").Get() == space
     if path.suffix != ".usdz":
         check_textures(built, path.parent, "2_balls")
+
+
+def test_names_in_an_archive_are_ascii(tmp_path: Path) -> None:
+    pytest.importorskip("pxr.Usd", reason="needs usd-core (extra `usd`)")
+    from pxr import UsdUtils
+
+    path = tmp_path / "Töpfe.usdz"
+    write_mesh_file(glossy(), path, "usd")
+    with zipfile.ZipFile(path) as archive:
+        assert archive.namelist()[0].endswith(".usdc") and len(archive.namelist()) == 3
+        assert all(name.isascii() for name in archive.namelist())
+    _, assets, missing = UsdUtils.ComputeAllDependencies(str(path))
+    assert len(assets) == 2 and not missing
 
 
 def test_a_level_that_varies_is_a_texture_of_usd_and_obj(tmp_path: Path) -> None:
