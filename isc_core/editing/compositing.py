@@ -9,7 +9,9 @@ maps it is modelled as an affine function of the photo's colour I, e ~ A_k^T I +
 as a factor of each channel, mean_k e / mean_k I, at most 1, so that texture finer than the maps
 gets the contrast of its new light. A and b, which are smooth, are upsampled and applied to the full
 photo; the remainder of e is upsampled directly. So a removed highlight or a changed reflectance
-ends at the photo's own edges. At the photo's own size e is added directly.
+ends at the photo's own edges. At the photo's own size e is added directly. Where an alpha channel
+has a soft rim (hair, fur), the pixels that are covered by less than half, and so not in the mask,
+change by A and b of the nearest pixel of the object: their colours are the object's.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013,
 doi:10.1109/TPAMI.2012.213; upsampling the coefficients: K. He, J. Sun, "Fast guided filter" (2015),
@@ -19,7 +21,7 @@ Limits: detail that the maps do not resolve changes only with its colour. Where 
 clipped, so is the edit.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -30,6 +32,7 @@ from ..imaging.bounding_box import FramePart, mask_box, mask_slices
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
 from ..photo import Photo
+from ..photo.soft_rim import soft_rim
 from ..scene.part_of_result import ResultPart
 from .edited import Edited
 
@@ -50,7 +53,7 @@ class EditedPart:
     image : (h, w, 3) float32 ndarray
         Linear, not negative.
     changed : (h, w) bool ndarray
-        Where it differs from the photo; never outside the mask.
+        Where it differs from the photo; never outside the mask and its soft rim.
     place : FramePart
         The place of the part in the photo.
     """
@@ -84,17 +87,31 @@ def composite(stored: ResultPart, edit: Edited, photo: Photo) -> EditedPart:
     d, part = stored.result, stored.part
     scale = scale_of(stored, photo)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
-    place = FramePart.around(photo.mask, 0)
-    near = photo.cut(place)
-    full = (
-        place.cut(part.placed(change))
-        if scale == 1 and part.shape == photo.mask.shape
-        else enlarged_change(stored, change, near, place, scale)
-    )
-    changed = near.mask & (full != 0).any(-1)
+    rim = _soft_rim_outside(photo)
+    covered = photo.mask | rim
+    place = FramePart.around(covered, 0)
+    near, rim = photo.cut(place), place.cut(rim)
+    if scale == 1 and part.shape == photo.mask.shape:
+        full = place.cut(part.placed(change))
+        if rim.any():
+            full = full + enlarged_change(stored, change, replace(near, mask=rim), place, scale)
+    else:
+        whole = replace(near, mask=place.cut(covered))
+        full = enlarged_change(stored, change, whole, place, scale)
+    changed = place.cut(covered) & (full != 0).any(-1)
     image = near.image.copy()
     image[changed] = np.maximum(image[changed] + full[changed], 0)
     return EditedPart(near, image, changed, place)
+
+
+def _soft_rim_outside(photo: Photo) -> np.ndarray:
+    """Where (H, W) a soft alpha channel covers less than half of a pixel."""
+    if photo.cover is None or photo.original.mask_from != "alpha":
+        return np.zeros_like(photo.mask)
+    soft = soft_rim(photo.cover, photo.mask, own=True)
+    if soft is None:
+        return np.zeros_like(photo.mask)
+    return np.asarray(soft & (photo.cover > 0) & ~photo.mask)
 
 
 def scale_of(stored: ResultPart, photo: Photo) -> float:
@@ -148,7 +165,7 @@ def enlarged_change(
     change : (h, w, 3) ndarray
         Of its image.
     photo : Photo
-        A part of the photo.
+        A part of the photo; its mask says where the change is wanted.
     place : FramePart
         The place of that part.
     scale : float
@@ -157,7 +174,7 @@ def enlarged_change(
     Returns
     -------
     (H, W, 3) float32 ndarray
-        0 outside the photo's mask.
+        0 outside that mask.
     """
     result, d = np.zeros(photo.image.shape, np.float32), stored.result
     if not change.any():

@@ -180,6 +180,7 @@ class _Picture:
     image: np.ndarray  # (h, w, 3)
     mask: np.ndarray  # (h, w)
     before: np.ndarray  # (h, w, 3)
+    changed: np.ndarray  # (h, w)
     place: FramePart
     raster: Raster
 
@@ -196,15 +197,17 @@ def _linear_planes(picture: _Picture, original: Original | None) -> dict[str, np
             place.cut(plane)[...] = picture.image[..., c]
             if cover is not None:
                 plane *= cover
-        planes |= _stored_outside(planes, original)
+        planes |= _stored_elsewhere(planes, original, place.placed(picture.changed))
     return planes if alpha is None else planes | {"A": alpha}
 
 
-def _stored_outside(planes: Mapping[str, np.ndarray], original: Original) -> dict[str, np.ndarray]:
-    """Planes with the values of the photo's EXR file outside the mask, which the product might
+def _stored_elsewhere(
+    planes: Mapping[str, np.ndarray], original: Original, changed: np.ndarray
+) -> dict[str, np.ndarray]:
+    """Planes with the values of the photo's EXR file where nothing changes, which the product might
     round; those that the file has.
     """
-    path, mask = original.path, original.photo.mask
+    path = original.path
     if (
         path is None
         or path.suffix.lower() != ".exr"
@@ -213,9 +216,9 @@ def _stored_outside(planes: Mapping[str, np.ndarray], original: Original) -> dic
         return {}
     stored = read_channels(path)
     return {
-        name: np.where(mask, plane, stored[name])
+        name: np.where(changed, plane, stored[name])
         for name, plane in planes.items()
-        if name in stored and stored[name].shape == mask.shape
+        if name in stored and stored[name].shape == changed.shape
     }
 
 
@@ -248,7 +251,7 @@ def _photo(stored: ResultPart, edit: Edited, original: Original) -> _Picture:
     done, raster = composite(stored, edit, original.photo), original.raster
     transfer = original.photo.original.transfer
     coded = encode_like(raster, transfer, done.image, done.changed, done.place)
-    return _Picture(done.image, done.photo.mask, done.photo.image, done.place, coded)
+    return _Picture(done.image, done.photo.mask, done.photo.image, done.changed, done.place, coded)
 
 
 def _picture(stored: ResultPart, edit: Edited) -> _Picture:
@@ -264,4 +267,4 @@ def _picture(stored: ResultPart, edit: Edited) -> _Picture:
     codes = encode_like(empty, transfer, edit.image, d.mask).values
     alpha = part.placed(d.mask.astype(np.float32))
     whole = replace(empty, values=part.placed(codes), alpha=alpha)
-    return _Picture(edit.image, d.mask, d.image, part, whole)
+    return _Picture(edit.image, d.mask, d.image, d.mask, part, whole)

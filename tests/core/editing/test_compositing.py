@@ -148,6 +148,33 @@ def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
             composite(ResultPart(near, part), edit_layers(near, DIFFUSE_ONLY), wrong)
 
 
+@pytest.mark.parametrize("size", ["own", "half"])
+def test_fur_changes_with_the_object(full: Decomposition, size: str) -> None:
+    """Strands that an alpha channel covers by less than half get the new hue, not a fringe of the
+    old one; what is transparent stays.
+    """
+    away, near = ndimage.distance_transform_edt(~full.mask, return_indices=True)
+    strands = np.random.default_rng(3).uniform(6, 20, full.mask.shape)
+    cover = np.where(full.mask, 0.55, np.clip(0.6 - away / strands, 0, 1)).astype(np.float32)
+    cover[ndimage.binary_erosion(full.mask, iterations=9)] = 1
+    d = full if size == "own" else half_size(full)
+    photo = photo_of(full)
+    fur = np.where(cover[..., None] > 0, photo.image[tuple(near)], photo.image)
+    photo = replace(photo, image=fur)
+    source = replace(photo.original, mask_from="alpha")
+    edit = recolour(d, ColourEdit(hue=180))
+    opaque, _ = composited(d, edit, photo)
+    soft = replace(photo, mask=full.mask, cover=cover, original=source)
+    image, changed = composited(d, edit, soft)
+    assert np.array_equal(image[full.mask], opaque[full.mask])
+    rim = (cover > 0.05) & ~full.mask
+    assert rim.sum() > 1000 and changed[rim].mean() > 0.95
+    wanted = opaque[tuple(near)][rim]
+    done, nothing = (np.abs(one[rim] - wanted).mean() for one in (image, photo.image))
+    assert done < (0.02 if size == "own" else 0.2) * nothing
+    assert np.array_equal(image[cover == 0], photo.image[cover == 0])
+
+
 # --- files ----------------------------------------------------------------------------------------
 
 
