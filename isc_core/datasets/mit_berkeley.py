@@ -174,6 +174,7 @@ def load_object(
         raise InputError(
             f"{own / 'L.mat'}: its light has shape {light.shape} where (9, 3) was expected"
         )
+    _require_finite(light, own / "L.mat")
     valid = (image > 0).all(axis=-1)
     return MitBerkeleyObject(
         name, illumination, image, valid, mask, height, shading, reflectance, light
@@ -202,7 +203,13 @@ def load_natural_lights(root: str | Path) -> np.ndarray:
     lights = _matrix(path, "Ls")
     if lights.ndim != 3 or lights.shape[:2] != (9, 3):
         raise InputError(f"{path}: 'Ls' has shape {lights.shape} where (9, 3, n) was expected")
+    _require_finite(lights, path)
     return lights
+
+
+def _require_finite(light: np.ndarray, path: Path) -> None:
+    if not np.isfinite(light).all():
+        raise InputError(f"{path}: its light has values that are not finite: is it damaged?")
 
 
 def _check_option(what: str, value: str, known: tuple[str, ...]) -> None:

@@ -146,7 +146,7 @@ def require_truth(truth: MitBerkeleyObject) -> None:
     with np.errstate(over="ignore", invalid="ignore"):
         brightness = np.square(np.exp(_probe_basis() @ light_from_reference(truth.light))).sum()
     if not np.isfinite(brightness):
-        raise InputError(f"{name}: its light has coefficients that are not finite, or too large")
+        raise InputError(f"{name}: its light is too bright for floating-point numbers")
 
 
 def truth_normal(height: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import pytest
 import scipy.io
 
 from isc_core.baselines import retinex
-from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_natural_lights, load_object
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import LightPrior, Settings, ShapePrior
 from isc_core.errors import Cancelled, InputError
@@ -265,7 +265,6 @@ def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
     ("file", "values", "told"),
     [
         ("laboratory/bowl/Z.mat", {"depth": np.full((40, 44), np.nan)}, "known height"),
-        ("natural/bowl/L.mat", {"L": np.full((9, 3), np.nan)}, "its light"),
         ("natural/bowl/L.mat", {"L": np.full((9, 3), 500.0)}, "its light"),
         ("laboratory/bowl/reflectance.png", None, "reflectance has a channel"),
         (
@@ -288,6 +287,16 @@ def test_truth_that_cannot_be_scored_is_found_before_the_first_run(
         scipy.io.savemat(path, values)
     with pytest.raises(InputError, match=f"^bowl, .*{told}"):
         evaluate(tmp_path, model="never", runner=never)
+
+
+def test_lights_that_are_not_finite_are_refused_by_file(tmp_path: Path) -> None:
+    root = write_set(tmp_path)
+    scipy.io.savemat(root / "natural" / "bowl" / "L.mat", {"L": np.full((9, 3), np.nan)})
+    scipy.io.savemat(root / "natural_lights.mat", {"Ls": np.full((9, 3, 4), np.inf)})
+    with pytest.raises(InputError, match=r"bowl.L\.mat: .* not finite"):
+        load_object(root, "bowl", "natural")
+    with pytest.raises(InputError, match=r"natural_lights\.mat: .* not finite"):
+        load_natural_lights(root)
 
 
 def test_a_name_given_twice_counts_once(root: Path) -> None:
