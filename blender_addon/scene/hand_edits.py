@@ -1,8 +1,8 @@
-"""Whether the mesh of an object is still the one that was built: a checksum (CRC-32) of its
-vertices and faces, stored in the mesh.
+"""Whether the mesh of an object is still the one that was built: checksums (CRC-32) of its vertices
+and faces and of its UV map, stored in the mesh, and nothing added that an update would discard.
 
-Limits: one edit in four thousand million goes unnoticed. UV maps, attributes and modifiers are not
-included; an update of the object keeps or replaces them.
+Limits: one edit in four thousand million goes unnoticed, and changes of the attribute `confidence`,
+of normals, and of what Blender stores under hidden names, such as seams.
 """
 
 import zlib
@@ -10,9 +10,10 @@ import zlib
 import bpy
 import numpy as np
 
-from ..datablocks.mesh import MeshArrays
+from ..datablocks.mesh import CONFIDENCE, NORMAL, UV, MeshArrays
 
 _BUILT = "isc_built_crc32"
+_OWN_ATTRIBUTES = {"position", UV, NORMAL, CONFIDENCE}
 
 
 def store_checksum(mesh: bpy.types.Mesh, checksum: str) -> None:
@@ -39,9 +40,9 @@ def mesh_checksum(arrays: MeshArrays) -> str:
     Returns
     -------
     str
-        Eight hexadecimal digits.
+        Eight hexadecimal digits for vertices and faces, and eight for the UV map.
     """
-    return _checksum(arrays.positions, arrays.corners)
+    return f"{_checksum(arrays.positions, arrays.corners)} {_checksum(arrays.uv)}"
 
 
 def is_edited_by_hand(obj: bpy.types.Object) -> bool:
@@ -55,10 +56,11 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     Returns
     -------
     bool
-        True with shape keys, too. False for an object of an earlier version, which stores none.
+        True with shape keys, vertex groups, further UV maps or attributes, or faces of other
+        materials, too. What an earlier version did not store is taken for unchanged.
     """
     mesh = obj.data
-    if mesh.shape_keys is not None:
+    if mesh.shape_keys is not None or len(obj.vertex_groups) > 0 or _has_other_attributes(mesh):
         return True
     if _BUILT not in mesh:
         return False
@@ -66,9 +68,33 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     corners = np.empty(len(mesh.loops), np.int32)
     mesh.vertices.foreach_get("co", places)
     mesh.loops.foreach_get("vertex_index", corners)
-    return bool(mesh[_BUILT] != _checksum(places, corners))
+    shape, *texture = mesh[_BUILT].split()
+    return bool(shape != _checksum(places, corners) or texture not in ([], [_uv_checksum(mesh)]))
 
 
-def _checksum(places: np.ndarray, corners: np.ndarray) -> str:
-    # As text: Blender stores whole numbers with a sign.
-    return f"{zlib.crc32(corners.tobytes(), zlib.crc32(places.tobytes())):08x}"
+def _has_other_attributes(mesh: bpy.types.Mesh) -> bool:
+    """Whether a mesh has attributes that were not built; Blender hides its own behind a dot."""
+    names = {attribute.name for attribute in mesh.attributes if not attribute.name.startswith(".")}
+    indices = mesh.attributes.get("material_index")
+    if indices is not None:
+        values = np.empty(len(indices.data), np.int32)
+        indices.data.foreach_get("value", values)
+        if values.any():
+            return True
+    return bool(names - _OWN_ATTRIBUTES - {"material_index"})
+
+
+def _uv_checksum(mesh: bpy.types.Mesh) -> str:
+    layer = mesh.uv_layers.get(UV)
+    if layer is None:
+        return ""
+    places = np.empty(2 * len(mesh.loops), np.float32)
+    layer.uv.foreach_get("vector", places)
+    return _checksum(places)
+
+
+def _checksum(*parts: np.ndarray) -> str:
+    number = 0
+    for part in parts:
+        number = zlib.crc32(part.tobytes(), number)
+    return f"{number:08x}"  # as text: Blender stores whole numbers with a sign

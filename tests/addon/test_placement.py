@@ -263,6 +263,35 @@ def test_hand_edits_are_noticed(result: ResultArrays) -> None:
     assert is_edited_by_hand(obj)
 
 
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda obj: obj.vertex_groups.new(name="pin").add([3], 1.0, "REPLACE"),
+        lambda obj: setattr(obj.data.uv_layers[0].uv[5], "vector", (2, 3)),
+        lambda obj: setattr(obj.data.uv_layers[0], "name", "mine"),
+        lambda obj: obj.data.uv_layers.new(name="lightmap"),
+        lambda obj: obj.data.color_attributes.new("paint", "FLOAT_COLOR", "POINT"),
+        lambda obj: setattr(obj.data.polygons[4], "material_index", 1),
+    ],
+    ids=["weights", "uv", "uv name", "uv map", "color", "material"],
+)
+def test_what_an_update_would_discard_is_an_edit_by_hand(result: ResultArrays, edit: Any) -> None:
+    """Weights, without which modifiers lose their vertex group, are as much work as a shape."""
+    obj = build_object(result, SHARED).object
+    edit(obj)
+    assert is_edited_by_hand(obj)
+    build_object(result, SHARED)
+    assert not is_edited_by_hand(obj)
+
+
+def test_a_mesh_of_an_earlier_version_is_known_by_its_shape(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    obj.data["isc_built_crc32"] = obj.data["isc_built_crc32"].split()[0]
+    assert not is_edited_by_hand(obj)
+    obj.data.vertices[7].co.z += 0.01
+    assert is_edited_by_hand(obj)
+
+
 def test_the_object_is_shown_in_the_largest_view(blender: Any, bump_folder: Path) -> None:
     blender.ops.wm.read_factory_settings(use_empty=False)
     view = find_view(blender.context.window, 0)
