@@ -58,13 +58,15 @@ def first_steps(acc: Any, measured: list[str]) -> Iterator[float]:
     yield from stroke(acc, measured)
     yield from marked_highlight(acc)
     settings = bpy.context.scene.isc
-    chosen = settings.image, settings.mask_source
+    chosen = settings.image, settings.mask, settings.mask_source
     large = glossy_ball(2400, 1100.0, (0.7, 0.25, 0.12))  # time to press
     settings.image, settings.mask_source = picture(acc, "large", large), "ALPHA"
     settings.separator, settings.max_size = "none", 2048
     yield from cancel(acc, measured, "Esc", escape)
     yield from cancel(acc, measured, "Cancel", press_cancel)
-    settings.image, settings.mask_source = chosen
+    # the automatic mask of a photo is not used for the next one
+    settings.image = chosen[0]
+    settings.mask, settings.mask_source = chosen[1:]
     settings.max_size = 512
     yield from load_during_a_run(acc, measured)
     yield from load_while_drawing(acc)
