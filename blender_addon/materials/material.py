@@ -1,8 +1,8 @@
 """The object's material: one Principled BSDF with the recovered textures, ready to be edited.
 
 The node of the group "ISC Dichromatic" holds the edits; `material_edits` writes them into the BSDF
-and its textures. When the object is built again, gains and colour edits are kept; textures,
-roughness and level follow the result.
+and its textures. When the object is built again, gains and colour edits are kept, with their
+keyframes and drivers; textures, roughness and level follow the result.
 """
 
 from dataclasses import dataclass
@@ -95,11 +95,11 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
     kept = _edited_values(material)
     tree = node_tree(material)
     discard_edits(material)
-    tree.nodes.clear()
+    edits = _clear(material)
     if hasattr(material, "cycles"):
         # The photo's highlights emit no light: rays toward them would only add noise.
         material.cycles.emission_sampling = "NONE"
-    group = _add_surface(tree, maps, with_variation=specular.source != "none")
+    group = _add_surface(tree, maps, edits, with_variation=specular.source != "none")
     _set_values(material, group, specular, kept)
     if maps.specular is not None:
         material["isc_highlights"] = maps.specular
@@ -147,6 +147,18 @@ def set_specular_gain(material: bpy.types.Material, gain: float) -> None:
             node.inputs["Specular Gain"].default_value = gain
 
 
+def _clear(material: bpy.types.Material) -> bpy.types.Node | None:
+    """Remove all nodes but that of the edits: Blender removes keyframes and drivers with a node."""
+    nodes, kept = material.node_tree.nodes, dichromatic_node(material)
+    if kept is not None and kept.node_tree != dichromatic_group():  # of an earlier version
+        kept = None
+    for node in [node for node in nodes if node != kept]:
+        nodes.remove(node)
+    if kept is not None:
+        kept.inputs["Photo Highlights"].default_value = 0.0
+    return kept
+
+
 def _edited_values(material: bpy.types.Material) -> dict[str, float]:
     """The values on the group's node that belong to the user."""
     node = dichromatic_node(material)
@@ -178,23 +190,23 @@ def _set_values(
 
 
 def _add_surface(
-    tree: bpy.types.NodeTree, maps: MaterialMaps, *, with_variation: bool
+    tree: bpy.types.NodeTree,
+    maps: MaterialMaps,
+    group: bpy.types.Node | None,
+    *,
+    with_variation: bool,
 ) -> bpy.types.Node:
-    """Add the nodes, framed; returns that of the edits."""
+    """Add the nodes, framed; returns that of the edits, which may exist."""
     textures, edits, surface = (
         add_node(tree, "NodeFrame", (0, 0), label=label, name=label)
         for label in ("Textures", "Edits", "Surface")
     )
     base_color = _add_texture(tree, maps.base_color, BASE_COLOR, (-900, 400), textures)
-    group = add_node(
-        tree,
-        "Group",
-        (-500, 420),
-        name=DICHROMATIC,
-        width=240,
-        node_tree=dichromatic_group(),
-        parent=edits,
-    )
+    if group is None:
+        group = add_node(
+            tree, "Group", (0, 0), name=DICHROMATIC, width=240, node_tree=dichromatic_group()
+        )
+    group.location, group.parent = (-500, 420), edits
     bsdf = add_node(tree, "BsdfPrincipled", (50, 420), name=SURFACE, parent=surface)
     bsdf.inputs["Specular IOR Level"].default_value = OWN_LEVEL
     output = add_node(tree, "OutputMaterial", (400, 420), parent=surface)

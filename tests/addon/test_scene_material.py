@@ -521,6 +521,24 @@ def test_edited_values_are_kept(blender: Any, result: ResultArrays) -> None:
     assert kept == pytest.approx([0.7, 2.5, 0.2, 1.3, 0.9, 0.9])
 
 
+def test_keyframes_and_drivers_of_edits_are_kept(blender: Any, result: ResultArrays) -> None:
+    built = build(result, own_scene=False)
+    inputs, tree = group_node(built).inputs, built.material.node_tree
+    for frame, hue in ((1, 0.5), (11, 0.7)):
+        inputs["Hue"].default_value = hue
+        inputs["Hue"].keyframe_insert("default_value", frame=frame)
+    inputs["Value"].driver_add("default_value").driver.expression = "frame / 10"
+    build(replace(result, roughness=0.3), specular_from="image", own_scene=False)
+    blender.context.scene.frame_set(6)
+    values = group_node(built).inputs
+    assert values["Hue"].default_value == pytest.approx(0.6), "half way"
+    assert values["Value"].default_value == pytest.approx(0.6)
+    source = surface(built).inputs["Base Color"].links[0].from_node
+    assert source == group_node(built) and len(tree.animation_data.drivers) == 1
+    build(result, own_scene=False)
+    assert group_node(built).inputs["Photo Highlights"].default_value == 0
+
+
 def gloss_of(built: Any) -> list[float]:
     return [
         group_node(built).inputs[name].default_value for name in ("Specular Level", "Roughness")
