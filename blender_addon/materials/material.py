@@ -12,7 +12,7 @@ import bpy
 
 from ..datablocks.mesh import UV
 from ..datablocks.nodes import add_node, connect, node_tree
-from ..datablocks.provenance import datablock_name, find_tagged, tag
+from ..datablocks.provenance import datablock_name, tag
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group
 from .edit_nodes import BASE_COLOR, LEVEL_FACTOR, OWN_LEVEL, SURFACE, dichromatic_node
 from .gloss_edits import FITTED_GLOSS, GlossBasis, store_base_colors
@@ -72,7 +72,12 @@ class SpecularSettings:
     source: SpecularSource
 
 
-def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) -> bpy.types.Material:
+def ensure_material(
+    key: str,
+    maps: MaterialMaps,
+    specular: SpecularSettings,
+    material: bpy.types.Material | None = None,
+) -> bpy.types.Material:
     """Create or update the material of a photo.
 
     Parameters
@@ -83,15 +88,34 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         Its images.
     specular : SpecularSettings
         Its specular part.
+    material : bpy.types.Material, optional
+        The material to update; None creates one.
 
     Returns
     -------
     bpy.types.Material
         The material.
     """
-    material = find_tagged(bpy.data.materials, key, "material") or tag(
-        bpy.data.materials.new(datablock_name(key)), key, "material"
-    )
+    if material is None:
+        material = tag(bpy.data.materials.new(datablock_name(key)), key, "material")
+    update_material(material, maps, specular)
+    return material
+
+
+def update_material(
+    material: bpy.types.Material, maps: MaterialMaps, specular: SpecularSettings
+) -> None:
+    """Give a material the textures and the gloss of a result; edits are kept.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        A local material of ISC.
+    maps : MaterialMaps
+        Its images.
+    specular : SpecularSettings
+        Its specular part.
+    """
     kept = _edited_values(material)
     tree = node_tree(material)
     discard_edits(material)
@@ -110,7 +134,6 @@ def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) ->
         bake_edits(material)
     else:
         begin_bake(material)  # colours that take longer are baked later, as after edits
-    return material
 
 
 def shows_highlights(material: bpy.types.Material) -> bool:

@@ -37,7 +37,13 @@ from ..datablocks.staging import StagedBlocks, run_to_end, stage
 from ..files.result_arrays import ResultArrays
 from ..materials.coated_surface import recovered_light
 from ..materials.gloss_edits import GlossBasis
-from ..materials.material import MaterialMaps, ensure_material
+from ..materials.material import (
+    MaterialMaps,
+    SpecularSettings,
+    ensure_material,
+    shows_highlights,
+    update_material,
+)
 from ..materials.photo_highlights import reset_view
 from .built_object import BuiltObject
 from .camera import ensure_camera, set_background_photo, set_render_size
@@ -50,7 +56,7 @@ from .collection import (
     link_object,
     use_standard_view,
 )
-from .copies import OBJECT, keep_material
+from .copies import MATERIAL, OBJECT, find_material, keep_material, materials_of_copies
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
 from .placement import free_location, world_matrix
@@ -260,7 +266,7 @@ def _place(
         alpha=images.get(ImageRole.ALPHA),
         basis=_gloss_basis(result, images),
     )
-    material = ensure_material(key, maps, prepared.specular)
+    material = _ensure_materials(key, existing, maps, prepared.specular)
     _remove_unused(key, images)
     obj = _ensure_object(key, prepared, blocks.take_mesh(), material)
     if not is_in_scene(obj, scene):
@@ -290,6 +296,23 @@ def _place(
     _set_scene(built, options, result)
     reset_view(material)  # the layer of highlights is valid for the present view
     return built
+
+
+def _ensure_materials(
+    key: str,
+    existing: bpy.types.Object | None,
+    maps: MaterialMaps,
+    specular: SpecularSettings,
+) -> bpy.types.Material:
+    """The material of an object; those of its copies, which show the same images, follow."""
+    if existing is None:
+        return ensure_material(key, maps, specular, find_tagged(bpy.data.materials, key, MATERIAL))
+    material = ensure_material(key, maps, specular, find_material(existing))
+    for other in materials_of_copies(existing, key):
+        is_off = specular.source == "image" and not shows_highlights(other)
+        update_material(other, maps, replace(specular, source="lobe") if is_off else specular)
+        reset_view(other)
+    return material
 
 
 def _light_before(existing: bpy.types.Object | None, options: BuildOptions) -> ShownLight:

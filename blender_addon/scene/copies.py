@@ -140,6 +140,37 @@ def has_other_material(obj: bpy.types.Object, material: bpy.types.Material) -> b
     return bool(assigned) and material not in assigned
 
 
+def materials_of_copies(obj: bpy.types.Object, key: str) -> list[bpy.types.Material]:
+    """Find the materials of ISC that copies of an object have of their own.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The original.
+    key : str
+        Name of the photo.
+
+    Returns
+    -------
+    list of bpy.types.Material
+        Without that of the original.
+    """
+    own = find_material(obj)
+    family = (
+        other
+        for other in bpy.data.objects
+        if other.get(KEY) == key and other.get(ROLE) in (OBJECT, COPY) and other.library is None
+    )
+    found = {
+        slot.material: None
+        for other in family
+        if are_of_one_photo(obj, other)
+        for slot in other.material_slots
+        if slot.material not in (None, own) and slot.material.get(KEY) == key
+    }
+    return [material for material in found if material.library is None]
+
+
 def objects_sharing_material(
     obj: bpy.types.Object, material: bpy.types.Material
 ) -> list[bpy.types.Object]:

@@ -357,9 +357,9 @@ def test_an_edited_linked_copy_follows_an_update_of_the_original(
     copy = copied(addon, built, linked=True)
     addon.ops.isc.recolour(hue=0.3)
     material = find_built(copy.object).material  # type: ignore[union-attr]
-    node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
 
     def shown() -> np.ndarray:
+        node = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
         image = node.inputs["Base Color"].links[0].from_node.image
         assert image.get("isc_role") == "edited_base_color"
         return np.array(image.pixels[:]).reshape(-1, 4)[:, :3]
@@ -369,6 +369,34 @@ def test_an_edited_linked_copy_follows_an_update_of_the_original(
     build_object(gray, BuildOptions(own_scene=True, name="bump"))
     addon.context.view_layer.update()
     assert np.ptp(before.mean(0)) > 0.1 and np.ptp(shown().mean(0)) < 0.01
+
+
+@pytest.mark.parametrize("single", ["copy", "original"])
+def test_an_update_fits_the_gloss_of_every_material(
+    addon: Any, built: BuiltObject, bump_folder: Path, single: str
+) -> None:
+    """All of them show the new images, whatever name they have, and whoever made them single-user.
+
+    Blender's own button copies the tags of ISC, too.
+    """
+    copy = copied(addon, built).object
+    obj = {"copy": copy, "original": built.object}[single]
+    obj.material_slots[0].material = built.material.copy()
+    obj.material_slots[0].material.name = "a first one"
+    dichromatic_node(obj.material_slots[0].material).inputs["Hue"].default_value = 0.2  # type: ignore[union-attr]
+    glossy = replace(read_result(bump_folder), specular_level=0.8, roughness=0.4)
+    build_object(glossy, BuildOptions(own_scene=True, name="bump"))
+    for one in (built.object, copy):
+        material = one.material_slots[0].material
+        node = dichromatic_node(material)
+        assert node is not None and node.inputs["Hue"].default_value == pytest.approx(
+            0.2 if one == obj else 0.5
+        )
+        assert node.inputs["Specular Level"].default_value == pytest.approx(0.8)
+        assert node.inputs["Roughness"].default_value == pytest.approx(0.4)
+        assert material["isc_fitted_gloss"][0] == pytest.approx(0.8)
+    assert built.object["isc_material"] == built.object.material_slots[0].material
+    assert len(addon.data.materials) == 2
 
 
 def test_a_copy_is_not_decomposed_again(addon: Any, built: BuiltObject) -> None:
