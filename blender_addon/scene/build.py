@@ -56,12 +56,20 @@ from .collection import (
     link_object,
     use_standard_view,
 )
-from .copies import MATERIAL, OBJECT, find_material, keep_material, materials_of_copies
+from .copies import (
+    MATERIAL,
+    OBJECT,
+    copies_of,
+    find_material,
+    keep_material,
+    materials_of_copies,
+)
 from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
 from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ShownLight, ensure_lamps, ensure_sun, restore_light, shown_light
+from .texture_window import move_textures, store_window
 from .world import ensure_world
 
 _NO_LAMPS = np.zeros((0, 3))
@@ -269,6 +277,8 @@ def _place(
     material = _ensure_materials(key, existing, maps, prepared.specular)
     _remove_unused(key, images)
     obj = _ensure_object(key, prepared, blocks.take_mesh(), material)
+    copies = [] if existing is None else copies_of(obj, key)
+    move_textures(obj, copies)
     if not is_in_scene(obj, scene):
         link_object(obj, collection)
     if options.displacement:
@@ -388,6 +398,7 @@ def _ensure_object(
         replace_mesh(obj.data, mesh)
     tag(mesh, key, "mesh")
     store_checksum(mesh, prepared.checksum)
+    store_window(mesh, prepared.result)
     if shadows is not None:
         obj.visible_shadow = obj.visible_diffuse = shadows
     if not mesh.materials:

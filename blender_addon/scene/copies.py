@@ -140,6 +140,32 @@ def has_other_material(obj: bpy.types.Object, material: bpy.types.Material) -> b
     return bool(assigned) and material not in assigned
 
 
+def copies_of(obj: bpy.types.Object, key: str) -> list[bpy.types.Object]:
+    """Find the copies of an object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The original.
+    key : str
+        Name of the photo.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        Local objects.
+    """
+    return [
+        other
+        for other in bpy.data.objects
+        if other != obj
+        and other.get(KEY) == key
+        and other.get(ROLE) in (OBJECT, COPY)
+        and other.library is None
+        and are_of_one_photo(obj, other)
+    ]
+
+
 def materials_of_copies(obj: bpy.types.Object, key: str) -> list[bpy.types.Material]:
     """Find the materials of ISC that copies of an object have of their own.
 
@@ -156,15 +182,9 @@ def materials_of_copies(obj: bpy.types.Object, key: str) -> list[bpy.types.Mater
         Without that of the original.
     """
     own = find_material(obj)
-    family = (
-        other
-        for other in bpy.data.objects
-        if other.get(KEY) == key and other.get(ROLE) in (OBJECT, COPY) and other.library is None
-    )
     found = {
         slot.material: None
-        for other in family
-        if are_of_one_photo(obj, other)
+        for other in copies_of(obj, key)
         for slot in other.material_slots
         if slot.material not in (None, own) and slot.material.get(KEY) == key
     }

@@ -6,6 +6,8 @@ of normals, and of what Blender stores under hidden names, such as seams.
 """
 
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 import numpy as np
@@ -27,6 +29,25 @@ def store_checksum(mesh: bpy.types.Mesh, checksum: str) -> None:
         As `mesh_checksum` its arrays.
     """
     mesh[_BUILT] = checksum
+
+
+@contextmanager
+def refresh_checksum(mesh: bpy.types.Mesh) -> Iterator[None]:
+    """Change the UV map of a mesh without its being taken for an edit.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        The mesh. Edits that the user made before stay edits.
+
+    Yields
+    ------
+    None
+    """
+    former = f" {_uv_checksum(mesh)}"
+    yield
+    if str(mesh.get(_BUILT, "")).endswith(former):
+        mesh[_BUILT] = mesh[_BUILT].removesuffix(former) + f" {_uv_checksum(mesh)}"
 
 
 def mesh_checksum(arrays: MeshArrays) -> str:

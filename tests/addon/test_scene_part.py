@@ -148,3 +148,26 @@ def test_a_part_beyond_its_frame_is_refused(
     np.savez(path, **{**arrays, "frame": np.array(frame, np.int32)})
     with pytest.raises(InputError, match="is damaged"):
         read_result(flat.folder)
+
+
+def test_a_copy_keeps_its_place_in_textures_of_another_part(
+    flat: ResultArrays, blender: Any
+) -> None:
+    """With another mask, the textures cover another part of the photo; a copy has its own mesh."""
+    from blender_addon.scene.hand_edits import is_edited_by_hand
+
+    def uv(obj: Any) -> np.ndarray:
+        return np.array([place.vector[:] for place in obj.data.uv_layers[0].uv])
+
+    obj = build(flat, own_scene=False, all_maps=False).object
+    copy, edited = obj.copy(), obj.copy()
+    for one in (copy, edited):
+        one.data = obj.data.copy()
+        blender.context.scene.collection.objects.link(one)
+    first = uv(obj)
+    edited.data.uv_layers[0].data[0].uv = (2, 3)
+    build(of_whole_frame(flat), own_scene=False, all_maps=False)
+    np.testing.assert_allclose(uv(copy), uv(obj), atol=1e-6)
+    np.testing.assert_allclose(uv(edited)[1:], uv(obj)[1:], atol=1e-6)
+    assert np.abs(uv(copy) - first).max() > 0.1
+    assert not is_edited_by_hand(copy) and is_edited_by_hand(edited)
