@@ -119,6 +119,8 @@ def add_displacement(
 ) -> None:
     """Add or update the modifier and its texture, without changing the strength of an existing one.
 
+    Linked copies (Alt D) have the same mesh and get the modifier, too.
+
     Parameters
     ----------
     key : str
@@ -135,14 +137,15 @@ def add_displacement(
         bpy.data.textures.new(datablock_name(key, "displacement"), "IMAGE"), key, "displacement"
     )
     texture.image, texture.use_interpolation, texture.extension = image, False, "EXTEND"
-    modifier = obj.modifiers.get(MODIFIER) or obj.modifiers.new(MODIFIER, "DISPLACE")
-    modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV
-    modifier.direction, modifier.mid_level = "RGB_TO_XYZ" if along_rays else "NORMAL", 0.0
     texture.use_clamp = False  # heights and vectors have negative parts
+    for one in _with_its_mesh(obj):
+        modifier = one.modifiers.get(MODIFIER) or one.modifiers.new(MODIFIER, "DISPLACE")
+        modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV
+        modifier.direction, modifier.mid_level = "RGB_TO_XYZ" if along_rays else "NORMAL", 0.0
 
 
 def remove_displacement(key: str, obj: bpy.types.Object) -> None:
-    """Remove the modifier, and the texture and image that nothing else uses.
+    """Remove the modifier, also of linked copies, and the texture and image that nothing else uses.
 
     Parameters
     ----------
@@ -151,10 +154,16 @@ def remove_displacement(key: str, obj: bpy.types.Object) -> None:
     obj : bpy.types.Object
         The object.
     """
-    modifier = obj.modifiers.get(MODIFIER)
-    if modifier is not None:
-        obj.modifiers.remove(modifier)
+    for one in _with_its_mesh(obj):
+        modifier = one.modifiers.get(MODIFIER)
+        if modifier is not None:
+            one.modifiers.remove(modifier)
     for blocks in (bpy.data.textures, bpy.data.images):
         block = find_tagged(blocks, key, "displacement")
         if block is not None and block.users == 0:
             blocks.remove(block)
+
+
+def _with_its_mesh(obj: bpy.types.Object) -> list[bpy.types.Object]:
+    """The local objects with the mesh of an object."""
+    return [one for one in bpy.data.objects if one.data == obj.data and one.library is None]

@@ -227,6 +227,25 @@ def test_the_displaced_grid_is_the_height_mesh(blender: Any, tmp_path: Path, fac
     assert not built.object.modifiers and len(blender.data.textures) == 0
 
 
+def test_linked_copies_follow_the_displacement(blender: Any, bump_folder: Path) -> None:
+    """They share the flat grid, or the full mesh, so they need the modifier, or none."""
+    from blender_addon.files.result_arrays import read_result
+    from blender_addon.scene import BuildOptions, build_object
+
+    result = read_result(bump_folder)
+    depths = []
+    for displacement in (False, True, False):
+        options = BuildOptions(own_scene=False, all_maps=False, displacement=displacement)
+        obj = build_object(result, options).object
+        if not depths:
+            copy = obj.copy()
+            blender.context.scene.collection.objects.link(copy)
+        graph = blender.context.evaluated_depsgraph_get()
+        depths.append([one.evaluated_get(graph).dimensions.y for one in (obj, copy)])
+        assert copy.data == obj.data and len(copy.modifiers) == int(displacement)
+    assert np.ptp(depths) < 1e-5 and depths[0][0] > 0.01
+
+
 def test_the_mesh_can_be_decimated(blender: Any, bump_folder: Path) -> None:
     """A fifth of the faces still has the recovered normals, which for the bump are known
     everywhere.
