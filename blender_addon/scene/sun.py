@@ -23,6 +23,7 @@ from .collection import LIGHT_AND_CAMERA, first_local, is_included, link_object
 from .world import set_sun_mix, sun_mix
 
 _LAMPS = ("lamp1", "lamp2", "lamp3")
+_FITTED = "isc_fitted_lamp"  # of a lamp: direction and irradiance of the fit
 _SAME_DIRECTION = 1 - 1e-6  # cosine of .08 degrees
 
 
@@ -75,6 +76,8 @@ def ensure_lamps(
 ) -> list[bpy.types.Object]:
     """Create or update the lamps of the highlights, and remove surplus ones.
 
+    Lamps that the user has turned, or made stronger or weaker, stay as they are.
+
     Parameters
     ----------
     key : str
@@ -92,7 +95,7 @@ def ensure_lamps(
         The lamps.
     """
     lamps = [
-        _ensure_sun(key, f"lamp{k + 1}", collection, direction, strength)
+        _ensure_lamp(key, f"lamp{k + 1}", collection, direction, strength)
         for k, (direction, strength) in enumerate(zip(directions, strengths, strict=True))
     ]
     for lamp in lamps:
@@ -102,6 +105,28 @@ def ensure_lamps(
     for role in _LAMPS[len(lamps) :]:
         _remove(key, role)
     return lamps
+
+
+def _ensure_lamp(
+    key: str,
+    role: str,
+    collection: bpy.types.Collection,
+    direction: np.ndarray,
+    strength: np.ndarray,
+) -> bpy.types.Object:
+    lamp = find_tagged(bpy.data.objects, key, role)
+    fitted = None if lamp is None else lamp.get(_FITTED)
+    if fitted is not None and not np.allclose(_shown(lamp), list(fitted), rtol=1e-3, atol=1e-4):
+        return lamp
+    lamp = _ensure_sun(key, role, collection, direction, strength)
+    lamp[_FITTED] = _shown(lamp)
+    return lamp
+
+
+def _shown(lamp: bpy.types.Object) -> list[float]:
+    """Direction toward a lamp and its irradiance, in Blender's axes."""
+    toward = lamp.matrix_basis.to_quaternion() @ Vector((0, 0, 1))
+    return [*toward, *(lamp.data.energy * part for part in lamp.data.color)]
 
 
 def relight(

@@ -17,7 +17,7 @@ import bpy
 import numpy as np
 
 from ..datablocks.nodes import add_node, connect, node_tree
-from ..datablocks.provenance import datablock_name, find_tagged, tag
+from ..datablocks.provenance import datablock_name, find_tagged, is_isc_datablock, tag
 
 ROTATION = 90.0  # degrees about Z
 MAPPING, SUN, BACKGROUND = "ISC Rotation", "ISC Sun", "ISC Light"
@@ -26,7 +26,7 @@ MAPPING, SUN, BACKGROUND = "ISC Rotation", "ISC Sun", "ISC Light"
 def ensure_world(
     key: str, environment_map: bpy.types.Image, ambient: np.ndarray, sun: bool
 ) -> bpy.types.World:
-    """Create or update the world of a photo.
+    """Create or update the world of a photo; rotation and strength that the user has set stay.
 
     Parameters
     ----------
@@ -47,6 +47,39 @@ def ensure_world(
     world = find_tagged(bpy.data.worlds, key, "world") or tag(
         bpy.data.worlds.new(datablock_name(key)), key, "world"
     )
+    if not _show_map(world, environment_map):
+        _add_nodes(world, environment_map)
+    set_sun_mix(world, ambient, sun)
+    if hasattr(world, "cycles"):
+        # The default of 1024 columns takes longer to tabulate than a small render.
+        world.cycles.sampling_method = "MANUAL"
+        world.cycles.sample_map_resolution = 4 * environment_map.size[0]
+    world["isc_rotation"] = ROTATION
+    world["isc_rotation_about"] = (
+        "degrees about Z by which the Mapping node rotates the map's middle column "
+        "toward the viewer (-Y)"
+    )
+    return world
+
+
+def _show_map(world: bpy.types.World, environment_map: bpy.types.Image) -> bool:
+    """Replace the map of a world, whose light the user may have turned or made stronger; False if
+    a node is missing.
+    """
+    nodes = node_tree(world).nodes
+    if any(name not in nodes for name in (MAPPING, SUN, BACKGROUND)):
+        return False
+    if world.get("isc_rotation") != ROTATION:  # of another version
+        return False
+    texture = next((node for node in nodes if node.type == "TEX_ENVIRONMENT"), None)
+    if texture is None:
+        return False
+    if texture.image is None or is_isc_datablock(texture.image):  # else it is the user's own
+        texture.image = environment_map
+    return True
+
+
+def _add_nodes(world: bpy.types.World, environment_map: bpy.types.Image) -> None:
     tree = node_tree(world)
     tree.nodes.clear()
     coordinates = add_node(tree, "TexCoord", (-900, 0))
@@ -65,17 +98,6 @@ def ensure_world(
         (next(socket for socket in mix.outputs if socket.type == "RGBA"), light.inputs["Color"]),
         (light.outputs["Background"], output.inputs["Surface"]),
     )
-    set_sun_mix(world, ambient, sun)
-    if hasattr(world, "cycles"):
-        # The default of 1024 columns takes longer to tabulate than a small render.
-        world.cycles.sampling_method = "MANUAL"
-        world.cycles.sample_map_resolution = 4 * environment_map.size[0]
-    world["isc_rotation"] = ROTATION
-    world["isc_rotation_about"] = (
-        "degrees about Z by which the Mapping node rotates the map's middle column "
-        "toward the viewer (-Y)"
-    )
-    return world
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ import pytest
 
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.shading.environment_map import directions, shading_under
-from tests.addon.scene_render import render
+from tests.addon.scene_render import pixels, render
 
 
 def build(result: ResultArrays, **options: Any) -> Any:
@@ -139,6 +139,24 @@ def test_an_object_is_relit_from_its_properties(blender: Any, result: ResultArra
     )
 
 
+def test_an_update_keeps_the_rotation_and_strength_of_the_light(
+    blender: Any, result: ResultArrays
+) -> None:
+    nodes = build(result).world.node_tree.nodes
+    nodes["ISC Rotation"].inputs["Rotation"].default_value[2] = 0.3
+    nodes["ISC Light"].inputs["Strength"].default_value = 2
+    brighter = replace(result, environment_map=2 * result.environment_map)
+    nodes = build(brighter).world.node_tree.nodes
+    assert nodes["ISC Rotation"].inputs["Rotation"].default_value[2] == pytest.approx(0.3)
+    assert nodes["ISC Light"].inputs["Strength"].default_value == 2
+    texture = next(node for node in nodes if node.type == "TEX_ENVIRONMENT")
+    shown = pixels(texture.image)[..., :3]
+    np.testing.assert_allclose(shown, brighter.environment_map, rtol=1e-5)
+    nodes.remove(nodes["ISC Sun"])
+    nodes = build(result).world.node_tree.nodes
+    assert "ISC Sun" in nodes and nodes["ISC Light"].inputs["Strength"].default_value == 1
+
+
 def test_other_objects_cannot_be_relit(blender: Any) -> None:
     from blender_addon.scene.sun import relight
     from isc_core.errors import InputError
@@ -181,6 +199,20 @@ def test_lamps_of_a_refined_lobe_light_highlights_alone(blender: Any, result: Re
     assert not lamps()
     build(with_lamps(result, 2), specular_from="none")
     assert not lamps()
+
+
+def test_lamps_that_the_user_has_changed_stay(blender: Any, result: ResultArrays) -> None:
+    build(with_lamps(result, 3))
+    turned, stronger, same = sorted(lamps(), key=lambda lamp: str(lamp["isc_role"]))
+    turned.rotation_mode, turned.rotation_euler = "XYZ", (1.0, 0.5, 0.0)
+    stronger.data.energy = 7.0
+    other = with_lamps(result, 3)
+    build(replace(other, lamp_strength=np.full_like(other.lamp_strength, 3.0)))
+    assert tuple(turned.rotation_euler) == pytest.approx((1.0, 0.5, 0.0))
+    assert [lamp.data.energy for lamp in (turned, stronger, same)] == pytest.approx([2, 7, 3])
+    stronger.data.energy, turned.rotation_mode = 2.0, "QUATERNION"
+    build(with_lamps(result, 1))
+    assert lamps() == [turned], "lamps that the fit no longer has are removed"
 
 
 @pytest.mark.slow
