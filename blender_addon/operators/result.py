@@ -36,6 +36,7 @@ from .viewport import activate, invoking_view, show
 # Staged objects by folder, until they are placed: operators take plain values only.
 _staged: dict[str, list[StagedObject]] = {}
 _CAME_FROM = "isc_came_from"
+_SAMPLES = "isc_samples"  # of a scene: what was set last
 
 
 def build_in_steps(
@@ -344,10 +345,16 @@ def _store_settings(built: BuiltObject, request: DecomposeRequest, scene: Any) -
             photo.pack()
     if request.build.own_scene:
         if built.scene.render.engine == "CYCLES":
-            built.scene.cycles.samples = request.method.samples
+            _set_samples(built.scene, request.method.samples)
         if built.scene != scene:
             built.scene[_CAME_FROM] = scene
             _copy_settings(scene.isc, built.scene.isc)
+
+
+def _set_samples(scene: Any, samples: int) -> None:
+    """Set the samples of a scene, unless the user has changed them since."""
+    if scene.get(_SAMPLES, scene.cycles.samples) == scene.cycles.samples:
+        scene.cycles.samples = scene[_SAMPLES] = samples
 
 
 def _copy_settings(source: Any, target: Any) -> None:

@@ -72,6 +72,7 @@ from .sun import ShownLight, ensure_lamps, ensure_sun, restore_light, shown_ligh
 from .texture_window import move_textures, store_window
 from .world import ensure_world
 
+_RESOLUTION = "isc_resolution"  # of a scene: what was set last
 _NO_LAMPS = np.zeros((0, 3))
 # Textures that only some builds have.
 _OPTIONAL_TEXTURES = (
@@ -256,9 +257,9 @@ def _place(
     result, options = prepared.result, prepared.options
     key = _choose_key(result, options, photo)
     _require_ready(key, options, scene)
-    if options.own_scene:
-        scene = ensure_scene(key)
     existing = find_tagged(bpy.data.objects, key, OBJECT)
+    if options.own_scene:
+        scene = ensure_scene(key, scene, existing)
     collection = ensure_collection(key, scene, existing)
     light = _light_before(existing, options)
     images = {
@@ -466,16 +467,20 @@ def _remove_unused(key: str, images: dict[ImageRole, bpy.types.Image]) -> None:
 
 
 def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) -> None:
-    if options.own_scene:
-        options = replace(
-            options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True
-        )
-    if options.set_world:
-        built.scene.world = built.world
-    if options.set_camera:
-        built.scene.camera = built.camera
-    if options.set_resolution:
-        width, height = map(int, result.photo_size)
-        set_render_size(built.scene, (width, height) if options.photo_resolution else result.size)
+    """Set what was requested; in the object's own scene all of it, unless the user has changed it
+    since.
+    """
+    scene, own = built.scene, options.own_scene
+    if options.set_world or (own and scene.world is None):
+        scene.world = built.world
+    if options.set_camera or (own and scene.camera is None):
+        scene.camera = built.camera
+    width, height = map(int, result.photo_size)
+    size = (width, height) if options.photo_resolution else result.size
+    given = tuple(scene.get(_RESOLUTION, ()))
+    is_given = given == (scene.render.resolution_x, scene.render.resolution_y) != size
+    if options.set_resolution or (own and (not given or is_given)):
+        set_render_size(scene, size)
+        scene[_RESOLUTION] = size
     if options.set_view_transform:
-        use_standard_view(built.scene)
+        use_standard_view(scene)

@@ -42,20 +42,28 @@ def ensure_collection(
     return collection
 
 
-def ensure_scene(key: str) -> bpy.types.Scene:
+def ensure_scene(
+    key: str, current: bpy.types.Scene, obj: bpy.types.Object | None
+) -> bpy.types.Scene:
     """Find or create a photo's own scene.
 
     Parameters
     ----------
     key : str
         Name of the photo.
+    current : bpy.types.Scene
+        The scene in use. If it is the photo's own, or a copy of it with the object, it is returned.
+    obj : bpy.types.Object or None
+        The photo's object, if it exists.
 
     Returns
     -------
     bpy.types.Scene
-        The scene; a new one renders with Cycles and a transparent background.
+        The scene; a new one renders with Cycles and a transparent background, and shows colours
+        unchanged.
     """
-    scene = find_tagged(bpy.data.scenes, key, "scene")
+    first = [current] if obj is None or is_in_scene(obj, current) else []
+    scene = find_tagged([*first, *bpy.data.scenes], key, "scene")
     if scene is None:
         scene = tag(bpy.data.scenes.new(datablock_name(key)), key, "scene")
         if hasattr(scene, "cycles"):  # an add-on, which may be disabled
@@ -69,6 +77,7 @@ def ensure_scene(key: str) -> bpy.types.Scene:
             scene.cycles.filter_width = 0.5
         scene.render.film_transparent = True
         scene.eevee.taa_samples = _PREVIEW_SAMPLES
+        use_standard_view(scene)
     return scene
 
 

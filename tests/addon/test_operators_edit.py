@@ -242,6 +242,15 @@ def test_a_library_override_has_its_sun_in_the_scene(
     assert not scene.collection.objects
 
 
+def test_an_update_keeps_the_samples_of_its_own_scene(
+    addon: Any, built: BuiltObject, bump_folder: Path
+) -> None:
+    assert built.scene.cycles.samples == 64
+    built.scene.cycles.samples = 7
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    assert built.scene.cycles.samples == 7
+
+
 def test_the_recovered_light_is_restored(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     before = render(built.scene, tmp_path, samples=4)["Combined"]
     addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0)

@@ -248,6 +248,31 @@ def test_the_users_scene_stays_as_it_is(blender: Any, result: ResultArrays, own:
         )
 
 
+def test_an_update_keeps_what_the_user_changed_in_its_own_scene(
+    blender: Any, result: ResultArrays
+) -> None:
+    scene = build(result, all_maps=False).scene
+    build(result, all_maps=False, photo_resolution=True)
+    blender.context.window.scene = scene
+    user_scene(blender)
+    scene.view_settings.view_transform = "AgX"
+    before = state(scene)
+    build(result, all_maps=False)
+    assert state(scene) == before
+    blender.data.worlds.remove(scene.world)
+    built = build(result, all_maps=False)
+    assert scene.world == built.world and scene.camera != built.camera
+
+
+def test_a_copy_of_its_own_scene_is_another_scene(blender: Any, result: ResultArrays) -> None:
+    scene = build(result, all_maps=False).scene
+    copy = scene.copy()
+    copy.name, copy.camera = "a first one", None
+    build(result, scene=scene, all_maps=False)
+    assert copy.camera is None and scene.camera is not None
+    assert build(result, scene=copy, all_maps=False).scene == copy
+
+
 CHANGES: dict[str, Callable[[Any, Any], bool]] = {
     "set_world": lambda scene, built: scene.world == built.world,
     "set_camera": lambda scene, built: scene.camera == built.camera,
