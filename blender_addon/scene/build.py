@@ -70,7 +70,7 @@ from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
 from .sun import ShownLight, ensure_lamps, ensure_sun, restore_light, shown_light
 from .texture_window import move_textures, store_window
-from .world import ensure_world
+from .world import ensure_world, keep_world, world_of
 
 _RESOLUTION = "isc_resolution"  # of a scene: what was set last
 _NO_LAMPS = np.zeros((0, 3))
@@ -289,9 +289,10 @@ def _place(
     if existing is None:
         _position(obj, options, scene, *position)
     attach_maps(obj, {role: images[role] for role in MAPS if role in images})
-    world = ensure_world(key, images[ImageRole.ENVIRONMENT_MAP], result.sun_ambient, options.sun)
-    # So that the light is saved and appended with the object even if no scene uses it.
-    obj["isc_world"] = world
+    former = find_tagged(bpy.data.worlds, key, "world") if existing is None else world_of(obj)
+    sky = images[ImageRole.ENVIRONMENT_MAP]
+    world = ensure_world(key, sky, result.sun_ambient, options.sun, former)
+    keep_world(obj, world)
     keep_material(obj, material)
     for block in (obj, collection):
         write_provenance(block, result, json.dumps(asdict(options)))

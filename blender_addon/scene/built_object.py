@@ -6,6 +6,7 @@ import bpy
 
 from ..datablocks.provenance import KEY, ROLE, find_tagged, is_isc_datablock
 from .copies import COPY, OBJECT, find_material
+from .world import world_of
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
         or next(iter(built.users_collection), None),
         object=built,
         camera=find_tagged(bpy.data.objects, key, "camera"),
-        world=find_tagged(bpy.data.worlds, key, "world"),
+        world=world_of(built),
         scene=scene_of(built),
         material=material,
     )

@@ -20,7 +20,7 @@ from ..datablocks.mesh import to_blender
 from ..datablocks.provenance import KEY, datablock_name, find_tagged, tag
 from .built_object import scene_of
 from .collection import LIGHT_AND_CAMERA, first_local, is_included, link_object
-from .world import set_sun_mix, sun_mix
+from .world import set_sun_mix, sun_mix, world_of
 
 _LAMPS = ("lamp1", "lamp2", "lamp3")
 _FITTED = "isc_fitted_lamp"  # of a lamp: direction and irradiance of the fit
@@ -162,7 +162,7 @@ def relight(
             f"{obj.name} is not an object of ISC, or its light was deleted: import the result again"
         )
     direction, strength, ambient = (np.array(value, float) for value in values)
-    set_sun_mix(find_tagged(bpy.data.worlds, key, "world"), ambient, sun)
+    set_sun_mix(world_of(obj), ambient, sun)
     hide_lamps(key, sun)
     scene = scene or scene_of(obj) or bpy.context.scene
     if sun:
@@ -209,7 +209,7 @@ def shown_light(obj: bpy.types.Object) -> ShownLight:
     ShownLight
     """
     sun = find_tagged(bpy.data.objects, obj[KEY], "sun")
-    mix = sun_mix(find_tagged(bpy.data.worlds, obj[KEY], "world"))
+    mix = sun_mix(world_of(obj))
     stored = [obj.get(f"isc_sun_{name}") for name in ("direction", "strength", "ambient")]
     if sun is None or mix is None or any(value is None for value in stored):
         return ShownLight(False)
@@ -243,7 +243,7 @@ def restore_light(obj: bpy.types.Object, light: ShownLight, scene: bpy.types.Sce
     if light.ambient is None:
         relight(obj, light.sun, scene)
         return
-    set_sun_mix(find_tagged(bpy.data.worlds, obj[KEY], "world"), light.ambient, light.sun)
+    set_sun_mix(world_of(obj), light.ambient, light.sun)
     hide_lamps(obj[KEY], light.sun)
 
 

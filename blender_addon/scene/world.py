@@ -17,14 +17,52 @@ import bpy
 import numpy as np
 
 from ..datablocks.nodes import add_node, connect, node_tree
-from ..datablocks.provenance import datablock_name, find_tagged, is_isc_datablock, tag
+from ..datablocks.provenance import KEY, datablock_name, find_tagged, is_isc_datablock, tag
 
 ROTATION = 90.0  # degrees about Z
+_OWN_WORLD = "isc_world"  # of an object
 MAPPING, SUN, BACKGROUND = "ISC Rotation", "ISC Sun", "ISC Light"
 
 
+def world_of(obj: bpy.types.Object) -> bpy.types.World | None:
+    """Return the recovered light of an object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+
+    Returns
+    -------
+    bpy.types.World or None
+        Its own: a full copy of a scene has copies of both. None where it was deleted.
+    """
+    own = obj.get(_OWN_WORLD)
+    if own is not None and own.library is None:
+        return own
+    return find_tagged(bpy.data.worlds, obj[KEY], "world")
+
+
+def keep_world(obj: bpy.types.Object, world: bpy.types.World) -> None:
+    """Store the light of an object in it: it is saved and appended with it even if no scene uses
+    it.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+    world : bpy.types.World
+        Its light.
+    """
+    obj[_OWN_WORLD] = world
+
+
 def ensure_world(
-    key: str, environment_map: bpy.types.Image, ambient: np.ndarray, sun: bool
+    key: str,
+    environment_map: bpy.types.Image,
+    ambient: np.ndarray,
+    sun: bool,
+    world: bpy.types.World | None = None,
 ) -> bpy.types.World:
     """Create or update the world of a photo; rotation and strength that the user has set stay.
 
@@ -38,15 +76,16 @@ def ensure_world(
         Uniform shading in addition to a sun.
     sun : bool
         Whether to show the uniform light instead of the environment map.
+    world : bpy.types.World, optional
+        The world to update; None creates one.
 
     Returns
     -------
     bpy.types.World
         The world.
     """
-    world = find_tagged(bpy.data.worlds, key, "world") or tag(
-        bpy.data.worlds.new(datablock_name(key)), key, "world"
-    )
+    if world is None:
+        world = tag(bpy.data.worlds.new(datablock_name(key)), key, "world")
     if not _show_map(world, environment_map):
         _add_nodes(world, environment_map)
     set_sun_mix(world, ambient, sun)

@@ -205,6 +205,20 @@ def test_the_sun_shines_in_the_scene_that_is_edited(addon: Any, bump_folder: Pat
     assert sun.name not in other.collection.objects, "the user moved it"
 
 
+def test_a_full_copy_of_the_scene_has_its_own_light(addon: Any, built: BuiltObject) -> None:
+    addon.ops.scene.new(type="FULL_COPY")
+    scene = addon.context.scene
+    copy = next(obj for obj in scene.objects if obj.type == "MESH")
+    addon.context.view_layer.objects.active = copy
+    assert scene not in (None, built.scene) and scene.world != built.world
+    assert addon.ops.isc.relight(light="OPTIMAL") == {"FINISHED"}
+    mixes = sun_mix(scene.world), sun_mix(built.world)
+    assert [mix is not None and mix.sun for mix in mixes] == [True, False]
+    assert any(obj.type == "LIGHT" for obj in scene.objects)
+    assert addon.ops.isc.relight(light="RECOVERED") == {"FINISHED"}
+    assert not sun_mix(scene.world).sun  # type: ignore[union-attr]
+
+
 def test_the_photos_light_stays_when_the_sun_is_removed(addon: Any, bump_folder: Path) -> None:
     made = shared(addon, bump_folder)
     part = addon.data.collections["bump light and camera"]
