@@ -21,7 +21,7 @@ from isc_core.imaging.srgb import linear_to_srgb, srgb_codes, srgb_to_linear
 from isc_core.io.png import encode_png
 
 from ..files.exr import encode_exr
-from .provenance import datablock_name, find_tagged, tag
+from .provenance import KEY, ROLE, all_tagged, datablock_name, is_isc_datablock, tag
 
 COLOR, DATA, SRGB = "Linear Rec.709", "Non-Color", "sRGB"
 _FAST = 1  # compression of large textures
@@ -291,7 +291,8 @@ def content_mark(image: bpy.types.Image) -> str:
 def replace_image(image: bpy.types.Image, key: str, role: ImageRole) -> bpy.types.Image:
     """Name and tag an image, and replace the previous one of that role everywhere.
 
-    A generated image loses its pixels when resized in place, so it is replaced instead.
+    A generated image loses its pixels when resized in place, so it is replaced instead. A texture
+    that the user has painted on stays in the file, see `keep_painted`.
 
     Parameters
     ----------
@@ -306,13 +307,46 @@ def replace_image(image: bpy.types.Image, key: str, role: ImageRole) -> bpy.type
     bpy.types.Image
         The same image.
     """
-    name, old = image_name(key, role), find_tagged(bpy.data.images, key, role)
+    name, old = image_name(key, role), _find_image(key, role)
     if old is not None:
         name = old.name
         old.user_remap(image)
-        bpy.data.images.remove(old)
+        if role in TEXTURE_NAMES and _CHECKSUM in old and not unmodified_file(old):
+            keep_painted(old)
+        else:
+            bpy.data.images.remove(old)
     image.name = name
     return tag(image, key, role)
+
+
+def keep_painted(image: bpy.types.Image) -> None:
+    """Keep an image that the user has painted on in the file, as the user's own.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        The image; loses its tags, and gets "painted" in its name.
+    """
+    if image.is_dirty:
+        image.pack()
+    for name in (KEY, ROLE):
+        image.pop(name, None)
+    image.name, image.use_fake_user = f"{image.name} painted", True
+
+
+def _find_image(key: str, role: ImageRole) -> bpy.types.Image | None:
+    """The image of a role. A duplicate of the user's has the same tags, and another name or no
+    user of ISC.
+    """
+    found = list(all_tagged(bpy.data.images, key, role))
+    if len(found) < 2:
+        return next(iter(found), None)
+    name, users = image_name(key, role), bpy.data.user_map(subset=found)
+
+    def rank(image: bpy.types.Image) -> tuple[bool, bool]:
+        return image.name == name, any(is_isc_datablock(user) for user in users.get(image, ()))
+
+    return max(found, key=rank)
 
 
 def image_name(key: str, role: ImageRole) -> str:

@@ -29,6 +29,7 @@ from ..datablocks.images import (
     ImageRole,
     content_mark,
     image_name,
+    keep_painted,
     new_image,
     unmodified_file,
 )
@@ -394,8 +395,5 @@ def _replace_image(node: Any, image: bpy.types.Image | None) -> None:
     if unmodified_file(old):
         bpy.data.images.remove(old)
         return
-    if old.is_dirty:
-        old.pack()
-    for name in (KEY, ROLE, _STATE):
-        old.pop(name, None)
-    old.name, old.use_fake_user = f"{old.name} painted", True
+    old.pop(_STATE, None)
+    keep_painted(old)

@@ -328,6 +328,26 @@ def test_paint_on_an_edited_base_color_stays_in_the_file(
     assert [image for image in blender.data.images if "edited" in image.name] == [shown]
 
 
+def test_paint_and_duplicates_stay_in_the_file_after_an_update(
+    blender: Any, result: ResultArrays
+) -> None:
+    image = base_color_image(build(result, own_scene=False, all_maps=False))
+    name, count = image.name, len(blender.data.images)
+    duplicate = image.copy()  # with its tags, as Blender's Duplicate
+    duplicate.name, duplicate.use_fake_user = "a first one", True
+    image.pixels[:4] = (1.0, 0.0, 1.0, 1.0)
+    image.update()
+    assert image.is_dirty
+    built = build(result, own_scene=False, all_maps=False)
+    assert base_color_image(built).name == name and len(blender.data.images) == count + 2
+    assert not base_color_image(built).is_dirty and "a first one" in blender.data.images
+    painted = blender.data.images[f"{name} painted"]
+    assert painted.use_fake_user and painted.packed_file is not None and "isc_key" not in painted
+    assert tuple(painted.pixels[:4]) == pytest.approx((1.0, 0.0, 1.0, 1.0), abs=0.01)
+    build(result, own_scene=False, all_maps=False)
+    assert len(blender.data.images) == count + 2
+
+
 @pytest.mark.parametrize("varies", [False, True])
 def test_the_base_color_follows_the_gloss(blender: Any, result: ResultArrays, varies: bool) -> None:
     """It is that of an object whose fit has the edited gloss; with the fitted gloss again, it is
