@@ -77,11 +77,16 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     Returns
     -------
     bool
-        True with shape keys, vertex groups, further UV maps or attributes, or faces of other
-        materials, too. What an earlier version did not store is taken for unchanged.
+        True with shape keys, vertex groups, levels of a Multiresolution modifier, further UV maps
+        or attributes, or faces of other materials, too. What an earlier version did not store is
+        taken for unchanged.
     """
     mesh = obj.data
-    if mesh.shape_keys is not None or len(obj.vertex_groups) > 0 or _has_other_attributes(mesh):
+    # The mesh holds what was sculpted on them.
+    levels = [mod.total_levels for mod in obj.modifiers if mod.type == "MULTIRES"]
+    if mesh.shape_keys is not None or len(obj.vertex_groups) > 0 or any(levels):
+        return True
+    if _has_other_attributes(mesh):
         return True
     if _BUILT not in mesh:
         return False

@@ -284,6 +284,15 @@ def test_what_an_update_would_discard_is_an_edit_by_hand(result: ResultArrays, e
     assert not is_edited_by_hand(obj)
 
 
+def test_sculpted_levels_are_an_edit_by_hand(result: ResultArrays) -> None:
+    obj = build_object(result, SHARED).object
+    bpy.context.view_layer.objects.active = obj
+    modifier = obj.modifiers.new("Multires", "MULTIRES")
+    assert not is_edited_by_hand(obj), "nothing to sculpt on"
+    bpy.ops.object.multires_subdivide(modifier=modifier.name)
+    assert is_edited_by_hand(obj)
+
+
 def test_a_mesh_of_an_earlier_version_is_known_by_its_shape(result: ResultArrays) -> None:
     obj = build_object(result, SHARED).object
     obj.data["isc_built_crc32"] = obj.data["isc_built_crc32"].split()[0]
