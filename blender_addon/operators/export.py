@@ -23,6 +23,7 @@ from isc_core.result_files.exports.targets import TARGETS
 from ..datablocks.images import ImageRole
 from ..datablocks.painted_images import pack_images
 from ..datablocks.provenance import KEY, ROLE
+from ..files.names import file_stem
 from ..materials.edit_nodes import PLASTIC, specular_level, surface_node
 from ..runs.messages import reason_line, sentence
 from ..scene.built_object import BuiltObject
@@ -320,9 +321,7 @@ def export_object(
 @contextmanager
 def _object_folder(built: BuiltObject, parent: Path) -> Iterator[Path]:
     """Create the folder of an object; raises `InputError` if it cannot be written to."""
-    name = built.object.name
-    letters = (letter if letter.isalnum() or letter in " -_." else "_" for letter in name)
-    folder = parent / ("".join(letters).strip(" .") or "object")
+    folder = parent / file_stem(built.object.name)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         yield folder

@@ -19,6 +19,7 @@ from isc_core.io.atomic import new_file, require_writable_file
 
 from ..datablocks.painted_images import pack_images
 from ..datablocks.provenance import KEY, require_local
+from ..files.names import file_stem
 from .built_object import BuiltObject
 from .collection import use_standard_view
 from .copies import has_other_material
@@ -94,7 +95,7 @@ def _shown_blocks(built: BuiltObject) -> list[Any]:
 
 
 def _free_file(library: Path, name: str, overwrite: bool) -> Path:
-    plain = bpy.path.clean_name(name) or "object"
+    plain = file_stem(name)
     path, number = library / f"{plain}.blend", 1
     while path.exists() and not overwrite:
         number += 1

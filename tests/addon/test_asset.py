@@ -72,6 +72,17 @@ def test_an_asset_can_be_appended_elsewhere(addon: Any, built: BuiltObject, tmp_
     assert images and all(image.packed_file is not None for image in images)
 
 
+def test_assets_of_similar_names_do_not_replace_each_other(
+    addon: Any, built: BuiltObject, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(asset, "_set_preview", lambda built: None)
+    names = ["cup 1", "cup.1", "cup_1", "caf\u00e9", "caf\u00e8", "\u676f"]
+    for name in names:
+        built.object.name = name
+        asset.save_asset(built, tmp_path, overwrite=True)
+    assert {path.stem for path in tmp_path.glob("*.blend")} == set(names)
+
+
 def test_an_asset_is_saved_without_cycles(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     import addon_utils  # type: ignore[import-not-found]
 
