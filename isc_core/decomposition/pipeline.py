@@ -111,7 +111,7 @@ def decompose(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
         )
     known_shape = inputs.height is not None or inputs.depth is not None
-    _check_shapes(inputs, photo)
+    inputs.check(photo.mask.shape)
     photo = with_camera(photo, settings, known_shape)
     with clock.stage("prepare"):
         part = object_part(photo, settings.maps_size)
@@ -151,17 +151,6 @@ def decompose(
     if maps.mask.size > LARGE_PHOTO:
         release_memory()
     return result
-
-
-def _check_shapes(inputs: KnownInputs, photo: Photo) -> None:
-    """Raise `InputError` for maps that are not of the photo's size."""
-    for what, values in (("shape", inputs.height), ("depth", inputs.depth)):
-        if values is not None and values.shape != photo.mask.shape:
-            (rows, columns), (h, w) = values.shape, photo.mask.shape
-            raise InputError(
-                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the "
-                "photo's full size"
-            )
 
 
 def _is_black(photo: Photo) -> bool:

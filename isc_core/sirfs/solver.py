@@ -41,6 +41,9 @@ _PREDICTED_LEVEL = 1  # about as fine as the network that predicts the normals
 _TRIAL = 80
 # `down` multiplies heights by 8, and upsampling by one level doubles them.
 _COARSER = 16
+# Magnitudes beyond which a trial is not evaluated: their curvature or reflectance would be NaN in
+# float32, and the kernels look these up in tables.
+_MOST_HEIGHT, _MOST_LIGHT = 1e11, 1e6
 
 
 @dataclass(frozen=True)
@@ -351,7 +354,11 @@ class ParameterVector:
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x
         self.evaluations += 1
-        result = self._engine.evaluate(self.height(), self.light())
+        height, light = self.height(), self.light()
+        if not (_is_below(height, _MOST_HEIGHT) and _is_below(light, _MOST_LIGHT)):
+            gradient[...] = 0
+            return float("inf")  # the line search tries a shorter step
+        result = self._engine.evaluate(height, light)
         if self._known_height is None:
             self._backend.analyse(result.height_gradient, self.levels(gradient))
         if self._known_light is None:
@@ -360,6 +367,11 @@ class ParameterVector:
             )
         self.terms = result.terms
         return result.terms.total
+
+
+def _is_below(values: np.ndarray, most: float) -> bool:
+    """Whether all magnitudes are below a number; False where one is NaN."""
+    return bool(values.max() < most and values.min() > -most)
 
 
 def solve(
@@ -392,7 +404,8 @@ def solve(
     Raises
     ------
     InputError
-        If a known shape or light is not finite, or the engine is not available.
+        If a known shape or light is not finite, the objective has no minimum, or the engine is not
+        available.
     Cancelled
         If the monitor cancels.
     """
@@ -415,6 +428,11 @@ def solve(
                 unknowns(run.x, np.empty_like(run.x))
         else:  # everything is known: only the loss is needed
             outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")
+        if not np.isfinite(outcome.loss):
+            raise InputError(
+                "shape and light cannot be recovered, because they grow without limit: check the "
+                "known inputs"
+            )
         return SirfsResult(
             np.array(unknowns.height(), float),
             np.array(unknowns.light(), float),

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -161,6 +162,30 @@ def test_what_cannot_be_used_is_named(
     given = codes if isinstance(image, str) and image == "codes" else image
     with pytest.raises(InputError) as refusal:
         isc_core.decompose(given, mask, settings=NAIVE)
+    assert message in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("known", "message"),
+    [
+        ({"height": np.zeros((5, 7))}, "the shape map is 7 x 5 but the photo"),
+        ({"height": np.zeros((5, 7, 1))}, "array of numbers (height, width)"),
+        ({"depth": [[1.0, 2.0]]}, "array of numbers (height, width)"),
+        ({"light": np.zeros((3, 9))}, "array (9, 3)"),
+        ({"light": np.full((9, 3), np.nan)}, "array (9, 3)"),
+        ({"light": np.full((9, 3), 1e6)}, "logarithm of shading"),
+        ({"depth_sigma": 0}, "the sigma of the depth must be a number from 1e-06"),
+        ({"depth_sigma": float("nan")}, "not nan"),
+        ({"depth_sigma": "2"}, "not '2'"),
+        ({"depth_weight": -3.0}, "the weight of the depth must be a number from 0"),
+    ],
+)
+def test_known_inputs_that_cannot_be_used_are_named(
+    codes: np.ndarray, known: dict[str, Any], message: str
+) -> None:
+    settings = Settings(model="sirfs", max_size=32)
+    with pytest.raises(InputError) as refusal:
+        isc_core.decompose(codes, settings=settings, known=isc_core.KnownInputs(**known))
     assert message in str(refusal.value)
 
 

@@ -1,5 +1,6 @@
 """The solver on made scenes whose shape, light and albedo are known."""
 
+import contextlib
 from dataclasses import replace
 from importlib.util import find_spec
 
@@ -167,6 +168,27 @@ def test_depth_with_holes_pulls_the_height() -> None:
         errors.append(shape_error(result.height, replace(scene, height=target)))
     assert errors[1] < 0.5 * errors[0] and errors[2] < 0.5 * errors[1]
     assert np.abs((result.height - 37 - target)[hole]).mean() < 1.0
+
+
+@pytest.mark.parametrize("engine", ["numpy", "numba"])
+@pytest.mark.parametrize("weight", [-1000.0, -1e30])
+def test_heights_that_grow_without_limit_crash_nothing(engine: str, weight: float) -> None:
+    """Their curvature became NaN, which the kernels looked up in a table."""
+    if engine == "numba" and find_spec("numba") is None:
+        pytest.skip("needs Numba")
+    scene = blob()
+    seen = np.where(scene.mask, scene.height, np.nan)
+    problem = make_problem(scene, observation=DepthObservation(seen, sigma=1.0, weight=weight))
+    with np.errstate(all="ignore"), contextlib.suppress(InputError):
+        assert np.isfinite(solve(problem, SolverOptions(engine=engine)).height).all()
+
+
+def test_observed_depth_beyond_all_numbers_is_refused() -> None:
+    scene = blob()
+    seen = np.where(scene.mask, scene.height * 1e200, np.nan)
+    problem = make_problem(scene, observation=DepthObservation(seen))
+    with np.errstate(all="ignore"), pytest.raises(InputError, match="check the known inputs"):
+        solve(problem, QUICK)
 
 
 def test_cancel_ends_it_at_once() -> None:
