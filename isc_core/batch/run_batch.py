@@ -108,17 +108,20 @@ def run_batch(
         )
     with folder.locked(plan.run):
         names = Names(_cancellable(inputs, monitor))
-        with Journal(folder, names.count) as journal:
+        monitor.report("starting workers", 0.0)
+        # The journal replaces that of the previous run, so only a run that can begin opens it.
+        with (
+            connected(worker_options) as client,
+            Journal(folder, names.count) as journal,
+        ):
             try:
-                monitor.report("starting workers", 0.0)
-                with connected(worker_options) as client:
-                    announce("; ".join([_counted(names.count), *dashboard(client)]))
-                    progress = _Progress(journal, monitor)
-                    for job, outcomes in run_jobs(
-                        client, _jobs(inputs, names, recipe, plan, journal), progress.tick, task
-                    ):
-                        journal.add(*_entries(job, outcomes))
-                        progress.count(outcomes)
+                announce("; ".join([_counted(names.count), *dashboard(client)]))
+                progress = _Progress(journal, monitor)
+                for job, outcomes in run_jobs(
+                    client, _jobs(inputs, names, recipe, plan, journal), progress.tick, task
+                ):
+                    journal.add(*_entries(job, outcomes))
+                    progress.count(outcomes)
             finally:
                 write_summary(folder, journal)
         return journal.counts

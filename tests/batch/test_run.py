@@ -126,6 +126,18 @@ def test_two_runs_into_one_folder(made: Path, photos: Path) -> None:
     assert run_batch(batch(photos, output=made))[SKIPPED] == 3
 
 
+def test_a_run_that_cannot_begin_keeps_the_summary_of_the_run_before(
+    made: Path, photos: Path
+) -> None:
+    names = ("failures.jsonl", "summary.html", "summary.csv", "summary.jsonl")
+    before = {name: (made / name).read_bytes() for name in names}
+    assert before["failures.jsonl"]
+    nowhere = WorkerOptions(scheduler="nowhere")
+    with pytest.raises(InputError, match="cannot be reached"):
+        run_batch(batch(photos, output=made, worker_options=nowhere))
+    assert {name: (made / name).read_bytes() for name in names} == before
+
+
 def test_foreign_files_are_never_replaced(photos: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     (output / "one").mkdir(parents=True)
