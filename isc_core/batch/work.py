@@ -20,12 +20,13 @@ from ..masking.finder import MaskSearch, read_each_object
 from ..photo import Photo, read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
+from ..result_files.object_folders import object_folders
 from ..result_files.result_folder import require_room, require_writable_result, save
 from ..sirfs.priors.prior_file import load_prior_set
 from ..sirfs.priors.prior_set import PriorSet
 from .fetch import is_url, local_copy, sha256
 from .fingerprint import fingerprint, is_finished, recorded_input
-from .item import DONE, FAILED, SKIPPED, ImageJob, Outcomes
+from .item import DONE, FAILED, SKIPPED, ImageJob, ImageOutcome, Outcomes
 from .outcome import Work, outcome_of
 from .run_folder import RunFolder
 
@@ -107,8 +108,7 @@ def _process_each(job: ImageJob) -> Outcomes:
             )
             for part, (files, photo) in zip(parts, objects, strict=True)
         }
-    _remove_further(job, len(objects))
-    return outcomes
+    return outcomes | _remove_further(job, len(objects))
 
 
 def _find(
@@ -153,14 +153,24 @@ def _decompose_object(
     return DONE
 
 
-def _remove_further(job: ImageJob, count: int) -> None:
-    """Remove results of additional objects that an earlier run found."""
-    number = count + 1
-    while recorded_input(folder := job.of_object(number).folder).get(_OBJECT_COUNT):
-        require_writable_result(folder)  # only a result is removed
-        shutil.rmtree(folder)
-        RunFolder(job.plan.output).thumbnail(job.of_object(number).name).unlink(missing_ok=True)
-        number += 1
+def _remove_further(job: ImageJob, count: int) -> dict[str, ImageOutcome]:
+    """Remove results of additional objects that an earlier run found.
+
+    Returns the failures: the outcomes of results that must stay.
+    """
+    failures = {}
+    for number in (int(folder.name) for folder in object_folders(job.folder)):
+        part = job.of_object(number)
+        if number <= count or not recorded_input(part.folder).get(_OBJECT_COUNT):
+            continue
+        try:
+            require_writable_result(part.folder)  # only a result is removed
+            shutil.rmtree(part.folder)
+            RunFolder(job.plan.output).thumbnail(part.name).unlink(missing_ok=True)
+        except (InputError, OSError) as error:
+            reason = f"the photo no longer shows this object, but its result stays: {error}"
+            failures[part.name] = ImageOutcome(FAILED, reason)
+    return failures
 
 
 @contextmanager

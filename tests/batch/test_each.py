@@ -139,6 +139,27 @@ def test_results_of_objects_that_are_no_longer_there_go(shelf: Path, out: Path) 
     assert len(list((out / "thumbnails" / "each" / "shelf").iterdir())) == 1
 
 
+def test_results_beyond_one_that_failed_go_too(shelf: Path, out: Path) -> None:
+    (out / "shelf" / "2").rename(out / "shelf" / "4")
+    write_image(shelf / "shelf.png", ball_codes(12.0))
+    assert run_batch(batch(shelf / "shelf.png", output=out, recipe=EACH)) == Counter({DONE: 1})
+    assert [path.name for path in (out / "shelf").iterdir()] == ["1"]
+
+
+def test_a_result_with_foreign_files_stays_and_is_reported(shelf: Path, out: Path) -> None:
+    (out / "shelf" / "2" / "diary.txt").write_text("mine")
+    write_image(shelf / "shelf.png", ball_codes(12.0))
+    given = batch(shelf / "shelf.png", output=out, recipe=EACH)
+    assert run_batch(given) == Counter({DONE: 1, FAILED: 1})
+    (failure,) = rows(out / "failures.jsonl")
+    assert failure["name"] == "shelf/2"
+    assert "no longer shows this object" in str(failure["reason"])
+    assert "diary.txt" in str(failure["reason"])
+    (out / "shelf" / "2" / "diary.txt").unlink()
+    assert run_batch(given) == Counter({SKIPPED: 1})
+    assert [path.name for path in (out / "shelf").iterdir()] == ["1"]
+
+
 def test_whole_photos_and_objects_do_not_replace_each_other(
     shelf: Path, out: Path, tmp_path: Path
 ) -> None:
