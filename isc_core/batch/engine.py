@@ -14,6 +14,7 @@ can connect.
 """
 
 import logging
+import math
 import os
 import queue
 import re
@@ -38,6 +39,7 @@ _ALLOWED_FAILURES = 100  # failures that the scheduler allows per job; `attempts
 _CHECK_SECONDS = 2.0  # interval of checks of the workers
 _IDLE_SECONDS = 900.0  # without any worker, before the run is aborted
 _CLUSTER_TIMEOUT = 60.0
+_LEAST_MEMORY = 2e8  # bytes of a worker; an idle one takes 1.4e8
 _MAX_STARTS = 3  # attempts to start local workers
 _LOST = "the connection to the scheduler is lost: run the same command again to resume"
 
@@ -77,6 +79,39 @@ class WorkerOptions:
             cores = os.cpu_count() or 1
         workers = self.workers or max(1, cores // max(self.threads, 1))
         return replace(self, workers=workers, threads=self.threads or max(1, cores // workers))
+
+    def check(self) -> None:
+        """Check the memory of local workers.
+
+        Raises
+        ------
+        InputError
+            If it is not an amount, or if even an idle worker exceeds it: Dask would restart the
+            workers for ever.
+        """
+        if self.scheduler or self.memory == "auto":
+            return
+        try:
+            amount = _bytes_of(self.memory)
+        except ValueError as error:
+            raise InputError(f"--memory {self.memory}: {error}") from error
+        if amount and not _LEAST_MEMORY <= amount < math.inf:
+            raise InputError(
+                f"--memory {self.memory}: a worker needs at least {_LEAST_MEMORY / 1e6:.0f}MB: "
+                "give an amount such as 4GB, or 0 for no limit"
+            )
+
+
+def _bytes_of(memory: str) -> float:
+    """An amount of memory as Dask reads it: numbers up to 1 are shares of the machine's."""
+    from dask.utils import parse_bytes
+    from distributed.system import MEMORY_LIMIT
+
+    try:
+        amount = float(memory)
+    except ValueError:
+        return float(parse_bytes(memory))
+    return amount * MEMORY_LIMIT if 0 < amount <= 1 else amount
 
 
 def require_dask() -> None:

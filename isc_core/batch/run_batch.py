@@ -94,6 +94,7 @@ def run_batch(
     monitor = monitor or Monitor()
     require_dask()
     worker_options = batch.worker_options.sized()
+    worker_options.check()
     recipe = replace(
         batch.recipe, settings=replace(batch.recipe.settings, threads=worker_options.threads)
     )

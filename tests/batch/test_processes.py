@@ -121,5 +121,8 @@ def test_what_is_wrong_with_the_run_is_one_line(
     assert "none.csv: cannot be read" in told(tmp_path / "none.csv")
     assert 'unknown model "nosuch"' in told(photos, "--model", "nosuch")
     assert "is not above 0" in told(photos, "--timeout", "-1")
+    for memory in ("4", "1kB", "-1", "inf", "1e-5"):  # Dask restarted these workers for ever
+        assert "needs at least 200MB: give" in told(photos, "--memory", memory)
+    assert "--memory 5XB: Could not interpret" in told(photos, "--memory", "5XB")
     monkeypatch.setitem(sys.modules, "dask", None)
     assert "pip install 'dask[distributed]>=" in told(photos)
