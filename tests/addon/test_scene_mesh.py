@@ -233,7 +233,7 @@ def test_linked_copies_follow_the_displacement(blender: Any, bump_folder: Path) 
     from blender_addon.scene import BuildOptions, build_object
 
     result = read_result(bump_folder)
-    depths = []
+    depths: list[list[float]] = []
     for displacement in (False, True, False):
         options = BuildOptions(own_scene=False, all_maps=False, displacement=displacement)
         obj = build_object(result, options).object
