@@ -143,7 +143,9 @@ def metres_per_pixel(result: ResultArrays, size_metres: float) -> float:
         If the size is not positive.
     """
     if not 0 < size_metres < 1e6:
-        raise InputError(f"a size of {size_metres} metres is not possible: choose one above 0")
+        raise InputError(
+            f"a size of {size_metres} metres is not possible: choose one above 0 and below 1e6"
+        )
     return size_metres / result.longest_side
 
 

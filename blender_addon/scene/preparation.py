@@ -246,7 +246,8 @@ def require_options(options: BuildOptions) -> None:
     """
     if not 0 < options.size_metres < 1e6:
         raise InputError(
-            f"a size of {options.size_metres} metres is not possible: choose one above 0"
+            f"a size of {options.size_metres} metres is not possible: "
+            "choose one above 0 and below 1e6"
         )
     if options.back not in ("", *Back):
         raise InputError(f"unknown back {options.back!r}: choose {', '.join(Back)}")
