@@ -7,11 +7,12 @@ image are kept in memory: the offset of its line.
 import json
 from array import array
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from types import TracebackType
 
+from ..io.atomic import explained
 from .item import FAILED, ImageOutcome
 from .run_folder import RunFolder
 
@@ -83,9 +84,11 @@ class Journal:
         self.counts: Counter[str] = Counter()
         self.total = count  # of results known so far
         self._offsets = array("q", [-1]) * count
-        self._files = ExitStack()
-        self._all = self._files.enter_context(folder.journal.open("w+b"))
-        self._failures = self._files.enter_context(folder.failures.open("wb"))
+        self._files, self._path = ExitStack(), folder.journal
+        with explained(folder.journal):
+            self._all = self._files.enter_context(folder.journal.open("w+b"))
+        with explained(folder.failures):
+            self._failures = self._files.enter_context(folder.failures.open("wb"))
 
     def add(self, *entries: JournalEntry) -> None:
         """Write an image's lines; failures also go into `failures.jsonl`.
@@ -94,7 +97,16 @@ class Journal:
         ----------
         *entries : JournalEntry
             All of one image: one, or one for each object.
+
+        Raises
+        ------
+        InputError
+            If the disk is full.
         """
+        with explained(self._path):
+            self._write(entries)
+
+    def _write(self, entries: Sequence[JournalEntry]) -> None:
         self._offsets[entries[0].number] = self._all.tell()
         self._all.write(b"".join(_line(entry.row()) for entry in entries))
         self._all.flush()
@@ -109,9 +121,11 @@ class Journal:
         """Iterate over all entries in input order."""
         for number, offset in enumerate(self._offsets):
             if offset >= 0:
-                self._all.seek(offset)
+                with explained(self._path):  # lines that did not fit are written again
+                    self._all.seek(offset)
                 yield from self._entries_of(number)
-        self._all.seek(0, 2)
+        with explained(self._path):
+            self._all.seek(0, 2)
 
     def _entries_of(self, number: int) -> Iterator[JournalEntry]:
         """The entries of an image, from the present position of the file."""
@@ -130,7 +144,8 @@ class Journal:
         value: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._files.close()
+        with explained(self._path):
+            self._files.close()
 
 
 def _line(row: Mapping[str, object]) -> bytes:

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
-from ..io.atomic import remove_unfinished_in
+from ..io.atomic import explained, remove_unfinished_in
 from .names import OWN_FILES
 
 THUMBNAILS, _EACH = "thumbnails", "each"
@@ -137,18 +137,20 @@ class RunFolder:
         from filelock import FileLock, Timeout
 
         self._make()
-        try:
-            lock = FileLock(self.lock).acquire(blocking=False)
-        except Timeout as error:
-            owner = self.owner.read_text().strip() if self.owner.exists() else "unknown"
-            raise InputError(
-                f"{self.output} is being written by another run ({owner}): wait until it ends"
-            ) from error
-        with lock:
-            self.owner.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
-            self._tidy()
-            self.run.write_text(run)
+        with explained(self.lock):
             try:
+                lock = FileLock(self.lock).acquire(blocking=False)
+            except Timeout as error:
+                owner = self.owner.read_text().strip() if self.owner.exists() else "unknown"
+                raise InputError(
+                    f"{self.output} is being written by another run ({owner}): wait until it ends"
+                ) from error
+        with lock:
+            try:
+                with explained(self.private):
+                    self.owner.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
+                    self._tidy()
+                    self.run.write_text(run)
                 yield
             finally:
                 self.run.unlink(missing_ok=True)

@@ -65,7 +65,7 @@ def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
     target = _resolved(folder)
     require_replaceable(target, ours)
     with (
-        _explained(target),
+        explained(target),
         _made_parents(target),
         temporary_sibling(target, is_folder=True) as partial,
     ):
@@ -99,7 +99,7 @@ def new_file(path: Path | str) -> Iterator[Path]:
     target = _resolved(path)
     _require_replaceable_file(target)
     with (
-        _explained(target),
+        explained(target),
         _made_parents(target),
         temporary_sibling(target, is_folder=False) as partial,
     ):
@@ -225,7 +225,7 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
     InputError
         If `folder` is a file, the working folder or a mount point, or contains foreign files.
     """
-    with _explained(folder):
+    with explained(folder):
         if not folder.exists():
             return
         if not folder.is_dir():
@@ -255,7 +255,7 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
 
 
 def _require_replaceable_file(target: Path) -> None:
-    with _explained(target):
+    with explained(target):
         if target.is_dir():
             raise InputError(f"{target} is a folder: choose a file")
         if target.exists() and not target.is_file():
@@ -266,7 +266,7 @@ def _try_writing(target: Path) -> None:
     """Create and remove a temporary sibling in the innermost existing parent, since creating and
     removing parents could interfere with another process.
     """
-    with _explained(target):
+    with explained(target):
         parent = next(folder for folder in target.parents if folder.exists())
         with temporary_sibling(parent / target.name, is_folder=True):
             pass
@@ -298,8 +298,23 @@ def _made_parents(target: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _explained(target: Path) -> Iterator[None]:
-    """Turn system errors into one-line messages."""
+def explained(target: Path) -> Iterator[None]:
+    """Turn system errors of the block into one-line messages.
+
+    Parameters
+    ----------
+    target : Path
+        What is written.
+
+    Returns
+    -------
+    context manager
+
+    Raises
+    ------
+    InputError
+        For an `OSError`.
+    """
     try:
         yield
     except OSError as error:

@@ -138,6 +138,18 @@ def test_a_run_that_cannot_begin_keeps_the_summary_of_the_run_before(
     assert {name: (made / name).read_bytes() for name in names} == before
 
 
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("name", ["owner", "run", "journal.jsonl"])
+def test_a_full_disk_is_named_with_its_remedy(tmp_path: Path, name: str) -> None:
+    (tmp_path / "good.png").touch()
+    private = tmp_path / "out" / ".isc-batch"
+    private.mkdir(parents=True)
+    (private / name).symlink_to("/dev/full")
+    with pytest.raises(InputError, match=r"cannot write .*\.isc-batch.*: no space is left.*free"):
+        run_batch(batch(tmp_path / "good.png", output=tmp_path / "out"), task=obedient)
+    assert not (private / "owner").exists()
+
+
 def test_foreign_files_are_never_replaced(photos: Path, tmp_path: Path) -> None:
     output = tmp_path / "out"
     (output / "one").mkdir(parents=True)
