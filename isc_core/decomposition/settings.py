@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from numbers import Integral, Real
 
 from .. import baselines
 from ..errors import InputError
@@ -161,6 +162,20 @@ def renamed_value(setting: str, value: str) -> str | None:
     return _RENAMED.get(setting, {}).get(value)
 
 
+def _check_numbers(settings: "Settings") -> None:
+    """Raise `InputError` for values that Python would take for others: "no" is true."""
+    for name in ("max_size", "detail", "threads", "seed"):
+        value = getattr(settings, name)
+        if not isinstance(value, Integral) or isinstance(value, bool):
+            raise InputError(f"{name} must be a whole number, not {value!r}")
+    for name in ("full_size", "shading_only", "confidence_weights"):
+        value = getattr(settings, name)
+        if value not in (True, False):
+            raise InputError(f"{name} must be True or False, not {value!r}")
+    if not isinstance(settings.highlight_odds, Real):
+        raise InputError(f"highlight_odds must be a number, not {settings.highlight_odds!r}")
+
+
 @dataclass(frozen=True)
 class Settings:
     """A user's choices for a decomposition.
@@ -284,8 +299,9 @@ class Settings:
         Raises
         ------
         InputError
-            If a value is unknown, or does not apply to the model.
+            If a value is unknown, of another type, or does not apply to the model.
         """
+        _check_numbers(self)
         for name, value, known in (
             ("model", self.model, MODELS),
             ("separator", self.separator, METHODS),

@@ -1,5 +1,8 @@
 """Names of the settings' values: present ones, and those of earlier versions."""
 
+from typing import Any
+
+import numpy as np
 import pytest
 
 from isc_core.cli.commands import build_parser
@@ -46,3 +49,25 @@ def test_numbers_are_given_as_text() -> None:
             Settings(light_colour=colour).check()  # type: ignore[arg-type]
     with pytest.raises(InputError, match="a text such as '35', not 35"):
         Settings(camera=35).check()  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"full_size": "no"}, "full_size must be True or False, not 'no'"),
+        ({"max_size": "64"}, "max_size must be a whole number, not '64'"),
+        ({"max_size": True}, "max_size must be a whole number, not True"),
+        ({"detail": None}, "detail must be a whole number, not None"),
+        ({"threads": 1.5}, "threads must be a whole number, not 1.5"),
+        ({"seed": "a"}, "seed must be a whole number, not 'a'"),
+        ({"highlight_odds": "4"}, "highlight_odds must be a number, not '4'"),
+    ],
+)
+def test_a_value_of_another_type_is_refused(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError) as refusal:
+        Settings(**values).check()
+    assert message in str(refusal.value)
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    Settings(max_size=np.int64(64), full_size=np.bool_(True)).check()  # type: ignore[arg-type]
