@@ -97,7 +97,8 @@ def _read(path: Path) -> dict[str, object]:
     if path.stat().st_size > _MAX_BYTES:
         raise InputError(f"{path} is larger than {_MAX_BYTES} bytes: is it a configuration file?")
     try:
-        return tomllib.loads(read_regular(path, None, remedy).decode("utf-8"))
+        # Editors on Windows write a byte order mark.
+        return tomllib.loads(read_regular(path, None, remedy).decode("utf-8-sig"))
     except UnicodeDecodeError as error:
         raise InputError(f"{path} is not UTF-8: save it as UTF-8") from error
     except tomllib.TOMLDecodeError as error:

@@ -52,6 +52,10 @@ def test_actions_have_tables_inside_their_command() -> None:
     assert light["direction"] == [0, 0.5, 1]
 
 
+def test_a_byte_order_mark_of_windows_is_no_part_of_the_text() -> None:
+    assert parsed('\ufeff[decompose]\nmodel = "sirfs"\n', *WORDS)["model"] == "sirfs"
+
+
 def test_a_repeated_option_replaces_the_list_of_the_file() -> None:
     text = '[decompose]\npoint = ["1,2", "3,4"]\nnot = ["5,6"]\n'
     options = parsed(text, *WORDS)
