@@ -6,7 +6,8 @@ not part of the key, nor are names and paths of files, as Blender packs them.
 
 The worker writes a result under its final name complete or not at all. One that cannot be read is
 removed and recomputed. If the folder exceeds its limit, the least recently used results are
-removed.
+removed. Only entries with the name of a key are; the user may have chosen a folder with other
+files.
 
 The worker stores results of stages that do not depend on model and separator, and the fits of the
 refinement, in the same folder, in files of its own (`isc_core.io.stage_cache`). They count toward
@@ -21,6 +22,7 @@ result that is larger than the limit stays until the next one is added.
 import contextlib
 import hashlib
 import os
+import re
 import shutil
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -28,9 +30,11 @@ from pathlib import Path
 
 from isc_core.errors import InputError
 from isc_core.io.source_stamp import source_stamp
-from isc_core.io.stage_cache import SUFFIX
 
 from .result_arrays import ARRAYS, ResultArrays, read_result
+
+# Results, files of stages, and what remains of unfinished ones.
+_OURS = re.compile(r"\.?[0-9a-f]{64}(\..+)?")
 
 
 @dataclass(frozen=True)
@@ -123,10 +127,11 @@ class ResultCache:
             Key of a result that stays.
         """
         with contextlib.suppress(OSError):  # another Blender may remove the same ones
-            entries = sorted(self.folder.iterdir(), key=lambda entry: -entry.stat().st_mtime)
+            ours = [entry for entry in self.folder.iterdir() if _OURS.fullmatch(entry.name)]
+            entries = sorted(ours, key=lambda entry: -entry.stat().st_mtime)
             room = self.limit - _size(self.place(keep))
             for entry in entries:
-                if entry.name == keep or not (entry.is_dir() or entry.suffix == SUFFIX):
+                if entry.name == keep:
                     continue
                 room -= _size(entry)
                 if room < 0:

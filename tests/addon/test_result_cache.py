@@ -1,5 +1,6 @@
 """Earlier results: found by their content, limited in size, and never trusted when damaged."""
 
+import hashlib
 import os
 import shutil
 from pathlib import Path
@@ -63,24 +64,44 @@ def test_a_result_is_read_and_a_damaged_one_removed(tmp_path: Path, bump_folder:
     assert cache.read("a") is None and not place.exists()
 
 
+def keyed(name: str) -> str:
+    """A name as the cache has it: a key, and the suffix of `name`."""
+    return hashlib.sha256(name.encode()).hexdigest() + Path(name).suffix
+
+
+def aged(folder: Path, *names: str) -> None:
+    """Make entries of 100 bytes, the first the last used: files of stages, or results."""
+    for age, name in enumerate(names):
+        entry = folder / name
+        file(entry if entry.suffix else entry / "arrays.npz", 100 * "x")
+        os.utime(entry, (1e9 - age, 1e9 - age))
+
+
 def test_what_was_not_used_for_the_longest_time_goes_first(tmp_path: Path) -> None:
-    cache = ResultCache(tmp_path, 250)
-    for age, name in enumerate(("new", "old", "oldest")):
-        file(tmp_path / name / "arrays.npz", 100 * "x")
-        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
-    cache.trim("oldest")
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["new", "oldest"]
+    new, old, oldest = map(keyed, ("new", "old", "oldest"))
+    aged(tmp_path, new, old, oldest)
+    ResultCache(tmp_path, 250).trim(oldest)
+    assert {entry.name for entry in tmp_path.iterdir()} == {new, oldest}
 
 
 def test_stages_of_the_worker_count_and_go_like_results(tmp_path: Path) -> None:
-    cache = ResultCache(tmp_path, 250)
-    for age, name in enumerate(("new/arrays.npz", "used.npz", "old/arrays.npz", "oldest.npz")):
-        entry = tmp_path / file(tmp_path / name, 100 * "x").relative_to(tmp_path).parts[0]
-        os.utime(entry, (1e9 - age, 1e9 - age))
-    file(tmp_path / "notes.txt", 100 * "x")
-    cache.trim("new")
-    left = sorted(entry.name for entry in tmp_path.iterdir())
-    assert left == ["new", "notes.txt", "used.npz"]
+    names = [keyed(name) for name in ("new", "used.npz", "old", "oldest.npz")]
+    aged(tmp_path, *names)
+    ResultCache(tmp_path, 250).trim(names[0])
+    assert {entry.name for entry in tmp_path.iterdir()} == set(names[:2])
+
+
+def test_other_files_of_a_chosen_folder_stay(tmp_path: Path) -> None:
+    """The user may choose any folder: its folders and arrays were removed like results."""
+    new, old = map(keyed, ("new", "old"))
+    aged(tmp_path, new, "holiday", "scan.npz", "notes.txt", old)
+    ResultCache(tmp_path, 100).trim(new)
+    assert {entry.name for entry in tmp_path.iterdir()} == {
+        new,
+        "holiday",
+        "scan.npz",
+        "notes.txt",
+    }
 
 
 class Done:
