@@ -96,6 +96,8 @@ class ResultCache:
     def store(self, key: str, made: Path) -> None:
         """Move a folder into the cache, completely or not at all.
 
+        If another Blender has stored the same result in the meantime, that one is kept.
+
         Parameters
         ----------
         key : str
@@ -114,7 +116,12 @@ class ResultCache:
             self.folder.mkdir(parents=True, exist_ok=True)
             shutil.rmtree(partial, ignore_errors=True)
             shutil.move(made, partial)
-            partial.rename(place)
+            try:
+                partial.rename(place)
+            except OSError:
+                if not place.is_dir():
+                    raise
+                shutil.rmtree(partial, ignore_errors=True)
         except OSError as error:
             raise InputError(f"cannot write {place}: {error.strerror or error}") from error
 

@@ -64,6 +64,16 @@ def test_a_result_is_read_and_a_damaged_one_removed(tmp_path: Path, bump_folder:
     assert cache.read("a") is None and not place.exists()
 
 
+def test_a_result_that_another_blender_has_stored_is_kept(tmp_path: Path) -> None:
+    cache = ResultCache(tmp_path / "cache", 1 << 30)
+    for made in ("first", "second"):
+        file(tmp_path / made / "1" / "arrays.npz", made)
+        cache.store("a", tmp_path / made)
+    assert (cache.place("a") / "1" / "arrays.npz").read_text() == "first"
+    assert [entry.name for entry in cache.folder.iterdir()] == ["a"]
+    assert not (tmp_path / "second").exists()
+
+
 def keyed(name: str) -> str:
     """A name as the cache has it: a key, and the suffix of `name`."""
     return hashlib.sha256(name.encode()).hexdigest() + Path(name).suffix
