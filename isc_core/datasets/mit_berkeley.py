@@ -165,6 +165,8 @@ def load_object(
         for path in (own / f"{input}.png", laboratory / "reflectance.png")
     )
     mask = _cut(_pixels(laboratory / "mask.png"), crop, 1, laboratory / "mask.png") > 0
+    if not mask.any():
+        raise InputError(f"{laboratory / 'mask.png'} marks no pixel: is it damaged?")
     height = _cut(_matrix(laboratory / "Z.mat", "depth"), crop, 1, laboratory / "Z.mat")
     shading = _shading(own, illumination, crop)
     light = _matrix(

@@ -175,3 +175,11 @@ def test_wrong_contents_are_refused(copy: Path) -> None:
     shutil.copyfile(folder / "shading.png", folder / "diffuse.png")
     with pytest.raises(InputError, match="16-bit colour"):
         load_object(copy, "apple", "laboratory")
+
+
+def test_an_empty_mask_is_refused(copy: Path) -> None:
+    path = copy / "MIT-Berkeley-Laboratory" / "apple" / "mask.png"
+    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    assert cv2.imwrite(str(path), np.zeros_like(stored))
+    with pytest.raises(InputError, match="mask.png marks no pixel"):
+        load_object(copy, "apple", "laboratory")
