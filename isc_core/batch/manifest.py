@@ -90,8 +90,10 @@ class Manifest:
             for key, value in row.items()
             if key not in _COLUMNS and value not in ("", None)
         }
-        grouped = row.get("options") or {}
-        if not given and not grouped:
+        grouped = row.get("options")
+        if grouped in ("", None):
+            grouped = {}
+        if not given and grouped == {}:
             return ()
         key = repr((sorted(given.items()), grouped))
         if key not in self._parsed:

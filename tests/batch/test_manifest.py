@@ -69,6 +69,8 @@ def test_names_of_files_may_be_any_bytes(tmp_path: Path) -> None:
         ("a.jsonl", '{"image": 3}\n', "must be text"),
         ("a.jsonl", '{"image": "x", "name": "/tmp/y"}\n', "is not a valid result name"),
         ("a.jsonl", '{"image": "x", "options": [1]}\n', "options must be an object"),
+        ("a.jsonl", '{"image": "x", "options": []}\n', "options must be an object"),
+        ("a.jsonl", '{"image": "x", "options": 0}\n', "options must be an object"),
         ("a.jsonl", '{"image": "x", "options": {"threads": 3}}\n', "unknown option 'threads'"),
         ("a.jsonl", '{"image": "x", "full_size": 3}\n', "true or false"),
         ("a.jsonl", '{"image": "x", "seed": ' + "9" * 5000 + "}\n", "is not JSON"),
