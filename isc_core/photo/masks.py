@@ -17,6 +17,7 @@ from .found_mask import FoundMask, MaskFinder
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
+_MOST_WHITE = 10.0  # times the median light of an object on pure black
 _LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
 _CHUNK = 1 << 16  # pixels compared at a time
 _HARD = 0.02  # of the largest value: lossy files differ from 0 and 1 by as much
@@ -139,8 +140,7 @@ def find_mask(
         )
     if always_whole:
         return np.ones(linear.shape[:2], bool), "whole frame"
-    # A float file has no peak value: use its 99th percentile as white.
-    white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
+    white = 1.0 if raster.peak is not None else _white_of_floats(light, border)
     if finder is not None and finder.always:
         found = finder(name, normalised_to_white(linear, white))
         if found is not None:
@@ -184,6 +184,17 @@ def opaque_part(raster: Raster) -> np.ndarray | None:
 def _brightest(values: np.ndarray) -> np.ndarray:
     """The largest channel of each pixel, 0 where that is not finite."""
     return finite_or_zero(largest(values))
+
+
+def _white_of_floats(light: np.ndarray, border: np.ndarray) -> float:
+    """White of a float file, which has no peak value: the 99th percentile of its light.
+
+    Highlights of a render may be thousands of times brighter than all else. On pure black, where
+    all light is the object's, they do not count as white: the rest would be taken for black.
+    """
+    light = light[light > 0]
+    white = float(np.percentile(light, 99.0))
+    return white if border.any() else min(white, _MOST_WHITE * float(np.median(light)))
 
 
 def soft_cover(raster: Raster, mask: np.ndarray) -> np.ndarray | None:

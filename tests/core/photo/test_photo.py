@@ -645,6 +645,19 @@ def test_black_border_fills_holes_and_drops_specks(tmp_path: Path) -> None:
     refused(write(tmp_path / "b.png", png(stored, 8, 2)), "isc mask PHOTO --box x,y,w,h -o MASK")
 
 
+@pytest.mark.parametrize("highlight", [1.0, 1e3, 6e4])
+def test_bright_highlights_of_a_float_photo_leave_the_mask_as_it_is(
+    tmp_path: Path, highlight: float
+) -> None:
+    light = np.zeros((80, 80, 3), np.float32)
+    light[10:70, 10:70] = np.random.default_rng(0).uniform(0.1, 0.4, (60, 60, 3))
+    expected = light.any(axis=2)
+    light[30:38, 30:38] = highlight  # 2 % of the object
+    np.save(tmp_path / "a.npy", light)
+    photo = read_photo(tmp_path / "a.npy")
+    assert photo.original.mask_from == "black border" and (photo.mask == expected).all()
+
+
 def test_tidy_mask_treats_diagonals_as_joined() -> None:
     mask = np.zeros((60, 60), bool)
     mask[5:30, 5:30] = mask[30:33, 30:33] = True
