@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..filters.distance import nearest_pixels
 from ..imaging.area_resize import reduced_count
-from ..imaging.resampling import nearest_samples
+from ..imaging.framing import continued_height
+from ..imaging.resampling import nearest_samples, resample_height
 from ..io.exr import read_channels
 from ..io.json_files import numbers, read_json
 from ..io.limits import DEFAULT_LIMITS, Limits
@@ -17,6 +19,7 @@ from ..photo import read_raster
 from .result_folder import load
 
 CODE = 1 / 64  # photo pixels per code of an integer file: 16 bits span 1024 pixels
+_BEYOND = 2  # pixels of a result's maps by which its height is continued beyond its mask
 _EXR = b"\x76\x2f\x31\x01"
 _NUMPY = b"\x93NUMPY"
 _CHANNELS = ("height.Z", "Z", "Y", "height.Y")
@@ -148,8 +151,10 @@ def _of_numpy(path: Path, limits: Limits) -> np.ndarray:
 
 
 def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
-    """A result's height on the photo's grid, NaN outside its mask; nearest samples, to keep holes
-    from growing.
+    """A result's height on the photo's grid, smoothly, NaN outside its mask.
+
+    Pixels of the photo's mask may lie beyond a smaller mask of the maps, by a few of its pixels:
+    the height is continued to them.
     """
     result = load(folder)
     scale = result.provenance.input.get("scale")
@@ -162,8 +167,13 @@ def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
             f"{folder} is the result of a photo of another size than {_size(shape)}: use a result "
             "of this photo"
         )
-    # The inverse of the resampling to the working grid, so that a round trip is exact.
-    return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale
+    if scale == 1:
+        return np.where(result.mask, result.height, np.nan)
+    rim = nearest_pixels(result.mask)
+    steps = [np.abs(r - i) for r, i in zip(rim, np.indices(result.mask.shape), strict=True)]
+    near = nearest_samples(np.where(np.maximum(*steps) <= _BEYOND, 1.0, np.nan), shape, 1 / scale)
+    height = continued_height(result.height.astype(float), result.mask)
+    return near * resample_height(height, shape, 1 / scale)
 
 
 def _size(shape: tuple[int, ...]) -> str:

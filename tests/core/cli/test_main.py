@@ -304,6 +304,22 @@ def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_pat
     np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
 
 
+@pytest.mark.parametrize("size", [20, 30])
+def test_a_result_of_smaller_maps_is_a_known_shape(tmp_path: Path, size: int) -> None:
+    photo, folder = ball_photo(tmp_path), tmp_path / "first"
+    quiet = ("--model", "sirfs", "--quiet", "--max-size")
+    small = ("decompose", photo, "--model", "retinex", "--quiet", "--max-size", 20)
+    assert isc(*small, "-o", folder) == 0
+    assert isc("decompose", photo, *quiet, size, "--shape", folder, "-o", tmp_path / "out") == 0
+    before, after = load(folder), load(tmp_path / "out")
+    scale = after.provenance.input["scale"] / before.provenance.input["scale"]
+    assert scale == pytest.approx(size / 20, rel=0.02)
+    assert after.height.max() == pytest.approx(scale * before.height.max(), rel=0.1)
+    if scale == 1:
+        error = np.abs(after.height - before.height)[before.mask]
+        assert error.mean() < 0.02 * before.height.max()
+
+
 @pytest.mark.slow
 def test_a_measured_depth_bends_the_shape_towards_it(result: Path, tmp_path: Path) -> None:
     mask = load(result / "result").mask
