@@ -100,6 +100,7 @@ def decompose(
         If the monitor cancels.
     """
     settings, inputs = settings or Settings(), known or KnownInputs()
+    given = _known_json(inputs, prior_set)
     monitor, clock = monitor or Monitor(), Clock()
     settings.check()
     _check_used(settings, inputs, prior_set)
@@ -138,7 +139,7 @@ def decompose(
         settings.seed,
         _versions(),
         clock.seconds,
-        _input_json(maps, part.target.corner, name),
+        _input_json(maps, part.target.corner, name) | given,
         estimate.diagnostics,
     )
     with clock.stage("maps"):
@@ -339,6 +340,24 @@ def _input_json(photo: Photo, corner: tuple[int, int], name: str) -> dict[str, o
         "mask_from": source.mask_from,
         **_marks_json(photo, corner),
         **({} if source.confidence is None else {"mask_confidence": round(source.confidence, 4)}),
+    }
+
+
+def _known_json(inputs: KnownInputs, prior_set: PriorSet | None) -> dict[str, object]:
+    """What was given besides the photo; empty if nothing was."""
+    given = {
+        "shape": inputs.height,
+        "light": inputs.light,
+        "depth": inputs.depth,
+        "priors": prior_set,
+    }
+    names = [name for name, value in given.items() if value is not None]
+    if inputs.depth is None:
+        return {"known": names} if names else {}
+    return {
+        "known": names,
+        "depth_sigma": float(inputs.depth_sigma),
+        "depth_weight": float(inputs.depth_weight),
     }
 
 

@@ -304,6 +304,18 @@ def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_pat
     np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
 
 
+def test_a_result_records_what_was_known(tmp_path: Path) -> None:
+    photo, first = ball_photo(tmp_path), tmp_path / "first"
+    small = ("decompose", photo, "--quiet", "--max-size", 16)
+    assert isc(*small, "--model", "retinex", "-o", first) == 0
+    known = ("--light", first, "--depth", first, "--depth-sigma", 3)
+    assert isc(*small, "--model", "sirfs", *known, "-o", tmp_path / "out") == 0
+    assert not {"known", "depth_sigma"} & load(first).provenance.input.keys()
+    recorded = load(tmp_path / "out").provenance.input
+    assert recorded["known"] == ["light", "depth"]
+    assert (recorded["depth_sigma"], recorded["depth_weight"]) == (3.0, 10.0)
+
+
 @pytest.mark.parametrize("size", [20, 30])
 def test_a_result_of_smaller_maps_is_a_known_shape(tmp_path: Path, size: int) -> None:
     photo, folder = ball_photo(tmp_path), tmp_path / "first"
