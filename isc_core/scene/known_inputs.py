@@ -48,11 +48,16 @@ class KnownInputs:
         ------
         InputError
             If an array is not one of numbers, or not of the right size, or a number is out of
-            range.
+            range; or if both an exact shape and a measured depth are given.
         """
         for what, values in (("shape", self.height), ("depth", self.depth)):
             if values is not None:
                 _check_map(what, values, shape)
+        if self.height is not None and self.depth is not None:
+            raise InputError(
+                "a known shape is exact, and a measured depth cannot change it: give --shape or "
+                "--depth, not both"
+            )
         if self.light is not None:
             _check_light(self.light)
         for what, value, (least, most) in (

@@ -304,6 +304,18 @@ def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_pat
     np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
 
 
+def test_a_depth_beside_an_exact_shape_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    photo = ball_photo(tmp_path)
+    np.save(tmp_path / "flat.npy", np.zeros(ball_codes().shape[:2]))
+    flat = tmp_path / "flat.npy"
+    known = ("--max-size", 16, "--shape", flat, "--depth", flat)
+    assert isc("decompose", photo, *known, "-o", tmp_path / "out") == 2
+    assert "give --shape or --depth, not both" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_result_records_what_was_known(tmp_path: Path) -> None:
     photo, first = ball_photo(tmp_path), tmp_path / "first"
     small = ("decompose", photo, "--quiet", "--max-size", 16)
