@@ -116,17 +116,19 @@ def _ensure_lamp(
 ) -> bpy.types.Object:
     lamp = find_tagged(bpy.data.objects, key, role)
     fitted = None if lamp is None else lamp.get(_FITTED)
-    if fitted is not None and not np.allclose(_shown(lamp), list(fitted), rtol=1e-3, atol=1e-4):
+    if fitted is not None and not np.allclose(
+        np.concatenate(_shown(lamp)), list(fitted), rtol=1e-3, atol=1e-4
+    ):
         return lamp
     lamp = _ensure_sun(key, role, collection, direction, strength)
-    lamp[_FITTED] = _shown(lamp)
+    lamp[_FITTED] = np.concatenate(_shown(lamp)).tolist()
     return lamp
 
 
-def _shown(lamp: bpy.types.Object) -> list[float]:
-    """Direction toward a lamp and its irradiance, in Blender's axes."""
+def _shown(lamp: bpy.types.Object) -> tuple[np.ndarray, np.ndarray]:
+    """Direction (3,) toward a lamp or the sun, in Blender's axes, and its irradiance (3,)."""
     toward = lamp.matrix_basis.to_quaternion() @ Vector((0, 0, 1))
-    return [*toward, *(lamp.data.energy * part for part in lamp.data.color)]
+    return np.array(toward), lamp.data.energy * np.array(lamp.data.color)
 
 
 def relight(
@@ -214,10 +216,10 @@ def shown_light(obj: bpy.types.Object) -> ShownLight:
     if sun is None or mix is None or any(value is None for value in stored):
         return ShownLight(False)
     direction, strength, ambient = (np.array(value, float) for value in stored)
-    toward = np.array(sun.matrix_basis.to_quaternion() @ Vector((0, 0, 1)))
+    toward, irradiance = _shown(sun)
     same = (
         toward @ to_blender(direction) > _SAME_DIRECTION * np.linalg.norm(direction)
-        and np.allclose(sun.data.energy * np.array(sun.data.color), strength, rtol=1e-3, atol=1e-6)
+        and np.allclose(irradiance, strength, rtol=1e-3, atol=1e-6)
         and (not mix.sun or np.allclose(mix.ambient, ambient, rtol=1e-3, atol=1e-6))
     )
     return ShownLight(mix.sun, None if same else mix.ambient)

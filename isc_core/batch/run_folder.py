@@ -21,6 +21,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..io.atomic import explained, remove_unfinished_in
+from ..result_files.object_folders import holds_result
 from .names import OWN_FILES
 
 THUMBNAILS, _EACH = "thumbnails", "each"
@@ -99,8 +100,7 @@ class RunFolder:
             return False
         parts = real.relative_to(output).parts
         return parts[0] in (*OWN_FILES, self.private.name) or any(
-            (output.joinpath(*parts[:depth]) / "decomposition.json").is_file()
-            for depth in range(1, len(parts) + 1)
+            holds_result(output.joinpath(*parts[:depth])) for depth in range(1, len(parts) + 1)
         )
 
     def begin_objects(self, name: str) -> None:

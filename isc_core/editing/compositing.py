@@ -90,14 +90,11 @@ def composite(stored: ResultPart, edit: Edited, photo: Photo) -> EditedPart:
     rim = _soft_rim_outside(photo)
     covered = photo.mask | rim
     place = FramePart.around(covered, 0)
-    near, rim = photo.cut(place), place.cut(rim)
-    if scale == 1 and part.shape == photo.mask.shape:
-        full = place.cut(part.placed(change))
-        if rim.any():
-            full = full + enlarged_change(stored, change, replace(near, mask=rim), place, scale)
-    else:
-        whole = replace(near, mask=place.cut(covered))
-        full = enlarged_change(stored, change, whole, place, scale)
+    near, direct = photo.cut(place), scale == 1 and part.shape == photo.mask.shape
+    indirect = place.cut(rim if direct else covered)
+    full = enlarged_change(stored, change, replace(near, mask=indirect), place, scale)
+    if direct:
+        full += place.cut(part.placed(change))
     changed = place.cut(covered) & (full != 0).any(-1)
     image = near.image.copy()
     image[changed] = np.maximum(image[changed] + full[changed], 0)
@@ -106,12 +103,12 @@ def composite(stored: ResultPart, edit: Edited, photo: Photo) -> EditedPart:
 
 def _soft_rim_outside(photo: Photo) -> np.ndarray:
     """Where (H, W) a soft alpha channel covers less than half of a pixel."""
-    if photo.cover is None or photo.original.mask_from != "alpha":
-        return np.zeros_like(photo.mask)
-    soft = soft_rim(photo.cover, photo.mask, own=True)
-    if soft is None:
-        return np.zeros_like(photo.mask)
-    return np.asarray(soft & (photo.cover > 0) & ~photo.mask)
+    cover = photo.cover
+    if cover is not None and photo.original.mask_from == "alpha":
+        soft = soft_rim(cover, photo.mask, own=True)
+        if soft is not None:
+            return np.asarray(soft & (cover > 0) & ~photo.mask)
+    return np.zeros_like(photo.mask)
 
 
 def scale_of(stored: ResultPart, photo: Photo) -> float:
@@ -177,7 +174,7 @@ def enlarged_change(
         0 outside that mask.
     """
     result, d = np.zeros(photo.image.shape, np.float32), stored.result
-    if not change.any():
+    if not (change.any() and photo.mask.any()):
         return result
     epsilon = _EPSILON * white_of(d.image, d.mask) ** 2
     mean_image, mean_change = (

@@ -53,14 +53,12 @@ def photo_of_result(
     source = given.get("mask_from")
     if mask is None and (source == "file" or source in FOUND):
         mask = folder / MASK
-        if not mask.is_file() and source == "file":
-            raise InputError(
-                "the result was made with a separate mask: give the same one with --mask"
-            )
         if not mask.is_file():
             raise InputError(
-                f"{folder} has no {MASK}, the mask that was found in its photo: give the mask with "
-                "--mask, or decompose the photo again"
+                "the result was made with a separate mask: give the same one with --mask"
+                if source == "file"
+                else f"{folder} has no {MASK}, the mask that was found in its photo: give the mask "
+                "with --mask, or decompose the photo again"
             )
     read = read_photo(photo, mask, "auto" if curve == PROFILE else curve, limits=limits)
     if mask is None and given.get("mask_from") == "alpha":

@@ -38,7 +38,8 @@ def creased(surface: Surface, crease: float = CREASE) -> Mesh:
         The same faces in the same order; its `uv` are zeros.
     """
     edges, count = shared_edges(surface.faces), len(surface.faces)
-    normals = _normalised(_areas(surface))
+    areas = _areas(surface)
+    normals = _normalised(areas)
     f, g = edges.faces.T
     cosine = np.einsum("ij,ij->i", normals[f], normals[g])
     smooth = edges.opposite & (cosine > np.cos(np.radians(crease)))
@@ -54,7 +55,7 @@ def creased(surface: Surface, crease: float = CREASE) -> Mesh:
     vertices = surface.vertices[surface.faces.ravel()[where]]
     faces = number.reshape(-1, 3)
     sums = np.zeros_like(vertices)
-    np.add.at(sums, faces.ravel(), np.repeat(_areas(surface), 3, axis=0))
+    np.add.at(sums, faces.ravel(), np.repeat(areas, 3, axis=0))
     return Mesh(vertices, _normalised(sums), np.zeros((len(vertices), 2)), faces)
 
 
