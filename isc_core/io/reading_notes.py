@@ -24,6 +24,8 @@ class ReadingNoteKind(StrEnum):
         The colours of the camera are unknown: its raw colours were used.
     OUT_OF_GAMUT
         Colours of the object are outside Rec.709; the value is their share of its pixels.
+    ABOVE_WHITE
+        A float file has highlights above the object's white: they were limited to it.
     """
 
     BROKEN_PROFILE = "broken profile"
@@ -32,6 +34,7 @@ class ReadingNoteKind(StrEnum):
     GAIN_MAP = "gain map"
     UNKNOWN_CAMERA_COLOURS = "unknown camera colours"
     OUT_OF_GAMUT = "out of gamut"
+    ABOVE_WHITE = "above white"
 
 
 @dataclass(frozen=True)

@@ -70,7 +70,8 @@ class Photo:
         only.
     clipped : (H, W) bool ndarray
         Some channel is at the coding's maximum, or the sensor was saturated, so the light may have
-        been brighter; never in float files. After resizing: part of the pixel is clipped.
+        been brighter; in float files: it was brighter than `white`. After resizing: part of the
+        pixel is clipped.
     original : PhotoSource
         The file.
     scale : float

@@ -28,6 +28,7 @@ from .photo import Photo, PhotoSource
 from .primaries import to_rec709
 from .soft_rim import soft_rim
 from .transfer import PROFILE, resolve_transfer, to_linear
+from .white import limit_to_white
 
 FLOAT_STEP = 2.0**-14
 _MOST_OUTSIDE = 0.01  # of the object's pixels: below it there is no note
@@ -169,6 +170,11 @@ def _photo(
     light = as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, name))
     code_value = _code_value(raster, used, linear, mask)
     notes = tuple(_notes(raster, used, linear, mask))
+    clipped = _clipped(raster)
+    if raster.peak is None:
+        light, clipped = limit_to_white(light, mask)
+        if clipped.any():
+            notes += (ReadingNote(ReadingNoteKind.ABOVE_WHITE),)
     if mixed and cover is not None:
         # The light of a float file may be the raster itself.
         light = estimate_foreground(light, cover, in_place=raster.peak is not None)
@@ -176,7 +182,7 @@ def _photo(
         image=light,
         mask=mask,
         code_value=code_value,
-        clipped=_clipped(raster),
+        clipped=clipped,
         original=PhotoSource(
             raster.sha256,
             (width, height),

@@ -25,6 +25,9 @@ _TEXTS = {
     ReadingNoteKind.OUT_OF_GAMUT: (
         "{value:.0%} of the object's pixels have colours outside Rec.709: they were clipped"
     ),
+    ReadingNoteKind.ABOVE_WHITE: (
+        "highlights over 64 times as bright as most of the object (HDR) were limited to that"
+    ),
 }
 
 
