@@ -5,9 +5,9 @@ gives SIRFS the diffuse image (model mdr). SIRFS-MBP and MDR-SIRFS use the separ
 
 Citation: H. Akbar, thesis (2016); J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the priors were fitted to objects of MIT-Berkeley, and the network of the joint model was
-trained on them: all frameworks are somewhat better on these objects than elsewhere. Seconds depend
-on the load of the machine; evaluations of the energy do not.
+Limits: the priors were fitted to objects of MIT-Berkeley: all frameworks are somewhat better on
+these objects than elsewhere. Seconds depend on the load of the machine; evaluations of the energy
+do not.
 """
 
 import time
