@@ -10,7 +10,7 @@ gain g. For a wider lobe, q < p, m / w is clamped to at least a quarter, because
 of the separated layer would be amplified, too. Rendering renders a new lobe on the recovered shape
 under the light that best explains the layer. Metals have no diffuse reflection: for the share M of
 metal the diffuse light vanishes, the highlight takes the colour of the reflectance, and the
-environment is reflected in that colour:
+environment is reflected in that colour, by the new lobe f:
 
     diffuse' = (1 - M) diffuse,
     specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w) max(0, n . w).
@@ -28,7 +28,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.luminance import luminance, white_of
-from ..lobe_fitting.light_direction import explain_specular
+from ..lobe_fitting.light_direction import DirectionEstimate, explain_specular
 from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
 from ..shading.environment_map import environment_from_shading
@@ -105,7 +105,13 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     """
     notes: list[str] = []
     same = gloss.exponent is None and gloss.sharper == 1 and gloss.method == "remap"
-    specular = d.specular if same else _new_lobe(d, gloss, light, notes)
+    if same and gloss.metal == 0:
+        return edited(d, specular=d.specular if gloss.gain == 1 else d.specular * gloss.gain)
+    fit = _explained(d, gloss, light)
+    present, exponent = _exponents(d, gloss, fit, notes)
+    specular = d.specular
+    if not same:
+        specular = _new_lobe(d, gloss, (present, exponent), light, fit, notes)
     if gloss.gain != 1:
         specular = specular * gloss.gain
     if gloss.metal == 0:
@@ -114,10 +120,9 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     tinted = reflectance * light_color(d)
     tint = tinted / np.maximum(tinted.max(-1, keepdims=True), 1e-6)
     environment = environment_from_shading(d.illumination, _ENVIRONMENT_ROWS, viewer=d.viewer)
-    lobe = Lobe(gloss.exponent or gloss.present or DEFAULT_EXPONENT)
     reflected = np.zeros_like(d.image)
     reflected[d.mask] = reflectance[d.mask] * lobe_in_environment(
-        lobe, d.normal[d.mask], environment, d.view_inside
+        Lobe(exponent), d.normal[d.mask], environment, d.view_inside
     )
     metallic = specular * (1 - gloss.metal + gloss.metal * tint) + gloss.metal * reflected
     return edited(d, (1 - gloss.metal) * d.diffuse, metallic, tuple(notes))
@@ -145,27 +150,47 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
     return specular * shape * ((exponent + 8) / (present + 8))
 
 
+def _explained(
+    d: Decomposition, gloss: Gloss, light: DirectionalLight | None
+) -> DirectionEstimate | None:
+    """The light and the exponent that explain the specular layer, if one of them is needed."""
+    unknown = gloss.present is None and known_lobe(d) is None
+    needs_light = gloss.method == "render" and light is None
+    return explain_specular(d) if unknown or needs_light else None
+
+
+def _exponents(
+    d: Decomposition, gloss: Gloss, fit: DirectionEstimate | None, notes: list[str]
+) -> tuple[float, float]:
+    """The present exponent and the new one."""
+    fitted = known_lobe(d)
+    present = gloss.present or (fitted.nearest_exponent if fitted is not None else None)
+    if present is None and fit is not None and fit.determined:
+        present = fit.exponent
+    if present is None:
+        if d.specular[d.mask].any():
+            notes.append(
+                "no single light and lobe explain the specular layer: the current exponent is a "
+                "guess"
+            )
+        present = DEFAULT_EXPONENT
+    return present, gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
+
+
 def _new_lobe(
-    d: Decomposition, gloss: Gloss, light: DirectionalLight | None, notes: list[str]
+    d: Decomposition,
+    gloss: Gloss,
+    exponents: tuple[float, float],
+    light: DirectionalLight | None,
+    fit: DirectionEstimate | None,
+    notes: list[str],
 ) -> np.ndarray:
-    """The specular layer at the requested exponent."""
+    """The specular layer at the requested exponent; `exponents` are the present and the new one."""
     if not d.specular[d.mask].any():
         notes.append(
             "the object has no specular light to change: isc edit RESULT highlight adds some"
         )
         return d.specular
-    fitted = known_lobe(d)
-    present = gloss.present or (fitted.nearest_exponent if fitted is not None else None)
-    needs_light = gloss.method == "render" and light is None
-    fit = explain_specular(d) if present is None or needs_light else None
-    if present is None and fit is not None and fit.determined:
-        present = fit.exponent
-    if present is None:
-        notes.append(
-            "no single light and lobe explain the specular layer: the current exponent is a guess"
-        )
-        present = DEFAULT_EXPONENT
-    exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
     if light is not None and not light.irradiance.any():
         raise InputError("the light is black: give one that shines, or none for that of the photo")
     found = fit is not None and fit.light.irradiance.any()  # black where no light explains anything
@@ -175,9 +200,10 @@ def _new_lobe(
             "no single light explains the specular layer: its highlights are changed in place"
         )
     if gloss.method == "remap" or used_light is None:
-        return remapped(d.specular, d.mask, present, exponent)
+        return remapped(d.specular, d.mask, *exponents)
     unit_light = replace(
         used_light, irradiance=used_light.irradiance / float(luminance(used_light.irradiance))
     )
-    rendered = lobe_under(Lobe(exponent), d.normal, unit_light, d.view)
-    return strength_of(d, Lobe(exponent), rendered, None) * rendered
+    lobe = Lobe(exponents[1])
+    rendered = lobe_under(lobe, d.normal, unit_light, d.view)
+    return strength_of(d, lobe, rendered, None) * rendered

@@ -562,6 +562,29 @@ def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> 
     assert color[0] > 2 * color[2]
 
 
+def test_metal_reflects_the_environment_by_the_new_lobe(scene: Decomposition) -> None:
+    matt = replace(scene, specular=np.zeros_like(scene.specular))
+
+    def reflected(**gloss: float) -> np.ndarray:
+        return change_gloss(matt, Gloss(metal=1.0, **gloss)).specular
+
+    assert np.array_equal(reflected(present=20, sharper=10), reflected(exponent=200))
+    assert not np.array_equal(reflected(exponent=200), reflected(exponent=20))
+    fit = LobeFit(
+        "blinn_phong: of the test",
+        LobeFitOutcome.DETERMINED,
+        float(np.sqrt(2 / 202)),
+        None,
+        (),
+        None,
+        None,
+        0.9,
+        scene.specular,
+    )
+    matt = replace(matt, brdf=fit)
+    assert reflected() == pytest.approx(reflected(exponent=200), abs=1e-6)
+
+
 def test_gloss_is_remapped_where_no_light_explains_it(scene: Decomposition) -> None:
     outcome = LobeFitOutcome.NO_SPECULAR
     brdf = LobeFit("ggx: of the test", outcome, None, None, (), None, None, 0.0, scene.specular)
