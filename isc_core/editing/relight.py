@@ -78,12 +78,13 @@ class NewLight:
                 "a new light needs exactly one of coefficients, directional and environment"
             )
         if self.environment is not None:
-            rows = len(self.environment)
-            if np.shape(self.environment) != (rows, 2 * rows, 3) or rows < 2:
+            shape = np.shape(self.environment)
+            if len(shape) != 3 or shape[2] != 3:
+                raise InputError(f"an environment map has shape {shape}: give (rows, 2 rows, 3)")
+            if shape[1] != 2 * shape[0] or shape[0] < 2:
                 raise InputError(
-                    f"an environment map is twice as wide as high, not "
-                    f"{np.shape(self.environment)[1]} "
-                    f"x {rows}: use a full panorama"
+                    f"an environment map is twice as wide as high, not {shape[1]} x {shape[0]}: "
+                    "use a full panorama"
                 )
             check_range("the environment's radiance", self.environment, 0, np.inf)
 

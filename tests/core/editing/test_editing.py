@@ -632,6 +632,8 @@ def test_gloss_of_a_diffuse_object_is_an_error(scene: Decomposition) -> None:
         lambda: DirectionalLight(toward(0, 0, 1), irradiance=-np.ones(3)),
         lambda: NewLight(),
         lambda: NewLight(environment=np.ones((4, 9, 3))),
+        lambda: NewLight(environment=np.ones(3)),
+        lambda: NewLight(environment=np.ones((4, 8))),
         lambda: Relighting("somehow"),
         lambda: Relighting(exposure=0),
         lambda: turned_light(LIGHT, 2 * np.eye(3)),
