@@ -61,7 +61,7 @@ class MirroredEnvironment:
         -------
         (N, 3) ndarray
         """
-        if view.ndim > 1:
+        if view.ndim > 1 or not np.array_equal(view, VIEW):
             normal = far_view_normals(normal, view)
         found = np.empty(normal.shape)
         for block in row_blocks(normal.shape, pixels=_CHUNK):

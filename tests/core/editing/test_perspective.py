@@ -61,6 +61,16 @@ def test_a_lobe_mirrors_the_environment_for_the_perspective_camera() -> None:
     assert angle_of_peak(d, layer) < 4
 
 
+def test_one_view_is_that_of_all_normals() -> None:
+    d = bump_before_camera()
+    environment = np.random.default_rng(0).random((8, 16, 3))
+    normal, view = d.normal[d.mask].astype(float), np.array([0.6, 0.0, 0.8])
+    one = lobe_in_environment(Lobe(30.0), normal, environment, view)
+    every = lobe_in_environment(Lobe(30.0), normal, environment, np.tile(view, (len(normal), 1)))
+    np.testing.assert_array_equal(one, every)
+    assert np.abs(one - lobe_in_environment(Lobe(30.0), normal, environment)).max() > 0.05
+
+
 @pytest.mark.parametrize("highlights", ["keep", "scale", "render"])
 def test_relighting_and_other_edits_work(highlights: str) -> None:
     bare = bump_before_camera()
