@@ -83,8 +83,9 @@ def enlarged_cubically(
             layer = np.take(layer, np.arange(part.start, part.stop), axis)
             continue
         place = (np.arange(part.start, part.stop) + 0.5) * have / size - 0.5
-        first = np.floor(np.clip(place, 0, have - 1)).astype(np.int64)
-        t = np.clip(place - first, 0, 1)
+        at = np.clip(place, 0, have - 1)
+        first = at.astype(np.int64)
+        t = at - first
         weights = (
             (-t + 2 * t**2 - t**3) / 2,
             (2 - 5 * t**2 + 3 * t**3) / 2,

@@ -39,3 +39,13 @@ def test_rows_are_those_of_the_whole() -> None:
     whole = enlarged_cubically(layer, SHAPE)
     assert whole.shape == (*SHAPE, 3)
     assert (enlarged_cubically(layer, SHAPE, slice(7, 20)) == whole[7:20]).all()
+
+
+def test_all_borders_are_alike_and_repeat_the_outermost_value() -> None:
+    layer = np.random.default_rng(1).random((5, 7))
+    shape = (15, 35)
+    found = enlarged_cubically(layer, shape)
+    mirrored = enlarged_cubically(layer[::-1, ::-1], shape)[::-1, ::-1]
+    np.testing.assert_allclose(found, mirrored, atol=1e-6)
+    ends = [0, 0, -1, -1], [0, -1, 0, -1]
+    np.testing.assert_allclose(found[ends], layer[ends], rtol=1e-6)
