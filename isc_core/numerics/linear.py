@@ -11,10 +11,13 @@ Citation: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), section 3.4
 R. J. Hanson, "Solving Least Squares Problems" (1974), chapter 23.
 
 Limits: n^3 operations in NumPy; meant for tens of unknowns. Normal equations lose half of the
-digits where the two columns are nearly parallel.
+digits where the two columns are nearly parallel; where they cannot be distinguished, one of them
+gets the whole sum.
 """
 
 import numpy as np
+
+_PARALLEL = 1e-12  # squared sine of the angle between two columns
 
 
 def solve_linear(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -66,7 +69,8 @@ def nonnegative_pair(first: np.ndarray, second: np.ndarray, values: np.ndarray) 
     gram = np.einsum("in,jn->ij", columns, columns)
     right = np.einsum("in,n->i", columns, values)
     determinant = gram[0, 0] * gram[1, 1] - gram[0, 1] ** 2
-    if determinant > np.finfo(float).eps * gram[0, 0] * gram[1, 1]:
+    # Of nearly parallel columns, the determinant is rounding, and one of them fits as well.
+    if determinant > _PARALLEL * gram[0, 0] * gram[1, 1]:
         cofactors = np.array([[gram[1, 1], -gram[0, 1]], [-gram[0, 1], gram[0, 0]]])
         free = np.einsum("ij,j->i", cofactors, right) / determinant
         if (free >= 0).all():

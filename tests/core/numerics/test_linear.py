@@ -44,6 +44,15 @@ def test_equal_columns_share_the_coefficient() -> None:
     assert first + 2 * second == pytest.approx(6)
 
 
+def test_proportional_columns_fit_as_well_as_one_of_them() -> None:
+    random = np.random.default_rng(0)
+    for count in random.integers(1, 300, size=200):
+        column, factor, values = random.random(count), random.random(), random.random(count)
+        first, second = nonnegative_pair(column, factor * column, values)
+        assert min(first, second) >= 0
+        assert first + factor * second == pytest.approx(column @ values / (column @ column))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["natural", "laboratory"])
 def test_the_precision_of_light_is_its_covariance_s_inverse_on_any_number_of_threads(
