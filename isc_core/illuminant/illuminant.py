@@ -138,16 +138,23 @@ def estimate_illuminant(
     Raises
     ------
     InputError
-        If the shapes do not match, the mask is empty, or an option is out of range.
+        If the arrays do not fit together, the mask is empty, or an option is out of range.
     """
     options = options or IlluminantOptions()
-    if image.ndim != 3 or image.shape[2] != 3 or mask.shape != image.shape[:2] or not mask.any():
+    masks = [mask] if clipped is None else [mask, clipped]
+    if (
+        image.ndim != 3
+        or image.shape[2] != 3
+        or any(one.shape != image.shape[:2] or one.dtype != bool for one in masks)
+        or not mask.any()
+    ):
         raise InputError(
-            "the light's colour needs an image (H, W, 3) and a mask of its size that is not empty"
+            "the light's colour needs an image (H, W, 3) and a mask of its size that is not empty, "
+            "mask and clipped of bool"
         )
     if (
-        options.prior_deviation <= 0
-        or options.common_deviation < 0
+        not 0 < options.prior_deviation < np.inf
+        or not 0 <= options.common_deviation < np.inf
         or not 0 <= options.min_confidence <= 1
     ):
         raise InputError(
@@ -192,14 +199,14 @@ def whitened(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
     Returns
     -------
     (..., 3) ndarray
-        The image under white light.
+        The image under white light; of floats.
 
     Raises
     ------
     InputError
         If the colour is invalid.
     """
-    return image / _checked(colour).astype(image.dtype)
+    return image / _checked(colour, image.dtype)
 
 
 def tinted(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
@@ -215,21 +222,27 @@ def tinted(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
     Returns
     -------
     (..., 3) ndarray
-        The image under the light.
+        The image under the light; of floats.
 
     Raises
     ------
     InputError
         If the colour is invalid.
     """
-    return image * _checked(colour).astype(image.dtype)
+    return image * _checked(colour, image.dtype)
 
 
-def _checked(colour: np.ndarray) -> np.ndarray:
+def _checked(colour: np.ndarray, dtype: np.dtype) -> np.ndarray:
+    """The colour in the precision of an image's `dtype`, if that is one of floats."""
     colour = np.asarray(colour)
-    if colour.shape != (3,) or not np.isfinite(colour).all() or colour.min() <= 0:
+    if (
+        colour.shape != (3,)
+        or colour.dtype.kind not in "fiu"
+        or not np.isfinite(colour).all()
+        or colour.min() <= 0
+    ):
         raise InputError("a light's colour is three numbers above 0")
-    return colour
+    return colour.astype(np.result_type(dtype, np.float32))
 
 
 def _colour(shift: np.ndarray) -> np.ndarray:

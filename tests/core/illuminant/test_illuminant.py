@@ -106,6 +106,12 @@ def test_whitened_and_back(dtype):
     )
 
 
+def test_codes_become_floats():
+    codes = np.random.default_rng(0).integers(1, 256, (9, 8, 3)).astype(np.uint8)
+    np.testing.assert_allclose(whitened(codes, LIGHT), codes / LIGHT, rtol=1e-6)
+    np.testing.assert_allclose(tinted(codes, LIGHT), codes * LIGHT, rtol=1e-6)
+
+
 def test_the_benchmark_relights_exactly_and_has_the_ground_truth():
     white = np.ones(3)
     (image, mask), (diffuse, _) = ball(ALBEDOS, white, 0.5), ball(ALBEDOS, white, 0.0)
@@ -123,11 +129,19 @@ def test_the_benchmark_relights_exactly_and_has_the_ground_truth():
 
 def test_what_does_not_fit_is_refused():
     image, mask = ball(ALBEDOS, LIGHT, 0.5)
-    for arrays in ((image[..., 0], mask), (image, mask[1:]), (image, np.zeros_like(mask))):
+    for arrays in (
+        (image[..., 0], mask),
+        (image, mask[1:]),
+        (image, np.zeros_like(mask)),
+        (image, mask.astype(np.uint8)),
+        (image, mask, mask[1:]),
+        (image, mask, np.zeros(mask.shape)),
+    ):
         with pytest.raises(InputError, match="the light's colour needs"):
             estimate_illuminant(*arrays)
     for options in (
         IlluminantOptions(prior_deviation=0),
+        IlluminantOptions(prior_deviation=float("nan")),
         IlluminantOptions(common_deviation=-1),
         IlluminantOptions(min_confidence=2),
     ):
