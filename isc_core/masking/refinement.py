@@ -59,7 +59,7 @@ def refined(
     """
     height, width = cover.shape
     factor = min(1.0, SIDE / max(width, height))
-    small = round(height * factor), round(width * factor)
+    small = max(round(height * factor), 1), max(round(width * factor), 1)
     codes = srgb_codes(resampled(light, small))
     likelier = with_larger_prior(resampled(cover, small).clip(0, 1), shift)
     fine = segmented_cover(codes, likelier, _nearest(known, small))
