@@ -5,7 +5,7 @@ and sums over tasks are taken in the order of the tasks.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache, wraps
 from threading import RLock
 from types import TracebackType
@@ -31,7 +31,7 @@ class ThreadPool:
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
     def run(self, tasks: Sequence[Callable[[], None]]) -> None:
-        """Run every task, and return when all are done.
+        """Run every task, and return, or raise, when none is running any more.
 
         Parameters
         ----------
@@ -51,7 +51,10 @@ class ThreadPool:
         others = [
             self._pool.submit(_drain, pending) for _ in range(min(self.threads, len(tasks)) - 1)
         ]
-        _drain(pending)
+        try:
+            _drain(pending)
+        finally:
+            wait(others)  # they write to memory of the caller
         for other in others:
             other.result()
 

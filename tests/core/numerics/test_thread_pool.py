@@ -1,11 +1,11 @@
-"""Results that are computed once for all threads."""
+"""Tasks on threads, and results that are computed once for all of them."""
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from isc_core.numerics.thread_pool import computed_once
+from isc_core.numerics.thread_pool import ThreadPool, computed_once
 
 
 def test_a_second_thread_waits_for_the_first() -> None:
@@ -41,3 +41,23 @@ def test_an_error_is_raised_at_each_call() -> None:
     with pytest.raises(ValueError, match="broken"):
         failing_once()
     assert failing_once() == "read"
+
+
+def test_nothing_runs_any_more_after_an_error() -> None:
+    going, failed, done = threading.Event(), threading.Event(), list[int]()
+    caller = threading.get_ident()
+
+    def task() -> None:
+        if threading.get_ident() == caller:
+            assert going.wait(10)
+            failed.set()
+            raise ValueError("broken")
+        going.set()
+        assert failed.wait(10)
+        threading.Event().wait(0.05)
+        done.append(1)
+
+    with ThreadPool(2) as pool:
+        with pytest.raises(ValueError, match="broken"):
+            pool.run([task, task])
+        assert done == [1]
