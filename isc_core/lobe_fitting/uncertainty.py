@@ -3,7 +3,7 @@
 Equation: with the scores g_i = w_i r_i J_i summed over blocks B of neighbouring pixels, and H = sum
 w_i J_i J_i^T,
 
-    covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p),      b effective blocks, p parameters.
+    covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p / 2),  b effective blocks, p parameters.
 
 Errors within a block may be correlated in any way; a block is about as wide as a highlight, since
 errors of the normals, the separation or the lobe's shape affect all of it.
