@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..io.json_files import read_json
 from ..io.matlab import read_matrix
 from ..photo import read_raster
 
@@ -28,6 +29,7 @@ _FOLDERS = {
     "natural": ("natural", "MIT-Berkeley-Natural"),
 }
 _WHITE = 65535.0
+_GLOSSY = "isc synth glossy-mit"  # kind of the sets of this command in their `scene.json`
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,6 +99,36 @@ def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
             f"{folder} contains no objects: give the folder that contains the MIT-Berkeley set"
         )
     return names
+
+
+def usual_illuminations(root: str | Path, input: str = "diffuse") -> tuple[str, ...]:
+    """Return the illuminations of a set that have images of a kind.
+
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+    input : str, optional
+        One of `INPUTS`.
+
+    Returns
+    -------
+    tuple of str
+        The set's own, except that its original images are those of the laboratory. A set of `isc
+        synth glossy-mit` has one light, though both of its folders can be read.
+
+    Raises
+    ------
+    InputError
+        If the set's record is damaged.
+    """
+    path = Path(root) / "scene.json"
+    record = read_json(path, "make the set again") if path.is_file() else None
+    if isinstance(record, dict) and record.get("kind") == _GLOSSY:
+        light = str(record.get("light")).partition("-")[0]
+        if light in ILLUMINATIONS:
+            return (light,)
+    return ("laboratory",) if input == "original" else ILLUMINATIONS
 
 
 def check_request(root: str | Path, name: str, illumination: str, input: str) -> None:

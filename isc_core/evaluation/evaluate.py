@@ -22,7 +22,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..datasets.mit_berkeley import MitBerkeleyObject, check_request, list_objects, load_object
+from ..datasets.mit_berkeley import (
+    MitBerkeleyObject,
+    check_request,
+    list_objects,
+    load_object,
+    usual_illuminations,
+)
 from ..errors import InputError
 from ..progress import Monitor
 from .metrics import Scores, geometric_mean, require_truth, score
@@ -228,7 +234,7 @@ def evaluate(
     root: str | Path,
     *,
     objects: Sequence[str] | None = None,
-    illuminations: Sequence[str] = ("natural", "laboratory"),
+    illuminations: Sequence[str] | None = None,
     input: str = "diffuse",
     model: str,
     protocol: str = "reference",
@@ -244,9 +250,9 @@ def evaluate(
     objects : sequence of str, optional
         Names; all objects by default.
     illuminations : sequence of str, optional
-        "natural", "laboratory".
+        "natural", "laboratory"; those of `usual_illuminations` by default.
     input : str, optional
-        "diffuse" or "original" (laboratory only).
+        "diffuse" or "original" (laboratory light, or a set of `isc synth glossy-mit`).
     model : str
         Name of the method in the report.
     protocol : str, optional
@@ -269,6 +275,8 @@ def evaluate(
         If the monitor cancels; between objects.
     """
     monitor = monitor or Monitor()
+    if illuminations is None:
+        illuminations = usual_illuminations(root, input)
     pairs = [
         (light, name)
         for light in illuminations
@@ -279,13 +287,14 @@ def evaluate(
         raise InputError("nothing to evaluate: name at least one object and one illumination")
     for light, name in jobs:
         check_request(root, name, light, input)
-    for light, name in jobs:
-        require_truth(load_object(root, name, light, input))
+    truths = [load_object(root, name, light, input) for light, name in jobs]
+    for truth in truths:
+        require_truth(truth)
     results = []
     for done, (light, name) in enumerate(jobs):
         part = monitor.part(done / len(jobs), (done + 1) / len(jobs))
         part.report(f"{name}, {light}", 0.0)
-        results.append(_run(load_object(root, name, light, input), runner, part))
+        results.append(_run(truths.pop(0), runner, part))
     monitor.report("evaluated", 1.0)
     return EvaluationReport(model, input, tuple(results), protocol)
 

@@ -14,7 +14,12 @@ import scipy.io
 
 from isc_core.cli.interface.parser import Parser, add_general_options
 from isc_core.datasets.highlight_set import load_laboratory
-from isc_core.datasets.mit_berkeley import list_objects, load_object
+from isc_core.datasets.mit_berkeley import (
+    INPUTS,
+    list_objects,
+    load_object,
+    usual_illuminations,
+)
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.io.exr import read_channels
@@ -501,6 +506,10 @@ def test_the_command_makes_the_sets_and_prints_how_to_evaluate_on_them(
     )
     lines = options.run(options, Monitor())
     assert len(lines) == 1 and "isc evaluate" in lines[0] and "level-20_natural" in lines[0]
+    for light in LIGHTS:
+        for kind in INPUTS:
+            own = usual_illuminations(tmp_path / "out" / f"level-20_{light}", kind)
+            assert own == (light.removesuffix("-area"),)
     made = tmp_path / "out" / "level-20_laboratory-area"
     assert {path.name for path in (made / "laboratory" / "bump").iterdir()} == set(LABORATORY_FILES)
     assert {path.name for path in (made / "natural" / "bump").iterdir()} == set(NATURAL_FILES)

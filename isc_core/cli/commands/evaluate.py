@@ -59,7 +59,8 @@ def declare(parser: argparse.ArgumentParser) -> None:
     main.add_argument(
         "--illumination",
         choices=(*ILLUMINATIONS, "both"),
-        help="light of the images (default: both, or laboratory for --input original)",
+        help="light of the images (default: both, or laboratory for --input original; for a set of "
+        "isc synth glossy-mit its own)",
     )
     main.add_argument(
         "--model",
@@ -125,8 +126,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """
     if options.json is not None:
         require_writable_file(options.json)
-    original = options.input == "original"
-    model = options.model or ("joint" if original else "sirfs")
+    model = options.model or ("joint" if options.input == "original" else "sirfs")
     runner_options = RunnerOptions(
         model, options.separator, options.engine, options.threads, options.confidence_weights,
         options.light_prior, options.shape_prior, Protocol(options.protocol),
@@ -136,7 +136,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     report = evaluate(
         options.root,
         objects=options.objects,
-        illuminations=_illuminations(options.illumination, original),
+        illuminations=_illuminations(options.illumination),
         input=options.input,
         model=model,
         protocol=options.protocol,
@@ -149,7 +149,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     return [report.table()]
 
 
-def _illuminations(chosen: str | None, original: bool) -> tuple[str, ...]:
+def _illuminations(chosen: str | None) -> tuple[str, ...] | None:
     if chosen is None:
-        return ("laboratory",) if original else ILLUMINATIONS
+        return None
     return ILLUMINATIONS if chosen == "both" else (chosen,)

@@ -246,13 +246,43 @@ def test_natural_light_has_highlights_where_the_set_was_given_some(tmp_path: Pat
     assert [result.name for result in glossy.results] == ["ball", "bowl"]
 
 
+@pytest.mark.parametrize("light", ["natural", "natural-area", "laboratory"])
+@pytest.mark.parametrize("kind", ["original", "diffuse"])
+def test_a_glossy_set_is_evaluated_once_under_its_own_light(
+    tmp_path: Path, light: str, kind: str
+) -> None:
+    """Its laboratory and natural folders have the same images, for readers of either half."""
+    root = write_set(tmp_path)
+    record = {"kind": "isc synth glossy-mit", "light": light}
+    (root / "scene.json").write_text(json.dumps(record), encoding="utf-8")
+    for name in ("ball", "bowl"):
+        for half in ("natural", "laboratory"):
+            images = root / half / name
+            (images / "original.png").write_bytes((images / "diffuse.png").read_bytes())
+    found = evaluate(root, input=kind, model="naive", runner=naive)
+    assert found.illuminations == (light.partition("-")[0],) and len(found.results) == 2
+
+
+def test_each_object_is_read_once(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was checked is what is scored, even if the files change during the runs."""
+    read: list[str] = []
+
+    def counted(where: Path, name: str, light: str, kind: str) -> MitBerkeleyObject:
+        read.append(f"{name}, {light}")
+        return load_object(where, name, light, kind)
+
+    monkeypatch.setattr("isc_core.evaluation.evaluate.load_object", counted)
+    evaluate(root, model="naive", runner=naive)
+    assert len(read) == len(set(read)) == 4
+
+
 def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
     def never(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
         raise AssertionError("must not run")
 
     wrong: tuple[dict[str, Any], ...] = (
         {"objects": ["ball", "cube"]},
-        {"input": "original"},
+        {"input": "original", "illuminations": ["natural"]},
         {"illuminations": ["dusk"]},
         {"objects": []},
     )
