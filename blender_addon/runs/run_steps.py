@@ -24,7 +24,7 @@ from ..files.result_arrays import ARRAYS, DESCRIPTION, ResultArrays, read_descri
 from ..files.result_cache import ResultCache, content_key
 from ..scene.objects import prepare_objects
 from ..scene.preparation import BuildOptions, PreparedObject, prepare
-from ..settings.usage import SIRFS_MODELS
+from ..settings.usage import SEPARATING_MODELS, SIRFS_MODELS
 from ..worker.commands import (
     CERTAIN,
     Box,
@@ -122,7 +122,7 @@ def decompose_steps(
         output=folder / RESULT,
         mask=mask_path,
         model=method.model,
-        separator=method.separator,
+        separator=method.separator if method.model in SEPARATING_MODELS else "isc",
         illumination=method.illumination,
         max_size=method.max_size,
         threads=threads,

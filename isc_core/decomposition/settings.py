@@ -162,6 +162,15 @@ def renamed_value(setting: str, value: str) -> str | None:
     return _RENAMED.get(setting, {}).get(value)
 
 
+def _check_separator(settings: "Settings") -> None:
+    """Raise `InputError` for a separator that the model would not run."""
+    if settings.model not in SEPARATING_MODELS and settings.separator not in (BEST, "none"):
+        raise InputError(
+            f"--separator does not apply to {settings.model}, which separates no highlights: use "
+            f"--model {' or '.join(SEPARATING_MODELS)}, or isc separate"
+        )
+
+
 def _check_numbers(settings: "Settings") -> None:
     """Raise `InputError` for values that Python would take for others: "no" is true."""
     for name in ("max_size", "detail", "threads", "seed"):
@@ -185,7 +194,7 @@ class Settings:
     model : str
         One of `MODELS`.
     separator : str
-        One of `separation.METHODS`, for `SEPARATING_MODELS`.
+        For `SEPARATING_MODELS`: one of `separation.METHODS`.
     illumination : Illumination or str
         The kind of photo.
     max_size : int
@@ -312,6 +321,7 @@ class Settings:
         ):
             if value not in known:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
+        _check_separator(self)
         if self.confidence_weights and self.model not in WEIGHTING_MODELS:
             raise InputError(
                 f"--confidence-weights does not apply to {self.model}: "

@@ -58,7 +58,7 @@ class RunnerOptions:
     model : str
         One of `decompose.settings.MODELS`.
     separator : str
-        One of `separation.METHODS`, for the models that separate.
+        See `Settings`.
     engine : str
         See `SolverOptions`.
     threads : int

@@ -25,6 +25,7 @@ from isc_core.decomposition.settings import (  # noqa: E402
     SIRFS_MODELS,
     Settings,
 )
+from isc_core.separation import BEST  # noqa: E402
 
 
 @dataclass
@@ -190,12 +191,15 @@ def test_the_slider_of_the_gain_moves_the_photos_highlights_too(
 
 
 @pytest.mark.parametrize("model", ["joint", "naive"])
-def test_the_color_of_the_light_reaches_the_worker(
+def test_light_color_and_separator_reach_the_worker(
     addon: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, model: str
 ) -> None:
-    """As `isc decompose` takes it; models without a light would refuse it."""
+    """As `isc decompose` takes it; models without a light would refuse it, and those that separate
+    no highlights another separator.
+    """
     settings = addon.context.scene.isc
     settings.image, settings.model = addon.data.images.new("cup", 8, 8), model
+    settings.separator = "shen_2013"
     choices = {item.identifier for item in settings.bl_rna.properties["light_color"].enum_items}
     assert choices == {*LIGHT_COLOURS, "custom"}
     jobs: list[DecomposeJob] = []
@@ -221,6 +225,10 @@ def test_the_color_of_the_light_reaches_the_worker(
         )
         with pytest.raises(WorkerFailed, match="seen"):
             list(steps)
+    separator = "shen_2013" if model in SEPARATING_MODELS else BEST
+    assert [job.separator for job in jobs] == [separator] * 2
+    for job in jobs:
+        Settings(model, job.separator, light_colour=job.light_colour).check()
     sent = [job.light_colour for job in jobs]
     if model == "naive":
         assert sent == ["balanced", "balanced"]

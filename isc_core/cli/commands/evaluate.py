@@ -86,7 +86,7 @@ def _add_model(group: argparse._ArgumentGroup) -> None:
         "--separator",
         default=RunnerOptions().separator,
         metavar="NAME",
-        help="separation method of joint, mdr, mbp (default %(default)s)",
+        help="for joint, mdr and mbp: separation method (default %(default)s)",
     )
     group.add_argument(
         "--confidence-weights", action="store_true", help="for joint and mdr: as for isc decompose"

@@ -231,7 +231,7 @@ def add_model_settings(parser: argparse.ArgumentParser) -> None:
         "--separator",
         default=defaults.separator,
         metavar="NAME",
-        help=f"separation method, see below (default {defaults.separator})",
+        help=f"for joint, mdr and mbp: separation method, see below (default {defaults.separator})",
     )
     _add_scene_settings(group, defaults)
     group.add_argument(

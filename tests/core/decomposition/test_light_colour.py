@@ -142,9 +142,13 @@ def test_options_that_mean_nothing_to_a_model_are_refused() -> None:
     for settings in (
         Settings(model="naive", light_colour="estimate"),
         Settings(model="mbp", confidence_weights=True),
+        Settings(model="sirfs", separator="shen_2013"),
+        Settings(model="retinex", separator="network"),
     ):
         with pytest.raises(InputError, match="does not apply to"):
             settings.check()
+    for separator in ("isc", "none"):  # the default, and what such a model does
+        Settings(model="retinex", separator=separator).check()
     for colour in ("red", "1,2", "1,0,1", "-1,-1,-1", "1,1,200", "nan,1,1", "inf,1,1"):
         with pytest.raises(InputError, match="unknown light colour"):
             Settings(light_colour=colour).check()
