@@ -60,6 +60,7 @@ _XYZ = np.array(
 _WHITE = float(np.linalg.norm(_XYZ.sum(axis=1)))
 _HIGHLIGHT = _XYZ.sum(axis=1) / _WHITE
 _TINY = 1e-12
+_BLURS = 0.01, 1000.0  # pixels: less changes nothing, more has a window larger than a photo
 # Basis of the plane orthogonal to the highlight atom, which contains the specular-free images.
 _FIRST = np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]) / np.linalg.norm(
     np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0])
@@ -95,7 +96,7 @@ class SparseCodingOptions:
     noise : float
         Changes below this share of the brightest pixels are no edges; in [0, 1).
     blur : float
-        Standard deviation, in pixels, of the smoothing before codes are made; >= 0.
+        Standard deviation, in pixels, of the smoothing before codes are made; 0, or .01 to 1000.
     """
 
     specular_free: str = "both"
@@ -279,10 +280,11 @@ def _check_options(options: SparseCodingOptions) -> None:
         options.hues < 3
         or not 0 < options.ratio_quantile < 1
         or not 0 < options.edge < 1
-        or not 0 <= options.blur < np.inf
+        or not (options.blur == 0 or _BLURS[0] <= options.blur <= _BLURS[1])
     ):
         raise InputError(
-            "hues must be at least 3, ratio_quantile and edge within (0, 1), blur at least 0"
+            "hues must be at least 3, ratio_quantile and edge within (0, 1), blur 0 or within "
+            f"[{_BLURS[0]:g}, {_BLURS[1]:g}]"
         )
     if not all(0 <= share < 1 for share in (options.sparsity, options.noise)):
         raise InputError("sparsity and noise must be within [0, 1)")

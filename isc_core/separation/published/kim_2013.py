@@ -203,13 +203,13 @@ def _check_options(options: Kim2013Options) -> None:
     if options.patch < 1 or options.rounds < 0 or options.sweeps < 0:
         raise InputError("patch must be at least 1, rounds and sweeps at least 0")
     positive = (options.purity, options.trust, options.prior, options.gradient)
-    if not all(value > 0 for value in positive):
-        raise InputError("purity, trust, prior and gradient must be above 0")
+    if not all(0 < value < np.inf for value in positive):
+        raise InputError("purity, trust, prior and gradient must be finite and above 0")
     # Smaller cells would need more memory than the image.
     if not options.reach >= 0.05 or not 0.02 <= options.hue <= 1:
         raise InputError("reach must be at least 0.05, hue within [0.02, 1]")
-    if not (options.base >= 0 and options.smoothness >= 0):
-        raise InputError("base and smoothness must be at least 0")
+    if not (0 <= options.base < np.inf and 0 <= options.smoothness < np.inf):
+        raise InputError("base and smoothness must be finite and at least 0")
     if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):
         raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
 

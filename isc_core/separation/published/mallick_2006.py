@@ -62,7 +62,7 @@ class Mallick2006Options:
         Steps of dilation that follow, >= 0. Zero is the published erosion, `steps` an opening.
     smoothing : float
         Standard deviation, in pixels, of the Gaussian that hue and rho get before they are
-        differentiated; >= 0.
+        differentiated; 0 to 1000.
     edge : float
         tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel; >= 0.
     chroma : float
@@ -105,6 +105,7 @@ VARIANTS: dict[str, Mallick2006Options] = {
 }
 
 _LEVELS = 255.0
+_WIDEST = 1000.0  # smoothing, pixels: beyond, its window needs more memory than a photo
 # Value of phi outside the mask: a neighbour this high never erodes a pixel.
 _FAR = np.float32(1e9)
 # Speeds below this count as zero.
@@ -164,9 +165,15 @@ def _check_options(options: Mallick2006Options) -> None:
     if options.steps < 0 or options.restoring_steps < 0 or not 0 < options.step <= 0.7:
         raise InputError("steps and restoring_steps must be at least 0, step within (0, 0.7]")
     if not (
-        options.smoothing >= 0 and options.edge >= 0 and options.chroma > 0 and options.texture > 0
+        0 <= options.smoothing <= _WIDEST
+        and options.edge >= 0
+        and options.chroma > 0
+        and options.texture > 0
     ):
-        raise InputError("smoothing and edge must be at least 0, chroma and texture above 0")
+        raise InputError(
+            f"smoothing must be within [0, {_WIDEST:g}], edge at least 0, chroma and texture above "
+            "0"
+        )
     if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):
         raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
     if options.longest is not None and options.longest < 16:

@@ -46,7 +46,8 @@ class Yang2010Options:
     Attributes
     ----------
     spatial_sigma : float
-        Of the filter, as a share of the object's (or frame's) shorter side, > 0.
+        Of the filter, as a share of the object's (or frame's) shorter side, >=
+        .001.
     range_sigma : float
         Of the filter in the guide, which lies in [1/3, 1], >= .001.
     tolerance : float
@@ -158,7 +159,7 @@ def separate(
 
 def _check_options(options: Yang2010Options) -> None:
     sound = (
-        options.spatial_sigma > 0
+        options.spatial_sigma >= 0.001
         and options.range_sigma >= 0.001
         and options.tolerance > 0
         and options.rounds >= 1
@@ -169,7 +170,7 @@ def _check_options(options: Yang2010Options) -> None:
         or not math.isfinite(options.spatial_sigma + options.range_sigma)
     ):
         raise InputError(
-            "spatial_sigma and tolerance must be above 0, range_sigma at least .001, rounds at "
+            "spatial_sigma and range_sigma must be at least .001, tolerance above 0, rounds at "
             "least 1, dark at least 0"
         )
 
