@@ -17,7 +17,7 @@ Citation: see `networks.highlight_network`.
 Limits: those of the network. Clipped pixels: see `support.clipped`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -91,23 +91,54 @@ def separate(
         If the user cancels.
     """
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
-    if options.log_odds_margin < 0 or options.stands_out < 0 or not options.tint >= 1:
+    if not (
+        0 <= options.log_odds_margin < np.inf
+        and 0 <= options.stands_out < np.inf
+        and 1 <= options.tint < np.inf
+    ):
         raise InputError(
-            "the method network needs log_odds_margin and stands_out at least 0 and tint at least 1"
+            "the method network needs finite numbers: log_odds_margin and stands_out at least 0, "
+            "tint at least 1"
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
+    unit = mean_unit(image, mask)
+    image = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
     prediction = predict_highlights(image, mask, options.log_odds_margin, network)
     excess = expected_ratio(image, prediction)
     if not highlights_stand_out(excess, mask, options.stands_out):
         excess = np.zeros_like(excess)
-    inside = np.where(mask[..., None], image, 0)
-    diffuse = limit_tint(inside, inside * np.exp(-excess), options.tint)
+    diffuse = limit_tint(image, image * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)
-    unit = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
-    confidence = 1 / (1 + prediction.deviation / unit)
+    error = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
+    confidence = 1 / (1 + prediction.deviation / error)
     unclipped = mask if clipped is None else mask & ~clipped
-    return replace(split, confidence=np.where(unclipped, confidence, 0).astype(np.float32))
+    return Separation(
+        unit * split.diffuse,
+        unit * split.specular,
+        unit * split.residual,
+        np.where(unclipped, confidence, 0).astype(np.float32),
+    )
+
+
+def mean_unit(image: np.ndarray, mask: np.ndarray) -> np.float32:
+    """Return a power of two near the mean light of an object.
+
+    Dividing by it is exact, and makes the network's small constants independent of the exposure.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Returns
+    -------
+    float32
+        Positive.
+    """
+    mean = max(float(image[mask].mean(dtype=float)), 1e-30)
+    return np.float32(2.0 ** np.round(np.log2(mean)))
 
 
 def expected_ratio(image: np.ndarray, prediction: HighlightPrediction) -> np.ndarray:
