@@ -39,7 +39,7 @@ class Abstention(StrEnum):
     NO_CANDIDATE
         No pixel is paler than pixels of its hue.
     NEAR_GREY
-        The object's colours are too pale to tell a highlight from them.
+        The bright pixels are too pale to tell a highlight from their colours.
     NOT_PROVEN
         There are pale pixels, but they look like reflectance: they have its edges, or run with its
         colours.

@@ -175,6 +175,8 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
 
 
 def _why_unchanged(method: str, layers: Separation) -> str:
+    if method == "network":
+        return "none stands out to the network; --set stands_out=0 removes what it finds"
     if layers.abstention is None:
         return f"the equation of {method} attributes no pixel to one; try --method {BEST}"
     reasons = {
@@ -184,7 +186,7 @@ def _why_unchanged(method: str, layers: Separation) -> str:
         ),
         Abstention.NO_CANDIDATE: "no pixel is paler than the others of its hue",
         Abstention.NEAR_GREY: (
-            "the object is nearly grey, so highlights have the same colour; "
+            "the bright pixels are nearly grey, so highlights have the same colour; "
             "isc decompose --model joint also uses the shape"
         ),
         Abstention.NOT_PROVEN: (

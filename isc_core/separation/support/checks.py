@@ -6,8 +6,10 @@ from ...errors import InputError
 from ...imaging.channels import largest, smallest
 
 # Channels that differ by less than this share of the brightest value are equal: rounding of 16-bit
-# codes is 1.5e-5.
+# codes is 1.5e-5. Highlights of renderings have no such codes and outshine all colour: they count
+# as this many times the median only.
 _GREY = 1e-4
+_BRIGHTEST = 256.0
 
 
 def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None) -> None:
@@ -56,7 +58,12 @@ def has_colour(image: np.ndarray, mask: np.ndarray) -> bool:
     bool
     """
     inside = image[mask]
-    return bool((largest(inside) - smallest(inside)).max() > _GREY * inside.max())
+    high = largest(inside)
+    lit = high[high > 0]
+    if not lit.size:
+        return False
+    brightest = min(float(lit.max()), _BRIGHTEST * float(np.median(lit)))
+    return bool((high - smallest(inside)).max() > _GREY * brightest)
 
 
 def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:

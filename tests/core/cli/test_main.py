@@ -467,6 +467,11 @@ def test_grey_photos_are_separated_into_themselves(tmp_path: Path) -> None:
 def test_an_unchanged_photo_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
     assert "the photo has no colour" in capsys.readouterr().out
+    level = np.linspace(0.5, 1, len(ball_codes()))[:, None, None]
+    dull = level * np.where(ball_codes().any(axis=-1, keepdims=True), [9000, 9000, 8000], 0)
+    photo = write_image(tmp_path / "dull.png", dull.astype(np.uint16))
+    assert isc("separate", photo, "--method", "network", "-o", tmp_path / "dull") == 0
+    assert "none stands out to the network" in capsys.readouterr().out
     assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
     assert "no highlight was found" not in capsys.readouterr().out
 

@@ -168,6 +168,14 @@ def test_a_photo_without_colour(method: str, variant: str, kind: str) -> None:
 
 
 @every
+def test_highlights_of_a_rendering_do_not_make_it_colourless(method: str, variant: str) -> None:
+    """They may be ten thousand times as bright as the coloured reflectance around."""
+    image, mask = scene()
+    image[20:23, 30:33] += 2e4
+    assert_sound(separate(method, image, mask, variant=variant), image, mask)
+
+
+@every
 def test_a_hint_of_colour_is_no_trap(method: str, variant: str) -> None:
     """Three parts in a thousand of colour, and 8 bits: hues are noise, but nothing breaks."""
     image, mask = scene()
