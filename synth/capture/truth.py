@@ -20,6 +20,7 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from isc_core.numerics.linear import solve_linear
 from isc_core.progress import Monitor
 from isc_core.shading.spherical_harmonics import real_sh
 
@@ -230,7 +231,10 @@ def fit_light(normal: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, floa
 
 
 def _fit_channel(basis: np.ndarray, shading: np.ndarray) -> np.ndarray:
-    """Newton steps on the Poisson likelihood, halved where one increases the loss."""
+    """Newton steps on the Poisson likelihood, halved where one increases the loss.
+
+    Sums have a fixed order: those of BLAS and LAPACK depend on the number of threads.
+    """
     mean = max(float(shading.mean()), 1e-12)
     target = shading / mean
     light = np.zeros(9)
@@ -245,9 +249,10 @@ def _fit_channel(basis: np.ndarray, shading: np.ndarray) -> np.ndarray:
     now = loss(light)
     for _ in range(_FIT_STEPS):
         model = np.exp(np.clip(basis @ light, np.log(_DARKEST), 30))
-        gradient = basis.T @ (model - target) / len(target) + ridge * light
-        curvature = (basis * model[:, None]).T @ basis / len(target) + np.diag(ridge + 1e-12)
-        step = np.linalg.solve(curvature, gradient)
+        gradient = np.einsum("nk,n->k", basis, model - target) / len(target) + ridge * light
+        curvature = np.einsum("nk,nl->kl", basis * model[:, None], basis) / len(target)
+        curvature += np.diag(ridge + 1e-12)
+        step = solve_linear(curvature, gradient[:, None])[:, 0]
         size = 1.0
         while (after := loss(light - size * step)) > now and size > 1e-4:
             size /= 2

@@ -13,6 +13,7 @@ from synth.scene.camera import Camera
 from synth.scene.lights import DirectionalLight, EnvironmentLight, panel_toward_origin
 from synth.scene.materials import Material
 from synth.shapes.gourd import gourd, gourd_albedo
+from tests.properties.laws import threads
 
 RADIOMETRIC = ("image", "diffuse", "specular", "residual", "shading")
 
@@ -117,6 +118,17 @@ def test_a_light_of_our_form_is_found_exactly(seed: int) -> None:
     found, misfit = fit_light(normals(), shading)
     assert misfit < 2e-3
     np.testing.assert_allclose(np.exp(real_sh(normals()) @ found), shading, rtol=0.02)
+
+
+def test_the_fitted_light_is_the_same_on_any_number_of_threads() -> None:
+    towards = np.random.default_rng(0).normal(size=(6000, 3))
+    towards /= np.linalg.norm(towards, axis=1, keepdims=True)
+    shading = np.exp(real_sh(towards) @ np.random.default_rng(1).normal(0, 0.4, (9, 3)))
+    found = []
+    for count in (1, 3):
+        with threads(count):
+            found.append(fit_light(towards, shading)[0])
+    assert np.array_equal(*found)
 
 
 def test_the_fitted_light_follows_a_gain_and_survives_black_shadows() -> None:
