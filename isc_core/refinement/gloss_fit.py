@@ -137,9 +137,8 @@ def gloss_problem(d: Decomposition, fit: LobeFit, work: WorkingScale, seed: int)
         direction,
         np.pi * lamp_shading(d, direction),
     )
-    return GlossProblem(
-        work, data, _held_out(work, seed), bumps_of(work) if d.camera is None else None
-    )
+    moves = d.camera is None and "shape" not in d.provenance.known
+    return GlossProblem(work, data, _held_out(work, seed), bumps_of(work) if moves else None)
 
 
 def bumps_of(work: WorkingScale, step: int = 1) -> HeightBumps:

@@ -9,13 +9,14 @@ layer (`gloss_fit`). They are kept if
 - they explain at least `_MIN_EXPLAINED` of the remaining fifth, and more than the initial lobe.
 
 Then all pixels are fitted. Image and layers are unchanged. The light is replaced by the one whose
-shading on the new normals is closest to the old shading; with shading = exp(SH(normal)) and
-reflectance = diffuse / shading, every identity of a result holds.
+shading on the new normals is closest to the old shading, unless the user has given it; with shading
+= exp(SH(normal)) and reflectance = diffuse / shading, every identity of a result holds.
 
 Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x; J. T. Barron, J. Malik 2015,
 doi:10.1109/TPAMI.2014.2377712 (reflectance terms).
 
-Limits: measured in docs/methods/refine.md. With a perspective camera, the shape is not changed.
+Limits: measured in docs/methods/refine.md. With a perspective camera, or an exact shape from the
+user, the shape is not changed.
 """
 
 from dataclasses import dataclass, replace
@@ -207,7 +208,7 @@ def _new_shading(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> np.nd
     if problem.bumps is None:
         return shading
     old, new = (real_sh(normal[mask]) for normal in (problem.work.normal, problem.normal(gloss)))
-    light = _refitted(new, old, d.illumination)
+    light = _new_light(d, new, old)
     change = np.einsum("nk,kc->nc", new, light) - np.einsum("nk,kc->nc", old, d.illumination)
     return np.asarray(shading * np.exp(change))
 
@@ -256,7 +257,7 @@ def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decompos
     new_height = np.where(mask, new_height - new_height[mask].min(), 0)
     shading = np.zeros_like(d.shading)
     basis = real_sh(normal[mask].astype(float))
-    light = _refitted(basis, real_sh(d.normal[mask].astype(float)), d.illumination)
+    light = _new_light(d, basis, real_sh(d.normal[mask].astype(float)))
     shading[mask] = np.exp(np.einsum("nk,kc->nc", basis, light))
     if d.visibility is not None:
         shading *= d.visibility
@@ -267,10 +268,13 @@ def _reshaped(d: Decomposition, problem: GlossProblem, gloss: Gloss) -> Decompos
     )
 
 
-def _refitted(basis: np.ndarray, old: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """The light (9, 3) whose log shading on the new normals is closest to that of `light` on the
-    old ones.
+def _new_light(d: Decomposition, basis: np.ndarray, old: np.ndarray) -> np.ndarray:
+    """The light (9, 3) whose log shading on the new normals is closest to that of the result's
+    light on the old ones; the same light if the user has given it.
     """
+    light = d.illumination
+    if "light" in d.provenance.known:
+        return light
     target = np.einsum("nk,kc->nc", old, light)
     gram = np.einsum("nk,nl->kl", basis, basis) / len(basis)
     right = np.einsum("nk,nc->kc", basis, target) / len(basis)

@@ -80,6 +80,12 @@ class Provenance:
     input: dict[str, Any] = field(default_factory=dict)
     diagnostics: Diagnostics = field(default_factory=Diagnostics)
 
+    @property
+    def known(self) -> frozenset[str]:
+        """What was given besides the photo: "shape", "light", "depth", "priors"."""
+        names = self.input.get("known")  # from a file, which may hold anything
+        return frozenset(map(str, names)) if isinstance(names, list) else frozenset()
+
 
 @dataclass(frozen=True)
 class IdentityErrors:

@@ -96,6 +96,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         raise InputError("the refined result cannot replace its input: choose another folder")
     require_writable_result(options.output, inputs=(options.photo,))
     stored = load_part(options.result)
+    if options.light:
+        from ..refine.refine import require_refinable
+
+        require_refinable(stored.result)
     if options.photo is not None:
         _require_same(options.photo, stored.result)
     with Checkpoint(options.output) as checkpoint:

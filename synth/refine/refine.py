@@ -122,12 +122,13 @@ def refine(
     Raises
     ------
     InputError
-        If the result is refined already, its light is zero, or Mitsuba is missing.
+        If the light is refined already, was given to the decomposition or is zero, or Mitsuba is
+        missing.
     Cancelled
         If the user cancels.
     """
     options, monitor = options or RefineOptions(), monitor or Monitor()
-    _check(d)
+    require_refinable(d)
     scale, surface = working_scale(d), Surface(d, part)
     points, stages = surface.points_at(scale), KeptLight.of(d, (options, part), kept)
 
@@ -238,9 +239,26 @@ def fit_environment(
     )
 
 
-def _check(d: Decomposition) -> None:
+def require_refinable(d: Decomposition) -> None:
+    """Check that the light of a result can be refined.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Raises
+    ------
+    InputError
+        If it is refined already, was given to the decomposition, or is zero.
+    """
     if d.visibility is not None:
-        raise InputError("the result is refined already: give the one that isc decompose wrote")
+        raise InputError(
+            "the light of the result is refined already: give the result that isc decompose wrote"
+        )
+    if "light" in d.provenance.known:
+        raise InputError(
+            "the light of the result is exact, as it was given to isc decompose: leave out --light"
+        )
     if not (d.shading[d.mask] > 0).all():
         raise InputError("the light of the result is zero somewhere: decompose the photo again")
 

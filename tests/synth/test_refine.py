@@ -269,6 +269,11 @@ def test_bad_inputs_are_refused_and_nothing_is_written(tmp_path: Path) -> None:
         with pytest.raises(InputError, match=message):
             command(words)
         assert not output.exists()
+    lit = replace(glossy(32), provenance=Provenance(input={"known": ["light"]}))
+    save(lit, tmp_path / "lit")
+    with pytest.raises(InputError, match="light of the result is exact"):
+        command([str(tmp_path / "lit"), "--light", "-o", str(output)])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["lit", "photo.png", "start"]
     dark = dome()
     with pytest.raises(InputError, match="light of the result is zero"):
         refine(replace(dark, shading=np.zeros_like(dark.shading)))

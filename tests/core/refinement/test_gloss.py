@@ -138,6 +138,25 @@ def test_the_highlight_comes_to_lie_where_the_photo_shows_it() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("known", ["shape", "light"])
+def test_what_the_user_has_given_stays(known: str) -> None:
+    start = replace(glossy(48), provenance=Provenance(input={"known": [known]}))
+    done = refine_gloss(start)
+    d = done.result
+    assert d.brdf is not None and not d.identity_errors().broken()
+    assert degrees_between(d.brdf.direction, TURNED) > 1, "the lamp moves"
+    same = [np.array_equal(getattr(d, name), getattr(start, name)) for name in ("normal", "height")]
+    assert all(same) if known == "shape" else not any(same)
+    assert np.array_equal(d.illumination, start.illumination)
+
+
+@pytest.mark.parametrize("found", [None, "shape", {"shape": 1}, 3])
+def test_what_anybodys_file_says_was_given_may_be_anything(found: object) -> None:
+    assert Provenance(input={"known": found}).known == frozenset()
+    assert Provenance(input={"known": ["shape", 2]}).known >= {"shape"}
+
+
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_bytes_and_the_folder_keeps_them(tmp_path: Path) -> None:
     first, second = (refine_gloss(glossy(48)).result for _ in range(2))
     for name in ("normal", "height", "shading", "reflectance"):
