@@ -190,7 +190,7 @@ def light_views(views: ViewBatch, material: Material, lights: Lights) -> LitView
             )
             shading = shading.index_add(0, which, direct)
             gloss = gloss.index_add(0, which, shine)
-    mean = (shading * material.albedo).mean(1, keepdim=True)
+    mean = views.mean(shading * material.albedo)
     shading = shading + lights.bounce[:, None, None] * (1 - open_share) * mean
     shading, gloss = _as_given(views, lights, shading, gloss)
     diffuse = material.albedo * shading

@@ -95,7 +95,7 @@ def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank
         picture[:, :-1],
         picture[:, -1:],
         lit.coefficients,
-        _background(lit, recipes),
+        _background(views, lit, recipes),
         lamps,
         strongest,
         recipes["kind"],
@@ -103,10 +103,10 @@ def make_pictures(views: ViewBatch, recipes: dict[str, torch.Tensor], bank: Bank
     )
 
 
-def _background(lit: LitViews, recipes: dict[str, torch.Tensor]) -> torch.Tensor:
+def _background(views: ViewBatch, lit: LitViews, recipes: dict[str, torch.Tensor]) -> torch.Tensor:
     """A colour (B, 3) behind the object, from black to as bright as its brightest parts."""
     level = (recipes["shifts"][:, 0, :1] * 2).clamp(0, 2)
-    return level * lit.diffuse.mean(1)
+    return level * views.mean(lit.diffuse)[:, 0]
 
 
 def _lamps(views: ViewBatch, recipes: dict[str, torch.Tensor]) -> tuple[torch.Tensor, torch.Tensor]:
@@ -114,7 +114,7 @@ def _lamps(views: ViewBatch, recipes: dict[str, torch.Tensor]) -> tuple[torch.Te
     power = recipes["power"].mean(-1)
     toward = views.directions.gather(1, recipes["lamp"][..., None].expand(-1, -1, 3))
     lamps = recipes["lamp"][:, None].expand(-1, views.normal.shape[1], -1)
-    light = power * views.reached.gather(2, lamps).float().mean(1) / 255
+    light = power * views.mean(views.reached.gather(2, lamps).float())[:, 0] / 255
     ambient = recipes["ambient"].mean(-1)
     counts = light > _LEAST_LAMP * light.sum(1, keepdim=True).clamp(min=1e-6)
     counts &= light > _LEAST_LIT * ambient[:, None]

@@ -100,6 +100,20 @@ class ViewBatch(TensorBatch):
     directions: torch.Tensor
     solid: torch.Tensor
 
+    def mean(self, values: torch.Tensor) -> torch.Tensor:
+        """Average values over the pixels of each view, without those that are filled up.
+
+        Parameters
+        ----------
+        values : (B, P, C) tensor
+
+        Returns
+        -------
+        (B, 1, C) tensor
+        """
+        own = (self.index < SIDE * SIDE)[..., None].to(values.dtype)
+        return (values * own).sum(1, keepdim=True) / own.sum(1, keepdim=True).clamp(min=1)
+
 
 def batch_of(views: Sequence[PreparedView]) -> ViewBatch:
     """Collect views.

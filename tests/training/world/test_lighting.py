@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.spherical_harmonics import real_sh
 from tests.training.world.analytic_views import ellipsoid_view
+from tests.training.world.test_recipes import ATLAS, bank
 from training.world.lighting import (
     Lights,
     Material,
@@ -21,6 +22,9 @@ from training.world.lighting import (
     light_coefficients,
     light_views,
 )
+from training.world.lit_pictures import make_pictures
+from training.world.pictures import stacked
+from training.world.recipes import Shares, draw_recipe
 from training.world.reflectance import reflected_share
 from training.world.view_batches import ViewBatch, batch_of, prepared
 
@@ -112,6 +116,19 @@ def test_uniform_surroundings_shade_a_convex_body_evenly(views: ViewBatch) -> No
     toward = torch.tensor([0.0, 0, 1])
     assert (basis_of(toward) @ lit.coefficients).abs().max() < 0.05
     assert lit.coefficients[:, [1, 3, 4, 5, 7, 8]].abs().max() < 0.05
+
+
+def test_the_light_of_a_body_does_not_depend_on_others_in_the_batch() -> None:
+    """Half of the directions are hidden, so that the body lights itself."""
+    views = [prepared(replace(one, visible=one.visible & np.uint8(0xAA))) for one in VIEWS]
+    small, shares = views[1], Shares(kinds=(1, 0, 0), lights=(0, 0, 0, 1, 0))
+    assert len(small.index) < 0.7 * len(views[0].index)
+    rng = np.random.default_rng(4)
+    recipes = [draw_recipe(v.directions, v.up, ATLAS, np.arange(1), rng, shares) for v in views]
+    alone = make_pictures(batch_of([small]), stacked(recipes[1:]), bank())
+    beside = make_pictures(batch_of(views), stacked(recipes), bank()).chosen(torch.tensor([1]))
+    for name in ("layers", "ground"):
+        torch.testing.assert_close(getattr(alone, name), getattr(beside, name))
 
 
 def test_harmonics_that_are_given_are_the_shading(views: ViewBatch) -> None:
