@@ -88,7 +88,7 @@ def seen_bodies(numbers: range, folder: Path, panoramas: Path) -> Iterator[SeenB
     SeenBody
         Without those that cannot be traced or decomposed.
     """
-    held_out = [one.radiance for one in read_panoramas(panoramas, 0) if one.held_out]
+    held_out = [one.radiance for one in read_panoramas(panoramas) if one.held_out]
     atlas = make_atlas(_SEED, _PATTERNS)
     bank = bank_of(held_out, atlas)
     for number in numbers:

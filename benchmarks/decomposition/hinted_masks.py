@@ -79,7 +79,7 @@ def composites(
     rng = np.random.default_rng(_SEED)
     torch.manual_seed(_SEED)
     pictures = [masked_cutout(path) for path in sorted(photos.glob("*.png"))]
-    rooms, patterns = panoramas_in(panoramas, 0, held_out=True), np.zeros((1, 8, 8), np.uint8)
+    rooms, patterns = panoramas_in(panoramas, held_out=True), np.zeros((1, 8, 8), np.uint8)
     ingredients = Ingredients(np.stack(pictures), rooms, patterns)
     yield from composites_of_targets(ingredients, (0, 0.5, 0.5), count, rng)
 

@@ -109,7 +109,7 @@ def balanced_scenes(
 
     torch.manual_seed(seed)
     found = read_world([world], panoramas, (Split.UNSEEN_BODY,), 0)
-    pictures = read_pictures(panoramas, 0)
+    pictures = read_pictures(panoramas)
     paints = {Paint.ONE: 0.2, Paint.FEW: 0.4, Paint.STRONG_WITH_WHITE: 0.3, Paint.NATURAL: 0.1}
     shares = Shares(
         kinds=(1, 0, 0),

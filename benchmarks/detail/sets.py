@@ -161,7 +161,7 @@ def write_set(
         If the panoramas cannot be used or the folder cannot be written.
     """
     kept = part != Part.LIGHTS
-    rooms = [one.radiance for one in read_panoramas(panoramas, 0) if one.held_out == kept]
+    rooms = [one.radiance for one in read_panoramas(panoramas) if one.held_out == kept]
     if kept:
         rooms = rooms[part == Part.TEST :: 2]
     for number in range(count):

@@ -142,7 +142,7 @@ def print_scenes(
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng([seed, glossy, *map(ord, _SEED_WORDS[part])] + [1] * (not painted))
-    found = [one for one in read_panoramas(panoramas, 0) if one.held_out != (part == Part.TRAINING)]
+    found = [one for one in read_panoramas(panoramas) if one.held_out != (part == Part.TRAINING)]
     rooms = [_balanced(one.radiance) for one in found]
     if part != Part.TRAINING:
         rooms = rooms[part == Part.TEST :: 2]

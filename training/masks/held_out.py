@@ -85,7 +85,7 @@ def held_out_ingredients(
     """
     half, rng = PARTS.index(part), np.random.default_rng([seed, 11, PARTS.index(part)])
     torch.manual_seed(seed)
-    kept = panoramas_in(panoramas, seed, held_out=True)[half::2]
+    kept = panoramas_in(panoramas, held_out=True)[half::2]
     if not len(kept):
         raise InputError(
             f"{panoramas} has too few panoramas to hold one out for part {part}: twelve are enough"

@@ -133,7 +133,7 @@ def main() -> None:
         world = read_world(
             [given.world], given.panoramas, (Split.TRAIN, Split.UNSEEN_BODY), given.seed
         )
-        panoramas = [panoramas_in(given.panoramas, given.seed, k == 1) for k in range(2)]
+        panoramas = [panoramas_in(given.panoramas, k == 1) for k in range(2)]
     except InputError as error:
         parser.error(str(error))
     given.output.mkdir(parents=True, exist_ok=True)

@@ -187,6 +187,7 @@ def read_world(
     splits : sequence of Split
         What to read.
     seed : int
+        Of the procedural environments.
 
     Returns
     -------
@@ -195,7 +196,7 @@ def read_world(
     Raises
     ------
     InputError
-        If a folder is no world, or there are no views.
+        If a folder is no world, there are no views, or no panorama can be held out.
     """
     with ThreadPoolExecutor() as pool:  # unpacking leaves other threads alone
         packs = list(pool.map(read_pack, [path for path in paths if path.is_file()]))
@@ -205,7 +206,7 @@ def read_world(
         raise InputError(f"{paths[0]} has no views for training: build more bodies")
     if panoramas is None and not packs:
         raise InputError("name a folder of panoramas with --panoramas; only packs have their own")
-    found = packs[0].panoramas if panoramas is None else read_panoramas(panoramas, seed)
+    found = packs[0].panoramas if panoramas is None else read_panoramas(panoramas)
     rng = np.random.default_rng([seed, 7])
     procedural = [
         make(rng) for _ in range(_PROCEDURAL) for make in (procedural_room, procedural_sky, studio)
@@ -213,6 +214,8 @@ def read_world(
     atlas = packs[0].atlas if packs else read_patterns(folders[0])
     bank = bank_of([*(one.radiance for one in found), *procedural], atlas)
     held_out = np.array([one.held_out for one in found] + [False] * len(procedural))
+    if not held_out.any():
+        raise InputError("there are too few panoramas to hold one out: six are enough")
     photographed = np.flatnonzero(~held_out[: len(found)])
     training = np.concatenate([np.flatnonzero(~held_out), np.repeat(photographed, _OFTEN)])
     return World(views, atlas, bank, training, np.flatnonzero(held_out))

@@ -61,14 +61,12 @@ class PanoramaPhoto:
     unbalanced: np.ndarray
 
 
-def read_pictures(folder: Path, seed: int) -> list[tuple[Panorama, np.ndarray]]:
+def read_pictures(folder: Path) -> list[tuple[Panorama, np.ndarray]]:
     """Read panoramas with all their pixels.
 
     Parameters
     ----------
     folder : Path
-    seed : int
-        Of `read_panoramas`, which says which are held out.
 
     Returns
     -------
@@ -83,7 +81,7 @@ def read_pictures(folder: Path, seed: int) -> list[tuple[Panorama, np.ndarray]]:
     files = {path.stem: path for path in folder.iterdir() if path.suffix.lower() in FILES}
     return [
         (one, read_linear(files[one.name], "linear").astype(float))
-        for one in read_panoramas(folder, seed)
+        for one in read_panoramas(folder)
     ]
 
 

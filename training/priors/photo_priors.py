@@ -85,7 +85,7 @@ def photos_of(
     """
     rngs = np.random.default_rng(seed), np.random.default_rng([seed, 1])
     training, held_out = list[PanoramaPhoto](), list[PanoramaPhoto]()
-    for panorama, radiance in read_pictures(panoramas, 0):
+    for panorama, radiance in read_pictures(panoramas):
         into, rng = (held_out, rngs[1]) if panorama.held_out else (training, rngs[0])
         into += [photograph(panorama, radiance, rng) for _ in range(each)]
     return training, held_out

@@ -73,5 +73,5 @@ class TabletopSources:
         references = [one for one in listed if split_of(one.name) == wanted]
         if not references:
             raise InputError("no object is left: raise --built")
-        found = list(panoramas_in(panoramas, 0, held_out=held_out))
+        found = list(panoramas_in(panoramas, held_out))
         return cls(references, found, read_patterns(world))

@@ -18,14 +18,12 @@ ROWS = 256
 _MAX_LIGHT = 6e4  # half floats end at 65504
 
 
-def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
+def panoramas_in(folder: Path, held_out: bool) -> np.ndarray:
     """Read panoramas at one size, with the split of `read_panoramas`.
 
     Parameters
     ----------
     folder : Path
-    seed : int
-        Determines which are held out.
     held_out : bool
         Whether to read the held-out ones, or the others.
 
@@ -39,7 +37,7 @@ def panoramas_in(folder: Path, seed: int, held_out: bool) -> np.ndarray:
     InputError
         If there is none, or one cannot be used.
     """
-    wanted = {one.name for one in read_panoramas(folder, seed) if one.held_out == held_out}
+    wanted = {one.name for one in read_panoramas(folder) if one.held_out == held_out}
     size, found = (ROWS, 2 * ROWS), list[np.ndarray]()
     for path in sorted(folder.iterdir()):
         if path.suffix.lower() in FILES and path.stem in wanted:

@@ -39,6 +39,7 @@ from isc_core.shading.environment_map import (
 ROWS = 32
 FILES = (".exr", ".hdr")
 HELD_OUT_OF = 6  # one panorama of so many is held out
+_SPLIT = 0  # seed of the choice: with one of each run, a run would learn from held-out light
 _SAMPLES = 4  # a pixel's side, for rotation and lobes
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _LEAST_SHADING = 1e-3  # of the brightest: where no light comes from, the logarithm has no value
@@ -63,18 +64,17 @@ class Panorama:
     held_out: bool
 
 
-def read_panoramas(folder: Path, seed: int) -> list[Panorama]:
+def read_panoramas(folder: Path) -> list[Panorama]:
     """Read all latitude-longitude images of a folder and split them.
 
-    One of six in the order of names is held out. If possible, it is one without others of the same
-    place (the same name but for a number), whose light a network would have seen in training.
+    One of six in the order of names is held out, in every program the same. If possible, it is one
+    without others of the same place (the same name but for a number), whose light a network would
+    have seen in training.
 
     Parameters
     ----------
     folder : Path
         With .exr or .hdr files, twice as wide as high.
-    seed : int
-        Chooses which are held out.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def read_panoramas(folder: Path, seed: int) -> list[Panorama]:
         raise InputError(
             f"{folder} has no {' or '.join(FILES)} file: give a folder of latitude-longitude images"
         )
-    held_out = _held_out([path.stem for path in files], np.random.default_rng(seed))
+    held_out = _held_out([path.stem for path in files], np.random.default_rng(_SPLIT))
     return [Panorama(path.stem, _read(path), path.stem in held_out) for path in files]
 
 

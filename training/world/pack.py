@@ -160,7 +160,7 @@ def pack_worlds(
     most : int
         Bytes that it may have.
     seed : int
-        Chooses views, and which panoramas are held out.
+        Chooses views.
     packed : sequence of View
         Left out; their bodies come last.
 
@@ -184,7 +184,7 @@ def pack_worlds(
     atlas = read_patterns(folders[0])
     few = slice(_PATTERNS)
     atlas = Atlas(atlas.maps[few], atlas.kinds[few], atlas.tileable[few])
-    found, count, size, whole = read_panoramas(panoramas, seed), _FIRST_GUESS, 0, 0
+    found, count, size, whole = read_panoramas(panoramas), _FIRST_GUESS, 0, 0
     everything = sum(map(len, views.values()))
     for _ in range(_GUESSES):
         chosen = {

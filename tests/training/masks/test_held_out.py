@@ -13,7 +13,7 @@ from tests.training.world.analytic_views import ellipsoid_view
 from tests.training.world.test_environments import photo, write
 from training.masks import held_out
 from training.networks import scene_batches
-from training.networks.scene_batches import World
+from training.networks.scene_batches import World, read_world
 from training.world.files import (
     VIEWS,
     Split,
@@ -75,6 +75,22 @@ def test_the_parts_share_no_body_and_no_light(
     assert first and second and not first & second and first | second == set(names)
     assert len(light) == len(other) == 1 and light != other
     assert not np.array_equal(made[0].panoramas, made[1].panoramas)
+
+
+@pytest.mark.slow
+def test_panoramas_are_held_out_whatever_the_seed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(scene_batches, "_PROCEDURAL", 0)
+    world, hdri, splits = world_folder(tmp_path, HELD_OUT[:1], 12), tmp_path / "hdri", list(Split)
+    found = [read_world([world], hdri, splits[1:2], seed) for seed in (0, 35)]
+    first, other = (one.held_out_environments.tolist() for one in found)
+    assert first == other and len(first) == 2
+    assert not set(first) & set(found[1].training_environments.tolist())
+    for path in sorted(hdri.iterdir())[5:]:
+        path.unlink()
+    with pytest.raises(InputError, match="too few panoramas"):
+        read_world([world], hdri, splits[1:2], 0)
 
 
 @pytest.mark.slow

@@ -32,28 +32,26 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_a_panorama_keeps_its_light(folder: Path) -> None:
-    first = read_panoramas(folder, 0)[0]
+    first = read_panoramas(folder)[0]
     assert first.name == "placea" and first.radiance.shape == (ROWS, 2 * ROWS, 3)
     np.testing.assert_allclose(light(first.radiance), light(photo(2 * ROWS, 0)), rtol=1e-6)
 
 
 @pytest.mark.slow
 def test_one_of_six_is_held_out_and_the_split_is_stable(folder: Path) -> None:
-    def held_out(seed: int) -> list[str]:
-        return [one.name for one in read_panoramas(folder, seed) if one.held_out]
+    def held_out() -> list[str]:
+        return [one.name for one in read_panoramas(folder) if one.held_out]
 
-    assert len(held_out(3)) == 2 and held_out(3) == held_out(3)
-    assert len({tuple(held_out(seed)) for seed in range(6)}) > 1
-    before = held_out(3)
+    before = held_out()
+    assert len(before) == 2 and held_out() == before
     write(folder / "z_later.exr", photo(2 * ROWS))
-    assert held_out(3) == before
+    assert held_out() == before
 
 
 def test_what_is_held_out_has_no_sibling_to_learn_from(tmp_path: Path) -> None:
     for name in ("hall_01", "hall_02", "hall_03", "hall_04", "hall_05", "quay"):
         write(tmp_path / f"{name}.exr", photo())
-    for seed in range(5):
-        assert [one.name for one in read_panoramas(tmp_path, seed) if one.held_out] == ["quay"]
+    assert [one.name for one in read_panoramas(tmp_path) if one.held_out] == ["quay"]
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -0.1])
@@ -62,15 +60,15 @@ def test_a_panorama_with_impossible_light_is_refused(tmp_path: Path, value: floa
     picture[3, 4, 1] = value
     write(tmp_path / "bad.exr", picture)
     with pytest.raises(InputError, match="bad.exr has NaN, infinite or negative"):
-        read_panoramas(tmp_path, 0)
+        read_panoramas(tmp_path)
 
 
 def test_a_folder_without_panoramas_or_with_other_pictures_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="has no .exr or .hdr file"):
-        read_panoramas(tmp_path, 0)
+        read_panoramas(tmp_path)
     write(tmp_path / "square.exr", np.ones((64, 64, 3), np.float32))
     with pytest.raises(InputError, match="64 x 64 pixels"):
-        read_panoramas(tmp_path, 0)
+        read_panoramas(tmp_path)
 
 
 def test_lobes_keep_the_mean_and_a_uniform_environment() -> None:

@@ -20,14 +20,14 @@ def write(path: Path, radiance: float) -> None:
 def test_panoramas_have_the_split_of_the_other_networks(tmp_path: Path) -> None:
     for k in range(6):
         write(tmp_path / f"{'abcdef'[k]}.exr", k + 1)
-    held_out = [k for k, one in enumerate(read_panoramas(tmp_path, 0)) if one.held_out]
-    found = panoramas_in(tmp_path, 0, held_out=True)
+    held_out = [k for k, one in enumerate(read_panoramas(tmp_path)) if one.held_out]
+    found = panoramas_in(tmp_path, held_out=True)
     assert found.shape == (1, ROWS, 2 * ROWS, 3) and held_out == [round(float(found.mean())) - 1]
-    others = panoramas_in(tmp_path, 0, held_out=False).mean((1, 2, 3))
+    others = panoramas_in(tmp_path, held_out=False).mean((1, 2, 3))
     assert sorted([*others.round().astype(int) - 1, *held_out]) == list(range(6))
 
 
 def test_too_few_panoramas_are_refused(tmp_path: Path) -> None:
     write(tmp_path / "one.exr", 1)
     with pytest.raises(InputError, match="too few panoramas"):
-        panoramas_in(tmp_path, 0, held_out=True)
+        panoramas_in(tmp_path, held_out=True)
