@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
+from pickle import UnpicklingError
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
@@ -30,12 +31,15 @@ import torch
 from torch import nn
 from torch.optim.swa_utils import get_ema_multi_avg_fn
 
-from isc_core.io.atomic import new_file
+from isc_core.cli.interface.values import count, not_negative, whole
+from isc_core.errors import InputError
+from isc_core.io.atomic import new_file, require_writable_file
 
 from .devices import available_device, halves_are_fast
 
 _REPORT_EVERY, _CHECKPOINT_EVERY = 100, 1000  # steps
 _VALIDATION_BATCHES = 8
+_SIDE_STEP = 32  # pixels
 _CHECKPOINT_KEYS = {"step", "network", "average", "optimizers"}
 
 Batch = tuple[torch.Tensor, ...]
@@ -145,19 +149,44 @@ def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -
     """
     add = parser.add_argument
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write weights")
-    add("--steps", type=int, default=steps, help="optimiser steps (default: %(default)s)")
-    add("--batch", type=int, default=batch, help="samples per batch (default: %(default)s)")
-    add("--seed", type=int, default=0, help="seed of weights and samples (default: %(default)s)")
-    add("--threads", type=int, default=0, help="PyTorch threads (default: all)")
+    add("--steps", type=whole, default=steps, help="optimiser steps (default: %(default)s)")
+    add("--batch", type=whole, default=batch, help="samples per batch (default: %(default)s)")
+    add("--seed", type=count, default=0, help="seed of weights and samples (default: %(default)s)")
+    add("--threads", type=count, default=0, help="PyTorch threads (default: all)")
     add(
         "--workers",
-        type=int,
+        type=count,
         default=0,
         help="processes that draw samples; 0, the default: none, the fastest on a CPU",
     )
     add("--device", default="cpu", type=available_device, help="cpu or cuda (default: %(default)s)")
-    add("--minutes", type=float, default=0, help="end after so long (default: after --steps)")
+    add(
+        "--minutes", type=not_negative, default=0, help="end after so long (default: after --steps)"
+    )
     add("--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint")
+
+
+def photo_side(text: str) -> int:
+    """Parse the side of photos on a command line.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    int
+        Pixels.
+
+    Raises
+    ------
+    argparse.ArgumentTypeError
+        If it is no multiple of 32, as the levels of the networks need it.
+    """
+    side = whole(text)
+    if side % _SIDE_STEP:
+        raise argparse.ArgumentTypeError(f"{text} is not a multiple of {_SIDE_STEP} pixels")
+    return side
 
 
 def run_options(arguments: argparse.Namespace) -> RunOptions:
@@ -170,7 +199,13 @@ def run_options(arguments: argparse.Namespace) -> RunOptions:
     Returns
     -------
     RunOptions
+
+    Raises
+    ------
+    InputError
+        If the output cannot be written: hours later would be too late.
     """
+    require_writable_file(arguments.output)
     return RunOptions(
         arguments.output,
         arguments.steps,
@@ -234,8 +269,8 @@ def fit(
 
     Raises
     ------
-    ValueError
-        If a checkpoint does not fit the network.
+    InputError
+        If a checkpoint cannot be read or does not fit the network.
     """
     if options.threads:
         torch.set_num_threads(options.threads)
@@ -376,9 +411,14 @@ class _Report:
 
 
 def _checkpoint(path: Path) -> dict[str, Any]:
-    found = torch.load(path, weights_only=True, map_location="cpu")
+    try:
+        found = torch.load(path, weights_only=True, map_location="cpu")
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    except (RuntimeError, UnpicklingError, EOFError):
+        found = None
     if not isinstance(found, dict) or not found.keys() >= _CHECKPOINT_KEYS:
-        raise ValueError(f"{path} is not a training checkpoint")
+        raise InputError(f"{path} is not a training checkpoint: give the .pt file of a run")
     return found
 
 
@@ -392,8 +432,9 @@ def _restore(
         for optimizer, state in zip(optimizers, kept["optimizers"], strict=True):
             optimizer.load_state_dict(state)
     except (RuntimeError, ValueError) as error:
-        raise ValueError(
-            f"the checkpoint is of another network, or of another kind of processor: {error}"
+        reason = str(error).splitlines()[-1].strip()
+        raise InputError(
+            f"the checkpoint is of another network, or of another kind of processor: {reason}"
         ) from error
     return int(kept["step"]), float(kept.get("seconds", 0))
 

@@ -11,11 +11,12 @@ pytest.importorskip("torch")
 
 import torch
 
+from isc_core.errors import InputError
 from isc_core.networks.scene_network import SceneNetwork
 from training.devices import available_device
 from training.loop import RunOptions, fit
 from training.networks.scene_module import SceneNetworkModule
-from training.networks.scene_network import SCHEDULE
+from training.networks.scene_network import SCHEDULE, main
 from training.world.samples import Sample
 
 from .test_scene_network import WIDTHS, batch
@@ -71,11 +72,40 @@ def test_another_networks_checkpoint_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "first.npz"
     fit(network(), draw, SCHEDULE, options(path))
     other = SceneNetworkModule((4, 8, 8, 10))
-    with pytest.raises(ValueError, match="another network"):
+    with pytest.raises(InputError, match=r"another network, [^\n]*size mismatch[^\n]*\Z"):
         fit(other, draw, SCHEDULE, options(path, resume=path.with_suffix(".pt")))
     torch.save({"weights": torch.zeros(1)}, tmp_path / "other.pt")
-    with pytest.raises(ValueError, match="not a training checkpoint"):
-        fit(other, draw, SCHEDULE, options(path, resume=tmp_path / "other.pt"))
+    for name, match in (
+        ("other.pt", "not a training checkpoint"),
+        ("first.npz", "not a training checkpoint"),
+        ("none.pt", "cannot be read"),
+    ):
+        with pytest.raises(InputError, match=match):
+            fit(other, draw, SCHEDULE, options(path, resume=tmp_path / name))
+
+
+def test_options_that_no_run_can_use_are_refused_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["scene_network", str(tmp_path), "-o", str(tmp_path / "out.npz")]
+    for more, match in (
+        (["--side", "50"], "50 is not a multiple of 32 pixels"),
+        (["--steps", "0"], "1 or more"),
+        (["--batch", "0"], "1 or more"),
+        (["--rate", "0"], "not a number"),
+        (["-o", str(tmp_path)], "is a folder"),
+        ([], "is no world"),
+    ):
+        monkeypatch.setattr("sys.argv", [*words, *more])
+        with pytest.raises(SystemExit) as found:
+            main()
+        assert found.value.code == 2 and match in capsys.readouterr().err.splitlines()[-1]
+
+
+def test_arrays_that_are_no_weights_are_refused() -> None:
+    for arrays in ({}, {"maps": np.zeros(3)}, {"weight00": np.zeros(3), "weight01": np.zeros(3)}):
+        with pytest.raises(InputError, match="weights of another network"):
+            SceneNetworkModule.of(arrays)
 
 
 def test_a_device_that_is_not_there_is_refused_in_one_line() -> None:

@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.io.atomic import new_file
+from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.io.npy import read_arrays
 from isc_core.masking.components import shows_several
 from isc_core.masking.confidence import mask_overlap
@@ -98,9 +98,9 @@ def main() -> None:
     add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write it")
     given = parser.parse_args()
     try:
-        arrays = read_arrays(given.weights)
+        require_writable_file(given.output)
+        arrays, network = read_arrays(given.weights), MaskNetwork.read(given.weights)
         ingredients = held_out_ingredients(given.world, given.panoramas, "A", seed=given.seed)
-        network = MaskNetwork.read(given.weights)
         folder = given.tabletops
         tabletops = [] if folder is None else list(held_out_tabletops(folder, given.seed))
     except InputError as error:

@@ -24,11 +24,12 @@ from pathlib import Path
 
 import torch
 
+from isc_core.cli.interface.values import positive, share
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
 from isc_core.networks.mask_network import SIDE
 
-from ..loop import Schedule, add_run_arguments, fit, run_options
+from ..loop import Schedule, add_run_arguments, fit, photo_side, run_options
 from ..tabletops.pictures import read_pictures
 from .composites import CompositeDraws, Composites
 from .difficulty import DIFFICULT
@@ -50,24 +51,34 @@ def main() -> None:
     add("folders", type=Path, nargs="+", metavar="FOLDER", help="ingredients of composites")
     add("--tabletops", type=Path, metavar="FOLDER", help="rendered pictures, half of the photos")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
-    add("--side", type=int, default=SIDE, metavar="PX", help="of photos (default: %(default)s)")
-    add("--rate", type=float, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
-    add("--hinted", type=float, default=0.5, help="share with hints (default: %(default)s)")
+    add(
+        "--side",
+        type=photo_side,
+        default=SIDE,
+        metavar="PX",
+        help="of photos (default: %(default)s)",
+    )
+    add("--rate", type=positive, default=SCHEDULE.rate, help="learning rate (default: %(default)s)")
+    add("--hinted", type=share, default=0.5, help="share with hints (default: %(default)s)")
     add_run_arguments(parser, steps=20_000, batch=32)
     arguments = parser.parse_args()
+    try:
+        _train(arguments)
+    except InputError as error:
+        parser.error(str(error))
+
+
+def _train(arguments: argparse.Namespace) -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     network = MaskNetworkModule()
-    try:
-        training, held_out = (
-            Ingredients.read([folder / f"{name}{SUFFIX}" for folder in arguments.folders])
-            for name in SETS
-        )
-        weights = None if arguments.weights is None else read_arrays(arguments.weights)
-        network.begin(weights)
-        pictures = [] if arguments.tabletops is None else list(read_pictures(arguments.tabletops))
-    except InputError as error:
-        parser.error(str(error))
+    training, held_out = (
+        Ingredients.read([folder / f"{name}{SUFFIX}" for folder in arguments.folders])
+        for name in SETS
+    )
+    weights = None if arguments.weights is None else read_arrays(arguments.weights)
+    network.begin(weights)
+    pictures = [] if arguments.tabletops is None else list(read_pictures(arguments.tabletops))
     side, size = arguments.side, options.batch // 2 if pictures else options.batch
     draw = CompositeDraws(size, arguments.hinted, _SHARES, varied=True, difficulty=DIFFICULT)
     compose = Composites(training, draw, side, options.device)

@@ -22,7 +22,7 @@ import torch
 from torch.nn import functional
 
 from isc_core.errors import InputError
-from isc_core.io.atomic import new_file
+from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.io.npy import read_arrays
 from isc_core.networks.scene_network import (
     FACTOR_SCALE,
@@ -123,11 +123,12 @@ def main() -> None:
     add("--seed", type=int, default=0, help="seed of the fit (default: %(default)s)")
     given = parser.parse_args()
     try:
+        require_writable_file(given.output)
         arrays = dict(read_arrays(given.weights))
+        network = SceneNetworkModule.of(arrays)
         world = read_world(given.worlds, given.panoramas, (Split.UNSEEN_BODY,), given.seed)
     except InputError as error:
         parser.error(str(error))
-    network = SceneNetworkModule.of(arrays)
     draw = SceneBatches(
         SceneDraws(
             world.views[Split.UNSEEN_BODY],

@@ -83,14 +83,18 @@ def main() -> None:
     add_photo_arguments(parser, SCHEDULE.rate)
     add_run_arguments(parser, steps=20_000, batch=32)
     arguments = parser.parse_args()
+    try:
+        _train(arguments)
+    except InputError as error:
+        parser.error(str(error))
+
+
+def _train(arguments: argparse.Namespace) -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     network = HighlightNetworkModule()
-    try:
-        world, start = read_given(arguments, options.seed)
-        network.begin(start)
-    except InputError as error:
-        parser.error(str(error))
+    world, start = read_given(arguments, options.seed)
+    network.begin(start)
     draw = SceneDraws(
         world.views[Split.TRAIN],
         world.atlas,

@@ -13,10 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from isc_core.cli.interface.values import positive
 from isc_core.errors import InputError
 from isc_core.io.npy import read_arrays
 
-from ..loop import Net, RunOptions, Schedule, fit
+from ..loop import Net, RunOptions, Schedule, fit, photo_side
 from ..world.environments import read_panoramas
 from ..world.files import Split, read_patterns, views_in
 from ..world.pack import PackedWorld, read_pack
@@ -246,8 +247,14 @@ def add_photo_arguments(parser: argparse.ArgumentParser, rate: float) -> None:
     add("worlds", type=Path, nargs="+", metavar="WORLD", help="folders or packs of isc world")
     add("--panoramas", type=Path, metavar="DIR", help="panoramas (default: those of a pack)")
     add("--weights", type=Path, metavar="NPZ", help="start from the weights of an archive")
-    add("--side", type=int, default=OUTPUT, metavar="PX", help="of photos (default: %(default)s)")
-    add("--rate", type=float, default=rate, help="learning rate (default: %(default)s)")
+    add(
+        "--side",
+        type=photo_side,
+        default=OUTPUT,
+        metavar="PX",
+        help="of photos (default: %(default)s)",
+    )
+    add("--rate", type=positive, default=rate, help="learning rate (default: %(default)s)")
 
 
 def read_given(

@@ -2,12 +2,12 @@
 
 Equation: with n, y, s the truth at a pixel, m, y', s' the prediction and their scales,
 
-    |m - n|^2 + .1 (|t - t'|^2 / (2 d^2) + 2 log d)        normals, t their part in the plane
-    + (|y - y'| / b + log b) / 4                           log ratio of image and diffuse image
-    + (|s - s' - k| / c + log c) / 3 + |grad (s - s')|     log shading, k its median offset
-    + .1 (binary cross entropy of depth edges)
-    + .02 (negative log likelihood of the light's 27 numbers, a Gaussian of low rank)
-    + .1 (cross entropies of the number and the place of lamps, and of the material)
+    1.5 |m - n|^2 + .1 (|t - t'|^2 / (4 d^2) + log d)      normals, t their part in the plane
+    + .2 (|y - y'| / b + log b)                            log ratio of image and diffuse image
+    + .25 (|s - s' - k| / c + log c) + .5 |grad (s - s')|  log shading, k its mean offset
+    + .1 |k| + .1 (binary cross entropy of depth edges)
+    + .1 (negative log likelihood of the light's 27 numbers, a Gaussian of low rank, over 27)
+    + .08, .04 and .1 (cross entropies of the number and the place of lamps, and of the material)
 
 each averaged over the object. Batch normalisation follows each convolution and is folded into it
 when the weights are written.
@@ -26,6 +26,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from isc_core.errors import InputError
 from isc_core.networks.encoder_decoder import BLOCK
 from isc_core.networks.layers import DARK
 from isc_core.networks.scene_network import (
@@ -143,10 +144,18 @@ class SceneNetworkModule(EncoderDecoderModule):
         Returns
         -------
         SceneNetworkModule
+
+        Raises
+        ------
+        InputError
+            If they are the weights of another network, or none.
         """
         convolutions = sum(name.startswith("weight") for name in arrays)
         levels = (convolutions + 1) // 4
-        network = cls(tuple(arrays[f"weight{2 * k:02d}"].shape[2] for k in range(levels)))
+        try:
+            network = cls(tuple(arrays[f"weight{2 * k:02d}"].shape[2] for k in range(levels)))
+        except (KeyError, IndexError, ValueError) as error:
+            raise InputError(f"these are the weights of another network: {error}") from error
         network.load_arrays(arrays)
         return network
 

@@ -23,6 +23,7 @@ from typing import Any
 
 import torch
 
+from isc_core.cli.interface.values import whole
 from isc_core.errors import InputError
 
 from ..loop import Schedule, add_run_arguments, run_options
@@ -71,18 +72,22 @@ def main() -> None:
     )
     add_photo_arguments(parser, SCHEDULE.rate)
     add = parser.add_argument
-    add("--widths", type=int, nargs="+", default=WIDTHS, metavar="N", help="channels by level")
+    add("--widths", type=whole, nargs="+", default=WIDTHS, metavar="N", help="channels by level")
     add("--without", nargs="+", default=[], choices=sorted(_ABLATIONS), help="leave out, to ablate")
     add_run_arguments(parser, steps=100_000, batch=32)
     arguments = parser.parse_args()
-    options = run_options(arguments)
-    torch.manual_seed(options.seed)
     try:
-        world, start = read_given(arguments, options.seed)
-        widths = tuple(arguments.widths)
-        network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
+        _train(arguments)
     except InputError as error:
         parser.error(str(error))
+
+
+def _train(arguments: argparse.Namespace) -> None:
+    options = run_options(arguments)
+    torch.manual_seed(options.seed)
+    world, start = read_given(arguments, options.seed)
+    widths = tuple(arguments.widths)
+    network = SceneNetworkModule(widths) if start is None else SceneNetworkModule.of(start)
     schedule = replace(SCHEDULE, rate=arguments.rate)
     shares = SHARES
     for name in arguments.without:
