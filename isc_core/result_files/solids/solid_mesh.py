@@ -23,7 +23,8 @@ and at least `_LEAST` sqrt(u) behind the front, so that the two meet only at the
 graphs over the same triangles and do not intersect, also with a pinhole camera, along whose rays
 the back lies. The texture of a rounded back is folded at the outline (see `texture_places`), that
 of the others is the texture of the pixel in front. Where the rim is soft, the closed part ends at
-its core, beyond which there is only the sheet (see `rim`).
+its core, beyond which there is only the sheet (see `rim`). There the back has vertices of its own,
+at the places of the front's, because it needs other normals.
 
 Citation: the membrane as inflation: P. Joshi and N. A. Carr, "Repousse: automatic inflation of 2D
 artwork", SBIM 2008, doi:10.2312/SBM/SBM08/049-055; outlines as the boundary of a smooth body: T.
@@ -152,12 +153,14 @@ def make_solid_mesh(
     middle = membrane(core & ~edge, edge, last, 0.0)
     middle = np.where(edge, last, middle)
     depth = FULLNESS * round_height if back is Back.ROUNDED else known - middle
-    behind = np.minimum(middle - depth, known - _LEAST * round_height)
+    seam = _seam(sheet, closed, core.shape)
+    behind = np.where(seam, known, np.minimum(middle - depth, known - _LEAST * round_height))
     mesh = _used(_joined(sheet, closed, heights, behind, front))
     if back is Back.MIRRORED:
         return mesh
-    hidden = ~mesh.front & core[mesh.pixels[:, 0], mesh.pixels[:, 1]]
-    outline = (np.arange(len(hidden)) < len(front))[hidden]
+    rows, columns = mesh.pixels.T
+    hidden = ~mesh.front & core[rows, columns]
+    outline = ((np.arange(len(hidden)) < len(front)) | seam[rows, columns])[hidden]
     mesh.texture[hidden] = folded_positions(
         u, section, mesh.places[hidden], mesh.pixels[hidden], outline
     )
@@ -230,15 +233,22 @@ def _core_faces(sheet: Outlined, thin: np.ndarray) -> np.ndarray:
     return ~alone & ~common[sheet.faces].all(1)
 
 
+def _seam(sheet: Outlined, closed: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """Pixels (H, W) with a vertex where the back meets the single sheet."""
+    found = np.zeros(shape, bool)
+    around = sheet.faces[~closed].ravel()
+    rows, columns = sheet.pixels[around[around < sheet.inner]].T
+    found[rows, columns] = True
+    return found
+
+
 def _joined(
     sheet: Outlined, closed: np.ndarray, heights: np.ndarray, behind: np.ndarray, front: np.ndarray
 ) -> SolidMesh:
-    """The sheet and the back, which share the points of the core's outline."""
+    """The sheet and the back, which share the points of a hard outline."""
     n, inner = len(heights), sheet.inner
     rows, columns = sheet.pixels[:inner].T
-    own = np.arange(n) < inner
-    own[sheet.faces[~closed]] = False
-    other = np.where(own[sheet.faces], sheet.faces + n, sheet.faces)[closed, ::-1]
+    other = np.where(sheet.faces < inner, sheet.faces + n, sheet.faces)[closed, ::-1]
     return SolidMesh(
         np.concatenate([sheet.places, sheet.places[:inner]]),
         np.concatenate([heights, behind[rows, columns]]),

@@ -11,7 +11,9 @@ from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.outline import outlined, smooth_cover
 from isc_core.result_files.solids.rim import Rim
 from isc_core.result_files.solids.solid_mesh import SolidMesh, make_solid_mesh
+from isc_core.result_files.solids.surface import make_solid, vertex_positions
 from isc_core.result_files.turned_view import turned_view
+from isc_core.shading.lights import VIEW
 
 CLOSED = (Back.FLAT, Back.ROUNDED, Back.MIRRORED)
 
@@ -197,13 +199,18 @@ def test_the_outline_follows_the_cover_between_the_pixels(radius: float) -> None
     assert soft < hard / 3 and soft < steps / 10
 
 
-def fur(back: Back) -> tuple[Rim, SolidMesh]:
-    """A ball whose rim is soft on the right."""
-    height, mask = hemisphere(40, 110)
+def soft_rim(mask: np.ndarray) -> Rim:
+    """The rim of a ball, soft on the right."""
     row, column = np.indices(mask.shape) - 55 + 0.3
     away = np.hypot(row, column) - 40
     soft = (column > 0) & (np.abs(away) < 16)
-    rim = Rim(np.where(soft, np.clip(0.5 - away / 20, 0, 1), np.clip(0.5 - away, 0, 1)), soft)
+    return Rim(np.where(soft, np.clip(0.5 - away / 20, 0, 1), np.clip(0.5 - away, 0, 1)), soft)
+
+
+def fur(back: Back) -> tuple[Rim, SolidMesh]:
+    """A ball whose rim is soft on the right."""
+    height, mask = hemisphere(40, 110)
+    rim = soft_rim(mask)
     return rim, make_solid_mesh(height, height / 40, mask, rim, back, 3000)
 
 
@@ -249,3 +256,18 @@ def test_the_texture_of_the_sheet_is_not_folded() -> None:
     rim, body = fur(Back.ROUNDED)
     thin = rim.sheet[body.pixels[:, 0], body.pixels[:, 1]]
     np.testing.assert_array_equal(body.texture[thin], body.places[thin])
+
+
+@pytest.mark.parametrize("back", [Back.ROUNDED, Back.MIRRORED])
+def test_the_back_behind_a_soft_rim_is_not_shaded_as_the_front(back: Back) -> None:
+    height, mask = hemisphere(40, 110)
+    row, column = np.indices(mask.shape) - 55 + 0.3
+    normal = np.where(mask[..., None], np.dstack([column, -row, height]) / 40, VIEW)
+    body = make_solid(height, normal, mask, soft_rim(mask), VIEW, back, 3000)
+    vertices = vertex_positions(body.mesh, None)
+    normals, faces = body.normals(vertices), body.mesh.faces
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    across = np.cross(b - a, c - a)
+    behind = across[:, 2] < 0
+    cosine = np.einsum("fx,fkx->fk", across[behind], normals[faces[behind]])
+    assert np.mean(cosine < 0) < 0.002  # all but a few slivers
