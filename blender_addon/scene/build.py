@@ -68,6 +68,7 @@ from .displacement import add_displacement, remove_displacement
 from .hand_edits import store_checksum
 from .placement import free_location, world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare, require_options
+from .shading_choice import shade, shading_choice, store_normals
 from .sun import ShownLight, ensure_lamps, ensure_sun, restore_light, shown_light
 from .texture_window import move_textures, store_window
 from .world import ensure_world, keep_world, world_of
@@ -391,12 +392,15 @@ def _ensure_object(
     material: bpy.types.Material,
 ) -> bpy.types.Object:
     obj, shadows = find_tagged(bpy.data.objects, key, OBJECT), prepared.options.own_shadows
+    store_normals(mesh)
     if obj is None:
         mesh.name = datablock_name(key)
         obj = tag(bpy.data.objects.new(datablock_name(key), mesh), key, OBJECT)
         shadows = not prepared.options.own_scene if shadows is None else shadows
     else:
         obj.shape_key_clear()
+        if (choice := shading_choice(obj.data)) is not None:
+            shade(mesh, choice)
         replace_mesh(obj.data, mesh)
     tag(mesh, key, "mesh")
     store_checksum(mesh, prepared.checksum)

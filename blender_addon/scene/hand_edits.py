@@ -13,9 +13,11 @@ import bpy
 import numpy as np
 
 from ..datablocks.mesh import CONFIDENCE, NORMAL, UV, MeshArrays
+from .shading_choice import SHARP_EDGE, SHARP_FACE, shading_choice
 
 _BUILT = "isc_built_crc32"
 _OWN_ATTRIBUTES = {"position", UV, NORMAL, CONFIDENCE}
+_SHADING = {SHARP_FACE, SHARP_EDGE}
 
 
 def store_checksum(mesh: bpy.types.Mesh, checksum: str) -> None:
@@ -78,8 +80,9 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     -------
     bool
         True with shape keys, vertex groups, levels of a Multiresolution modifier, further UV maps
-        or attributes, or faces of other materials, too. What an earlier version did not store is
-        taken for unchanged.
+        or attributes, faces of other materials, or single flat faces and sharp edges, too. Shade
+        Smooth and Shade Flat, which an update repeats, are no edits. What an earlier version did
+        not store is taken for unchanged.
     """
     mesh = obj.data
     # The mesh holds what was sculpted on them.
@@ -107,7 +110,9 @@ def _has_other_attributes(mesh: bpy.types.Mesh) -> bool:
         indices.data.foreach_get("value", values)
         if values.any():
             return True
-    return bool(names - _OWN_ATTRIBUTES - {"material_index"})
+    if names & _SHADING and shading_choice(mesh) is None:
+        return True
+    return bool(names - _OWN_ATTRIBUTES - _SHADING - {"material_index"})
 
 
 def _uv_checksum(mesh: bpy.types.Mesh) -> str:

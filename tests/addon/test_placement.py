@@ -284,6 +284,42 @@ def test_what_an_update_would_discard_is_an_edit_by_hand(result: ResultArrays, e
     assert not is_edited_by_hand(obj)
 
 
+@pytest.mark.parametrize(
+    "choose",
+    [
+        lambda mesh: mesh.shade_flat(),
+        lambda mesh: mesh.shade_smooth(),
+        lambda mesh: mesh.set_sharp_from_angle(angle=0.02),
+        lambda mesh: mesh.attributes.remove(mesh.attributes["custom_normal"]),
+    ],
+    ids=["flat", "smooth", "by angle", "normals cleared"],
+)
+def test_the_shading_of_the_mesh_is_kept_and_no_edit(result: ResultArrays, choose: Any) -> None:
+    """Shade Flat, and Clear Custom Split Normals, which shows it."""
+
+    def shading(mesh: Any) -> tuple[Any, ...]:
+        names = ("sharp_face", "sharp_edge")
+        flags = [mesh.attributes.get(name) for name in names]
+        sums = [None if flag is None else sum(one.value for one in flag.data) for flag in flags]
+        return "custom_normal" in mesh.attributes, *sums
+
+    obj = build_object(result, SHARED).object
+    choose(obj.data)
+    expected = shading(obj.data)
+    for _ in range(2):
+        assert not is_edited_by_hand(obj)
+        build_object(result, SHARED)
+        assert shading(obj.data) == expected
+
+
+@pytest.mark.parametrize("name", ["sharp_face", "sharp_edge"])
+def test_single_flat_faces_and_sharp_edges_are_edits(result: ResultArrays, name: str) -> None:
+    mesh = build_object(result, SHARED).object.data
+    domain = "FACE" if name == "sharp_face" else "EDGE"
+    mesh.attributes.new(name, "BOOLEAN", domain).data[9].value = True
+    assert is_edited_by_hand(bpy.data.objects["bump"])
+
+
 def test_sculpted_levels_are_an_edit_by_hand(result: ResultArrays) -> None:
     obj = build_object(result, SHARED).object
     bpy.context.view_layer.objects.active = obj
