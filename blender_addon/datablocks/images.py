@@ -9,7 +9,6 @@ Files are encoded here, in any thread, and not by Blender, which takes seconds f
 does it while the window waits. Blender decodes one when it is drawn for the first time.
 """
 
-import zlib
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -20,6 +19,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import linear_to_srgb, srgb_codes, srgb_to_linear
 from isc_core.io.png import encode_png
 
+from ..files.checksums import crc32_of
 from ..files.exr import encode_exr
 from .provenance import KEY, ROLE, all_tagged, datablock_name, is_isc_datablock, tag
 
@@ -142,7 +142,7 @@ class ImageFile:
 
     def __post_init__(self) -> None:
         # Computed here, in the thread that encodes: it takes as long as packing a large map.
-        object.__setattr__(self, "checksum", f"{zlib.crc32(self.data):08x}")
+        object.__setattr__(self, "checksum", crc32_of(self.data))
 
 
 def map_file(values: np.ndarray, space: str, alpha: np.ndarray | None = None) -> ImageFile:
@@ -266,7 +266,7 @@ def unmodified_file(image: bpy.types.Image) -> bytes:
     if _CHECKSUM not in image or image.is_dirty or len(image.packed_files) != 1:
         return b""
     data = bytes(image.packed_file.data)
-    return data if f"{zlib.crc32(data):08x}" == image[_CHECKSUM] else b""
+    return data if crc32_of(data) == image[_CHECKSUM] else b""
 
 
 def content_mark(image: bpy.types.Image) -> str:

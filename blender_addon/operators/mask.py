@@ -4,7 +4,6 @@ the photo's size.
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender requires sets for operator options)
 
-import zlib
 from collections.abc import Callable
 from math import ceil, floor
 from pathlib import Path
@@ -17,6 +16,7 @@ from bpy.props import StringProperty
 from isc_core.errors import InputError
 
 from ..datablocks.provenance import MASK_OF
+from ..files.checksums import crc32_of
 from ..files.image_source import ImageSource, inspect_image
 from ..runs.active_run import require_no_active_run
 from ..runs.messages import error_line, sentence
@@ -303,7 +303,7 @@ def _set_overlay(mask: Any, photo: Any, path: Path) -> None:
 
 def _checksum(mask: Any) -> str:
     """Of the packed file; "" if there is none."""
-    return "" if mask.packed_file is None else f"{zlib.crc32(mask.packed_file.data):08x}"
+    return "" if mask.packed_file is None else crc32_of(mask.packed_file.data)
 
 
 def mask_shown_on(mask: Any) -> Any:

@@ -5,7 +5,6 @@ Limits: one edit in four thousand million goes unnoticed, and changes of the att
 of normals, and of what Blender stores under hidden names, such as seams.
 """
 
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -13,6 +12,7 @@ import bpy
 import numpy as np
 
 from ..datablocks.mesh import CONFIDENCE, NORMAL, UV, MeshArrays
+from ..files.checksums import crc32_of
 from .shading_choice import SHARP_EDGE, SHARP_FACE, shading_choice
 
 _BUILT = "isc_built_crc32"
@@ -65,7 +65,7 @@ def mesh_checksum(arrays: MeshArrays) -> str:
     str
         Eight hexadecimal digits for vertices and faces, and eight for the UV map.
     """
-    return f"{_checksum(arrays.positions, arrays.corners)} {_checksum(arrays.uv)}"
+    return f"{_of_arrays(arrays.positions, arrays.corners)} {_of_arrays(arrays.uv)}"
 
 
 def is_edited_by_hand(obj: bpy.types.Object) -> bool:
@@ -98,7 +98,7 @@ def is_edited_by_hand(obj: bpy.types.Object) -> bool:
     mesh.vertices.foreach_get("co", places)
     mesh.loops.foreach_get("vertex_index", corners)
     shape, *texture = mesh[_BUILT].split()
-    return bool(shape != _checksum(places, corners) or texture not in ([], [_uv_checksum(mesh)]))
+    return bool(shape != _of_arrays(places, corners) or texture not in ([], [_uv_checksum(mesh)]))
 
 
 def _has_other_attributes(mesh: bpy.types.Mesh) -> bool:
@@ -121,11 +121,8 @@ def _uv_checksum(mesh: bpy.types.Mesh) -> str:
         return ""
     places = np.empty(2 * len(mesh.loops), np.float32)
     layer.uv.foreach_get("vector", places)
-    return _checksum(places)
+    return _of_arrays(places)
 
 
-def _checksum(*parts: np.ndarray) -> str:
-    number = 0
-    for part in parts:
-        number = zlib.crc32(part.tobytes(), number)
-    return f"{number:08x}"  # as text: Blender stores whole numbers with a sign
+def _of_arrays(*parts: np.ndarray) -> str:
+    return crc32_of(*(part.tobytes() for part in parts))
