@@ -250,9 +250,13 @@ class ResultArrays:
         return Path(str(given)).stem or self.folder.resolve().name or "object"
 
     @property
-    def longest_side(self) -> int:
-        """Longer side of the mask's bounding box in pixels; it has the size given in metres."""
-        return max(int(np.ptp(np.flatnonzero(self.mask.any(axis)))) + 1 for axis in (0, 1))
+    def longest_side(self) -> float:
+        """Longer side of the object across the view, which has the size given in metres: in pixels,
+        with a pinhole camera in those at its mean distance, of which its far parts have more.
+        """
+        if self.eye is not None:
+            return float(np.ptp(self.vertices[:, :2], axis=0).max() / self.metres_per_pixel) + 1
+        return max(float(np.ptp(np.flatnonzero(self.mask.any(axis)))) + 1 for axis in (0, 1))
 
 
 def read_result(folder: Path | str) -> ResultArrays:

@@ -70,6 +70,12 @@ def test_each_vertex_is_seen_at_its_pixel(blender: Any, result: ResultArrays, mo
     assert np.abs(off).max() < 0.01
 
 
+def test_the_longer_side_has_the_given_size(blender: Any, result: ResultArrays) -> None:
+    """Although the outline of the object is farther away than its middle."""
+    longer = max(np.ptp(evaluated_vertices(build(result, size_metres=0.7)), axis=0)[[0, 2]])
+    assert longer == pytest.approx(0.7, rel=0.03)  # and one pixel
+
+
 def test_a_displaced_grid_is_seen_alike_at_any_strength(blender: Any, result: ResultArrays) -> None:
     expected = evaluated_vertices(build(result, name="mesh"))
     built = build(result, displacement=True, name="grid")
