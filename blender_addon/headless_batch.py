@@ -23,7 +23,7 @@ from .files.result_arrays import ARRAYS
 from .headless_sources import Source, find_sources, output_files
 from .operators.result import build_as_undo_step
 from .registration import register, unregister
-from .runs.messages import join_notes, reason_line
+from .runs.messages import join_notes, notes_of_objects, reason_line
 from .runs.request import DecomposeRequest, MethodSettings
 from .runs.run_steps import result_notes
 from .runs.worker_run import RunOutput
@@ -113,8 +113,8 @@ def run_batch(options: argparse.Namespace, monitor: Monitor) -> BatchReport:
                 if problem:
                     report.failures.append(_failure(plan.source.path, problem))
                 folders = object_folders(folder) if _each(plan.source, options) else [folder]
-                lines = [note for result in folders for note in result_notes(result)]
-                if notes := join_notes(dict.fromkeys(lines)):
+                lines = {result.name: result_notes(result) for result in folders}
+                if notes := join_notes(notes_of_objects(lines)):
                     report.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
                     new_file_needed = previous is None or plan.blend != previous

@@ -5,7 +5,7 @@ images and fields of the panels, in Blender's own.
 """
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import bpy
@@ -162,6 +162,31 @@ def join_notes(lines: Iterable[str]) -> str:
         The notes, separated by semicolons.
     """
     return "; ".join(filter(None, (line.strip() for line in lines)))
+
+
+def notes_of_objects(notes: Mapping[str, Sequence[str]]) -> list[str]:
+    """Merge the notes on the objects of a photo.
+
+    Parameters
+    ----------
+    notes : mapping of str to sequence of str
+        Notes by the number of the object.
+
+    Returns
+    -------
+    list of str
+        Notes on all objects once, the others with the number of their object.
+    """
+    found = []
+    for note in dict.fromkeys(note for lines in notes.values() for note in lines):
+        about = [number for number, lines in notes.items() if note in lines]
+        if len(about) == len(notes):
+            found.append(note)
+            continue
+        start = NOTE if note.startswith(NOTE) else ""
+        word = "object" if len(about) == 1 else "objects"
+        found.append(f"{start}{word} {', '.join(about)}: {note.removeprefix(start)}")
+    return found
 
 
 def busy_message(title: str) -> str:

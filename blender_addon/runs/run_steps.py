@@ -38,7 +38,7 @@ from ..worker.commands import (
 )
 from ..worker.pace import Pace
 from ..worker.process import WorkerProcess, WorkerUpdate
-from .messages import NOTE, translate_message
+from .messages import NOTE, notes_of_objects, translate_message
 from .request import MethodSettings, parse_points
 from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
 
@@ -191,7 +191,7 @@ def _several_objects(
             folder = job.output
             prepared = tuple(_in_folder(one, folder) for one in prepared)
     results = object_folders(folder)
-    notes = dict.fromkeys(note for one in results for note in _notes(one))
+    notes = notes_of_objects({one.name: _notes(one) for one in results})
     remarks = set(map(_remark, results))
     return RunOutput(
         folder,

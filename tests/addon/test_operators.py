@@ -24,7 +24,12 @@ from blender_addon.panels import read_notes, wrap_text  # noqa: E402
 from blender_addon.runs import request as requests  # noqa: E402
 from blender_addon.runs import run_steps, worker_run  # noqa: E402
 from blender_addon.runs.active_run import begin_run  # noqa: E402
-from blender_addon.runs.messages import join_notes, sentence, translate_message  # noqa: E402
+from blender_addon.runs.messages import (  # noqa: E402
+    join_notes,
+    notes_of_objects,
+    sentence,
+    translate_message,
+)
 from blender_addon.runs.request import (  # noqa: E402
     inspect_images,
     parse_points,
@@ -682,3 +687,16 @@ def test_a_drawn_box_is_measured_from_the_top(
     first: tuple[float, float], second: tuple[float, float], box: Any
 ) -> None:
     assert box_from_corners(first, second, (100, 200)) == box
+
+
+def test_notes_name_the_objects_that_they_are_about() -> None:
+    """The expected errors of two objects differ, and advice may concern one of three."""
+    assert notes_of_objects({"result": ["note: dark", "error: 3"]}) == ["note: dark", "error: 3"]
+    notes = {"1": ["note: dark", "error: 3"], "2": ["error: 4"], "3": ["note: dark", "error: 4"]}
+    assert notes_of_objects(notes | {"2": ["error: 4", "flat"]}) == [
+        "note: objects 1, 3: dark",
+        "object 1: error: 3",
+        "objects 2, 3: error: 4",
+        "object 2: flat",
+    ]
+    assert notes_of_objects({"1": ["flat"], "2": ["flat"]}) == ["flat"]
