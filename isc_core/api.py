@@ -22,6 +22,7 @@ from .io.decoders import Raster, read_raster
 from .masking.finder import MaskSearch
 from .photo.arrays import raster_from_array
 from .photo.highlight_marks import HighlightMarks
+from .photo.names import WholeFrame
 from .photo.photo import Photo
 from .photo.reading import photo_from_raster
 from .progress import Monitor
@@ -82,7 +83,7 @@ def decompose(
     Cancelled
         If the monitor cancels.
     """
-    photo = _photo(image, mask, transfer, whole_frame=False)
+    photo = _photo(image, mask, transfer, WholeFrame.NEVER)
     if marks:
         photo = replace(photo, marks=marks)
     name = Path(image).name if isinstance(image, str | Path) else ""
@@ -129,7 +130,7 @@ def separate(
     Cancelled
         If the monitor cancels.
     """
-    photo = _photo(image, mask, transfer, whole_frame=True)
+    photo = _photo(image, mask, transfer, WholeFrame.WITHOUT_MASK)
     layers = separate_layers(
         method, photo.image, photo.mask, photo.clipped, variant=variant, monitor=monitor
     )
@@ -181,7 +182,7 @@ def load(folder: str | Path) -> Decomposition:
 
 
 def _photo(
-    image: Image, mask: str | Path | np.ndarray | None, transfer: str, *, whole_frame: bool
+    image: Image, mask: str | Path | np.ndarray | None, transfer: str, whole_frame: WholeFrame
 ) -> Photo:
     if isinstance(image, Photo):
         if mask is not None:
@@ -196,7 +197,7 @@ def _photo(
         mask_name,
         transfer=transfer,
         whole_frame=whole_frame,
-        finder=MaskSearch(lenient=whole_frame),
+        finder=MaskSearch(lenient=whole_frame is not WholeFrame.NEVER),
     )
 
 

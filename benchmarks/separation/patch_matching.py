@@ -24,7 +24,7 @@ from isc_core.inpainting.coherency_sensitive_hashing import (
     Patches,
     patches_within,
 )
-from isc_core.photo import read_photo
+from isc_core.photo import WholeFrame, read_photo
 
 # Source patches that the exhaustive search compares at once: the products then fit the cache.
 _BLOCK = 4096
@@ -233,7 +233,7 @@ def main() -> None:
         "", procedural_texture(40, 40), later_view(procedural_texture(40, 40)), 10, options
     )  # compiles
     scenes = [
-        (path.name, read_photo(path, transfer="linear", whole_frame=True).image)
+        (path.name, read_photo(path, transfer="linear", whole_frame=WholeFrame.WITHOUT_MASK).image)
         for path in arguments.photos
     ] or [("procedural", procedural_texture(700, 714))]
     print(

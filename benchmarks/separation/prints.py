@@ -33,7 +33,7 @@ from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import linear_to_srgb
-from isc_core.photo import Photo, PhotoSource, read_photo
+from isc_core.photo import Photo, PhotoSource, WholeFrame, read_photo
 from isc_core.photo.highlight_marks import HighlightMarks
 from isc_core.separation import COLOUR_ALONE, separate
 
@@ -196,7 +196,9 @@ def write_photo_sheet(path: Path, folder: Path) -> None:
     for file in sorted([*folder.glob("*.png"), *folder.glob("*.[bp][mp][pm]")]):
         if file.stem.endswith("_gt"):
             continue
-        whole = read_photo(file, whole_frame=file.suffix != ".png")
+        whole = read_photo(
+            file, whole_frame=WholeFrame.NEVER if file.suffix == ".png" else WholeFrame.WITHOUT_MASK
+        )
         photo = whole.resized_to_object(_SHEET_SIDE)
         image, mask = np.where(photo.mask[..., None], photo.image, 0), photo.mask
         colour = separate("isc", image, mask, photo.clipped, changes=COLOUR_ALONE)

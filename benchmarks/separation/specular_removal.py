@@ -37,7 +37,7 @@ from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.exr import read_channels
-from isc_core.photo import read_linear, read_photo
+from isc_core.photo import WholeFrame, read_linear, read_photo
 from isc_core.result_files.contact_sheet import LabelledSeparation, comparison_sheet
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import IMPROVED, METHODS, variants
@@ -263,7 +263,7 @@ def photos(given: argparse.Namespace) -> str:
             if code == 0:
                 answers.append(_answer(folder, method, coded=transfer == "linear"))
                 shutil.rmtree(folder)
-        photo = read_photo(path, None, transfer, whole_frame=True)
+        photo = read_photo(path, None, transfer, whole_frame=WholeFrame.WITHOUT_MASK)
         shown = srgb_to_linear(photo.image) if transfer == "linear" else photo.image
         _save(
             given.output / "sheets" / f"photo-{path.stem}.png",

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from ..lazy import exports
-from .names import TRANSFERS
+from .names import TRANSFERS, WholeFrame
 
 if TYPE_CHECKING:
     from ..io.decoders import Raster, read_raster
@@ -34,6 +34,7 @@ __all__ = [
     "Photo",
     "PhotoSource",
     "Raster",
+    "WholeFrame",
     "check_mask",
     "encode_like",
     "read_linear",

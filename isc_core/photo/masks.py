@@ -1,7 +1,6 @@
 """Finding the object's mask in a photo, and checking it."""
 
 from collections.abc import Iterator
-from typing import Literal
 
 import numpy as np
 
@@ -14,6 +13,7 @@ from ..imaging.srgb import srgb_to_linear
 from ..io.decoders import MIN_SIDE, Raster
 from ..io.decoders.raster import as_rgb
 from .found_mask import FoundMask, MaskFinder
+from .names import WholeFrame
 
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
@@ -21,8 +21,6 @@ _MOST_WHITE = 10.0  # times the median light of an object on pure black
 _LEFT_OUT = 1e-3  # of the photo: an alpha channel that leaves out less is no mask but stray pixels
 _CHUNK = 1 << 16  # pixels compared at a time
 _HARD = 0.02  # of the largest value: lossy files differ from 0 and 1 by as much
-
-WholeFrame = bool | Literal["always"]  # whether all pixels may be used, or are
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
@@ -106,9 +104,8 @@ def find_mask(
         Of the photo.
     linear : (H, W, 1 or 3) ndarray
         Its linear light.
-    whole_frame : bool or "always"
-        Use all pixels where there is no alpha channel and no black border, and the finder's
-        confidence is too low; or in any case.
+    whole_frame : WholeFrame
+        Whether all pixels are used.
     finder : MaskFinder, optional
         Finds the object where there is no alpha channel and no black border.
 
@@ -123,7 +120,7 @@ def find_mask(
     InputError
         If no mask is found.
     """
-    always_whole = whole_frame == "always"
+    always_whole = whole_frame is WholeFrame.ALWAYS
     looked_for = finder is not None and finder.always
     if not (looked_for or always_whole):
         opaque = opaque_part(raster)
@@ -149,7 +146,7 @@ def find_mask(
         found = None if finder is None else finder(name, normalised_to_white(linear, white))
         if found is not None:
             return found, "automatic"
-        if whole_frame:
+        if whole_frame is WholeFrame.WITHOUT_MASK:
             return np.ones(linear.shape[:2], bool), "whole frame"
         raise InputError(
             f"{name}: there is no mask, no transparency and no black border: "

@@ -23,7 +23,8 @@ from ..io.reading_notes import ReadingNote, ReadingNoteKind
 from .camera import Camera
 from .decontamination import estimate_foreground
 from .found_mask import FoundMask, MaskFinder
-from .masks import WholeFrame, check_mask, find_mask, mask_of, opaque_part, soft_cover
+from .masks import check_mask, find_mask, mask_of, opaque_part, soft_cover
+from .names import WholeFrame
 from .photo import Photo, PhotoSource
 from .primaries import to_rec709
 from .soft_rim import soft_rim
@@ -41,7 +42,7 @@ def read_photo(
     mask_path: str | Path | None = None,
     transfer: str = "auto",
     *,
-    whole_frame: WholeFrame = False,
+    whole_frame: WholeFrame = WholeFrame.NEVER,
     limits: Limits = DEFAULT_LIMITS,
     finder: MaskFinder | None = None,
 ) -> Photo:
@@ -62,9 +63,8 @@ def read_photo(
     mask_path : str or Path, optional
     transfer : {"auto", "srgb", "linear"}
         "auto": the curve that the file states; without one, floats are linear, all others sRGB.
-    whole_frame : bool or "always"
-        Use all pixels where there is no mask, alpha channel or black border; or, without a mask, in
-        any case.
+    whole_frame : WholeFrame
+        Whether all pixels are used where no mask is given.
     limits : Limits
         Checked with the header, before the file is decoded.
     finder : MaskFinder, optional
@@ -100,7 +100,7 @@ def photo_from_raster(
     mask_name: str = "",
     *,
     transfer: str = "auto",
-    whole_frame: WholeFrame = False,
+    whole_frame: WholeFrame = WholeFrame.NEVER,
     finder: MaskFinder | None = None,
 ) -> Photo:
     """Make a photo of decoded files.
@@ -116,7 +116,7 @@ def photo_from_raster(
     mask_name : str
         Prefix of the error messages about it.
     transfer : {"auto", "srgb", "linear"}
-    whole_frame : bool or "always"
+    whole_frame : WholeFrame
     finder : MaskFinder, optional
         As for `read_photo`.
 

@@ -19,7 +19,7 @@ from PIL import Image
 from isc_core.errors import InputError
 from isc_core.io.exr import read_channels
 from isc_core.io.reading_notes import ReadingNoteKind
-from isc_core.photo import read_photo
+from isc_core.photo import WholeFrame, read_photo
 from isc_core.result_files.known_inputs import read_height
 from tests.core.photo.icc_profiles import (
     P3,
@@ -124,12 +124,12 @@ def with_checksums(data: bytes) -> bytes:
 
 
 def _photo(path: Path) -> object:
-    return read_photo(path, whole_frame=True)
+    return read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
 
 
 def _photo_of_profile(path: Path) -> object:
     """A broken profile is a note, which counts as a refusal here."""
-    photo = read_photo(path, whole_frame=True)
+    photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
     if any(note.kind is ReadingNoteKind.BROKEN_PROFILE for note in photo.original.notes):
         raise InputError("broken")
     return photo

@@ -21,7 +21,7 @@ from isc_core.io.limits import Limits
 from isc_core.io.matlab import read_matrix
 from isc_core.io.npy import read_array, read_arrays
 from isc_core.networks.scene_network import SceneNetwork
-from isc_core.photo import read_linear, read_photo
+from isc_core.photo import WholeFrame, read_linear, read_photo
 from isc_core.result_files.known_inputs import read_light
 from isc_core.result_files.result_folder import load
 from isc_core.separation.support.filter_statistics import read_table, shipped_table
@@ -133,7 +133,7 @@ def test_pixel_limit_applies_before_decoding(refused: Callable[..., None], tmp_p
         (".hdr", ball().astype(np.float32)),
     ):
         refused(
-            lambda path: read_photo(path, whole_frame=True, limits=few),
+            lambda path: read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK, limits=few),
             f"a{suffix}",
             coded(suffix, pixels),
             "20 x 24 pixels.*--max-pixels",

@@ -9,7 +9,7 @@ import numpy as np
 from ...errors import InputError
 from ...io.limits import Limits
 from ...masking.finder import MaskSearch
-from ...photo import Photo, read_linear, read_photo
+from ...photo import Photo, WholeFrame, read_linear, read_photo
 from ...progress import Monitor
 from ...result_files.reading_notes_text import reading_note_lines
 from ...result_files.result_folder import require_writable_result, save_separation
@@ -140,7 +140,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
             file,
             options.mask,
             options.transfer,
-            whole_frame="always" if options.whole else True,
+            whole_frame=WholeFrame.ALWAYS if options.whole else WholeFrame.WITHOUT_MASK,
             limits=limits,
             finder=MaskSearch(given, lenient=True),
         )

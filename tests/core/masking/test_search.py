@@ -16,7 +16,7 @@ from isc_core.masking import (
     read_each_object,
 )
 from isc_core.masking.refinement import segmented_cover, trimap
-from isc_core.photo import read_photo
+from isc_core.photo import WholeFrame, read_photo
 from isc_core.photo.grabcut import Label, write_mask
 from tests.core.command_line import write_image
 from tests.core.masking.ball_photos import ONE, TWO, balls, overlap
@@ -109,7 +109,7 @@ def test_a_photo_without_object_is_refused_in_one_line_that_names_the_remedies(
         read_photo(path, finder=MaskSearch())
     assert "--box" in str(error.value) and "--point" in str(error.value)
     assert "\n" not in str(error.value)
-    lenient = read_photo(path, whole_frame=True, finder=MaskSearch(lenient=True))
+    lenient = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK, finder=MaskSearch(lenient=True))
     assert lenient.original.mask_from == "whole frame"
 
 

@@ -14,7 +14,7 @@ from PIL.TiffImagePlugin import IFDRational
 from isc_core.io.decoders.exif import with_focal_length
 from isc_core.io.decoders.raster import Raster, raster_of_codes
 from isc_core.io.focal_length import pixels_of_35mm
-from isc_core.photo import Photo, read_photo
+from isc_core.photo import Photo, WholeFrame, read_photo
 from isc_core.photo.camera import Camera
 
 H, W = 48, 64
@@ -43,7 +43,7 @@ def jpeg(folder: Path, tags: dict[int, Any], orientation: int = 1) -> Photo:
     """A JPEG with these tags, read."""
     path = folder / "photo.jpg"
     Image.fromarray(codes()).save(path, quality=95, exif=exif(tags, orientation))
-    return read_photo(path, whole_frame=True)
+    return read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
 
 
 def png_of_16_bits(path: Path, data: Image.Exif) -> None:
@@ -75,7 +75,7 @@ def test_the_focal_length_is_read_from_every_format_with_exif(tmp_path: Path, ki
         Image.fromarray(codes()).save(path, tiffinfo=tags)
     else:
         Image.fromarray(codes()).save(path, exif=data)
-    camera = read_photo(path, whole_frame=True).camera
+    camera = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).camera
     assert camera is not None
     assert camera.focal_length == pytest.approx(pixels_of_35mm(40, (W, H)))
 

@@ -14,7 +14,7 @@ from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.decoders.raw import is_raw
 from isc_core.io.limits import Limits
 from isc_core.io.reading_notes import ReadingNote, ReadingNoteKind
-from isc_core.photo import encode_like, read_photo, read_raster
+from isc_core.photo import WholeFrame, encode_like, read_photo, read_raster
 from tests.core.photo.icc_profiles import (
     P3,
     PROPHOTO_XYZ,
@@ -78,7 +78,7 @@ def raw(path: Path, light: np.ndarray, black: int = 512, **options: object) -> P
 
 def refusal(path: Path, **options: object) -> str:
     with pytest.raises(InputError) as caught:
-        read_photo(path, whole_frame=True, **options)
+        read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK, **options)
     assert "\n" not in str(caught.value)
     return str(caught.value)
 
@@ -87,7 +87,7 @@ def refusal(path: Path, **options: object) -> str:
 
 
 def test_heic(tmp_path: Path) -> None:
-    photo = read_photo(heic(tmp_path / "a.heic", codes()), whole_frame=True)
+    photo = read_photo(heic(tmp_path / "a.heic", codes()), whole_frame=WholeFrame.WITHOUT_MASK)
     assert off(photo.image, patches()) < 3
     source = photo.original
     assert (source.transfer, source.bit_depth, source.size) == ("srgb", 8, (W, H))
@@ -101,7 +101,7 @@ def test_a_phones_display_p3(tmp_path: Path, kind: str) -> None:
         heic(path, pixels, icc_profile=DISPLAY_P3)
     else:
         Image.fromarray(pixels).save(path, quality=97, subsampling="4:4:4", icc_profile=DISPLAY_P3)
-    photo = read_photo(path, whole_frame=True)
+    photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
     assert off(photo.image, patches()) < 4 < off(srgb_to_linear(pixels / 255), patches())
     assert photo.original.colour_profile == "Display P3"
 
@@ -114,7 +114,7 @@ def test_more_than_8_bits_of_a_heic_are_kept(tmp_path: Path) -> None:
     assert (raster.bit_depth, raster.peak, raster.values.max()) == (10, 65535, 65535)
     error = raster.values.astype(int) - pixels
     assert np.abs(error).max() < 130 and len(np.unique(raster.values)) > 700
-    photo = read_photo(tmp_path / "a.heic", whole_frame=True)
+    photo = read_photo(tmp_path / "a.heic", whole_frame=WholeFrame.WITHOUT_MASK)
     assert photo.code_value == pytest.approx(1 / 1023 / 12.92) and photo.clipped[-1, -1].all()
 
 
@@ -130,7 +130,7 @@ def test_a_camera_that_was_turned(tmp_path: Path, kind: str, orientation: int) -
         raw(path, patches(), orientation=orientation)
     else:
         Image.fromarray(codes()).save(path, quality=97, exif=turned(orientation))
-    photo = read_photo(path, whole_frame=True)
+    photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
     assert photo.image.shape == upright[orientation].shape
     assert off(photo.image, upright[orientation]) < 5
 
@@ -163,12 +163,15 @@ def test_hdr_pictures_and_gain_maps(tmp_path: Path) -> None:
     xmp = b'<x:xmpmeta xmlns:x="adobe:ns:meta/" hdrgm:Version="1.0"></x:xmpmeta>'
     Image.fromarray(codes()).save(jpeg, "jpeg", quality=98, xmp=xmp)
     (tmp_path / "a.jpg").write_bytes(jpeg.getvalue())
-    photo = read_photo(tmp_path / "a.jpg", whole_frame=True)
+    photo = read_photo(tmp_path / "a.jpg", whole_frame=WholeFrame.WITHOUT_MASK)
     assert photo.original.notes == gain_map and off(photo.image, patches()) < 5
     data = heic(tmp_path / "a.heic", codes()).read_bytes()
     box = b"\0\0\0\x38freeurn:com:apple:photo:2020:aux:hdrgainmap\0"
     (tmp_path / "b.heic").write_bytes(data + box)
-    assert read_photo(tmp_path / "b.heic", whole_frame=True).original.notes == gain_map
+    assert (
+        read_photo(tmp_path / "b.heic", whole_frame=WholeFrame.WITHOUT_MASK).original.notes
+        == gain_map
+    )
 
 
 def test_damaged_heic_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -184,7 +187,9 @@ def test_damaged_heic_is_refused_in_one_line(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("order", ["<", ">"])
 def test_raw_is_linear_with_the_cameras_white_balance(tmp_path: Path, order: str) -> None:
-    photo = read_photo(raw(tmp_path / "a.dng", patches(), order=order), whole_frame=True)
+    photo = read_photo(
+        raw(tmp_path / "a.dng", patches(), order=order), whole_frame=WholeFrame.WITHOUT_MASK
+    )
     assert middles(photo.image) == pytest.approx(middles(patches()), abs=2e-4)
     source = photo.original
     assert (source.transfer, source.bit_depth, source.notes) == ("linear", 14, ())
@@ -192,14 +197,16 @@ def test_raw_is_linear_with_the_cameras_white_balance(tmp_path: Path, order: str
 
 
 def test_the_name_of_a_raw_file_does_not_matter(tmp_path: Path) -> None:
-    photo = read_photo(raw(tmp_path / "a.tif", patches()), whole_frame=True)
+    photo = read_photo(raw(tmp_path / "a.tif", patches()), whole_frame=WholeFrame.WITHOUT_MASK)
     assert photo.original.colour_profile == "camera raw"
 
 
 def test_saturated_pixels_of_the_sensor_are_clipped(tmp_path: Path) -> None:
     light = patches()
     light[16:32, 16:32, 1] = 1.5  # green alone: red and blue of the picture stay below white
-    photo = read_photo(raw(tmp_path / "a.dng", light, orientation=6), whole_frame=True)
+    photo = read_photo(
+        raw(tmp_path / "a.dng", light, orientation=6), whole_frame=WholeFrame.WITHOUT_MASK
+    )
     expected = np.zeros((H, W), bool)
     expected[16:32, 16:32] = True
     grown = np.zeros((H, W), bool)
@@ -229,7 +236,9 @@ def test_a_raw_of_an_unknown_camera(tmp_path: Path, camera: str) -> None:
 
 
 def test_a_raw_without_the_colours_of_its_camera(tmp_path: Path) -> None:
-    photo = read_photo(raw(tmp_path / "a.dng", patches(), matrix=None), whole_frame=True)
+    photo = read_photo(
+        raw(tmp_path / "a.dng", patches(), matrix=None), whole_frame=WholeFrame.WITHOUT_MASK
+    )
     assert photo.original.notes == (ReadingNote(ReadingNoteKind.UNKNOWN_CAMERA_COLOURS),)
 
 
@@ -252,7 +261,7 @@ def test_plain_files_are_not_taken_for_raw(tmp_path: Path) -> None:
 
 def test_an_edit_of_a_raw_photo_is_srgb(tmp_path: Path) -> None:
     path = raw(tmp_path / "a.dng", patches())
-    raster, image = read_raster(path), read_photo(path, whole_frame=True).image
+    raster, image = read_raster(path), read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).image
     changed = np.ones((H, W), bool)
     result = encode_like(raster, "linear", image, changed)
     assert (result.peak, result.space) == (65535, None)
@@ -273,7 +282,7 @@ def test_16_bit_prophoto_tiff(tmp_path: Path, orientation: int) -> None:
         tmp_path / "a.tif", pixels, photometric="rgb", extratags=tags, metadata=None,
         compression="adobe_deflate",
     )  # fmt: skip
-    photo = read_photo(tmp_path / "a.tif", whole_frame=True)
+    photo = read_photo(tmp_path / "a.tif", whole_frame=WholeFrame.WITHOUT_MASK)
     assert off(photo.image, np.rot90(patches(), -1) if orientation == 6 else patches()) < 0.05
     assert (photo.original.colour_profile, photo.original.bit_depth) == ("ProPhoto RGB", 16)
 

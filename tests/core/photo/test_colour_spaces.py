@@ -18,7 +18,7 @@ from isc_core.io.decoders.colour.space import ColourSpace
 from isc_core.io.decoders.png import write_png
 from isc_core.io.decoders.raster import raster_of_codes
 from isc_core.io.reading_notes import ReadingNote, ReadingNoteKind
-from isc_core.photo import encode_like, read_linear, read_photo, read_raster
+from isc_core.photo import WholeFrame, encode_like, read_linear, read_photo, read_raster
 from tests.core.lit_balls import under_lights
 from tests.core.photo.icc_profiles import (
     ADOBE,
@@ -104,7 +104,7 @@ def test_16_bits_in_a_wide_space_are_read_precisely(tmp_path: Path, name: str) -
         png(tmp_path / "a.png", codes, profile),
         tiff16(tmp_path / "a.tif", codes, profile),
     ):
-        photo = read_photo(path, whole_frame=True)
+        photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
         assert off(photo.image, light()).max() < 0.05
         source = photo.original
         assert (source.colour_profile, source.bit_depth, source.notes) == (name, 16, ())
@@ -127,7 +127,7 @@ def test_8_bits_in_a_wide_space_are_read_as_littlecms_does(
         )  # fmt: skip
     assert srgb is not None
     theirs = srgb_to_linear(np.asarray(srgb) / 255)
-    ours = np.minimum(read_photo(path, whole_frame=True).image, 1)
+    ours = np.minimum(read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).image, 1)
     assert off(ours, theirs).max() < 1
     assert off(srgb_to_linear(codes / 255), theirs).max() > 5, "the profile makes no difference"
 
@@ -144,8 +144,8 @@ def test_8_bits_in_a_wide_space_are_read_as_littlecms_does(
 @pytest.mark.parametrize("peak", [255, 65535])
 def test_an_srgb_profile_changes_no_bit(tmp_path: Path, profile: bytes, peak: int) -> None:
     codes = encoded(light(), to_d50(REC709), None, peak)
-    plain = read_photo(png(tmp_path / "a.png", codes), whole_frame=True)
-    photo = read_photo(png(tmp_path / "b.png", codes, profile), whole_frame=True)
+    plain = read_photo(png(tmp_path / "a.png", codes), whole_frame=WholeFrame.WITHOUT_MASK)
+    photo = read_photo(png(tmp_path / "b.png", codes, profile), whole_frame=WholeFrame.WITHOUT_MASK)
     assert np.array_equal(photo.image, plain.image) and photo.code_value == plain.code_value
     assert photo.original.transfer == "srgb" and photo.original.notes == ()
 
@@ -154,7 +154,7 @@ def test_a_grey_profile(tmp_path: Path) -> None:
     grey = light()[..., :1]
     codes = np.rint(255 * grey ** (1 / 1.8)).astype(np.uint8)
     profile = grey_profile(gamma_curve(1.8))
-    photo = read_photo(png(tmp_path / "a.png", codes, profile), whole_frame=True)
+    photo = read_photo(png(tmp_path / "a.png", codes, profile), whole_frame=WholeFrame.WITHOUT_MASK)
     assert off(photo.image, grey).max() < 1
     assert (photo.image[..., 0] == photo.image[..., 2]).all()
     in_colour = png(tmp_path / "b.png", np.repeat(codes, 3, axis=2), profile)
@@ -184,8 +184,8 @@ def test_a_broken_profile_is_a_note(tmp_path: Path, kind: str, name: str) -> Non
     image = Image.fromarray(encoded(light(), to_d50(REC709), None, 255))
     image.save(tmp_path / f"a.{kind}")
     image.save(tmp_path / f"b.{kind}", icc_profile=profile)
-    plain = read_photo(tmp_path / f"a.{kind}", whole_frame=True)
-    photo = read_photo(tmp_path / f"b.{kind}", whole_frame=True)
+    plain = read_photo(tmp_path / f"a.{kind}", whole_frame=WholeFrame.WITHOUT_MASK)
+    photo = read_photo(tmp_path / f"b.{kind}", whole_frame=WholeFrame.WITHOUT_MASK)
     assert np.array_equal(photo.image, plain.image)
     assert photo.original.notes == BROKEN and plain.original.notes == ()
     assert photo.original.colour_profile == ""
@@ -194,7 +194,7 @@ def test_a_broken_profile_is_a_note(tmp_path: Path, kind: str, name: str) -> Non
 def test_a_packed_profile_that_is_a_bomb_is_a_note(tmp_path: Path) -> None:
     path = png(tmp_path / "a.png", encoded(light(), to_d50(REC709), None, 255))
     with_chunks(path, (b"iCCP", b"x\0\0" + zlib.compress(bytes(1 << 25))))
-    assert read_photo(path, whole_frame=True).original.notes == BROKEN
+    assert read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).original.notes == BROKEN
 
 
 def test_a_table_of_colours_is_applied_with_8_bits(tmp_path: Path) -> None:
@@ -202,10 +202,10 @@ def test_a_table_of_colours_is_applied_with_8_bits(tmp_path: Path) -> None:
     for peak in (255, 65535):
         codes = np.rint(peak * light() ** (1 / 2.2)).astype(np.uint8 if peak == 255 else np.uint16)
         path = png(tmp_path / "a.png", codes, table_profile())
-        photo = read_photo(path, whole_frame=True)
+        photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
         assert np.percentile(off(photo.image, swapped), 90) < 4
         assert photo.original.notes == (ReadingNote(ReadingNoteKind.TABLE_PROFILE),)
-    unused = read_photo(path, transfer="linear", whole_frame=True)
+    unused = read_photo(path, transfer="linear", whole_frame=WholeFrame.WITHOUT_MASK)
     assert unused.image == pytest.approx(codes / 65535, abs=1e-6)
     assert unused.original.notes == (ReadingNote(ReadingNoteKind.UNUSED_PROFILE),)
 
@@ -214,11 +214,15 @@ def test_the_users_curve_replaces_the_profiles_and_the_primaries_remain(tmp_path
     profile, colorants, _ = SPACES["Adobe RGB"]
     linear = encoded(light(), colorants, 1.0, 65535)
     photo = read_photo(
-        png(tmp_path / "a.png", linear, profile), transfer="linear", whole_frame=True
+        png(tmp_path / "a.png", linear, profile),
+        transfer="linear",
+        whole_frame=WholeFrame.WITHOUT_MASK,
     )
     assert photo.original.transfer == "linear" and photo.image == pytest.approx(light(), abs=1e-4)
     srgb = encoded(light(), colorants, None, 65535)
-    photo = read_photo(png(tmp_path / "b.png", srgb, profile), transfer="srgb", whole_frame=True)
+    photo = read_photo(
+        png(tmp_path / "b.png", srgb, profile), transfer="srgb", whole_frame=WholeFrame.WITHOUT_MASK
+    )
     assert photo.image == pytest.approx(light(), abs=1e-4)
 
 
@@ -227,14 +231,18 @@ def test_clipping_is_that_of_the_stored_codes(tmp_path: Path) -> None:
     codes[5, 7] = (255, 90, 90)
     codes[codes == 255] -= 1
     codes[9, 11, 1] = 255
-    photo = read_photo(png(tmp_path / "a.png", codes, SPACES["Display P3"][0]), whole_frame=True)
+    photo = read_photo(
+        png(tmp_path / "a.png", codes, SPACES["Display P3"][0]), whole_frame=WholeFrame.WITHOUT_MASK
+    )
     assert [*map(tuple, np.argwhere(photo.clipped))] == [(9, 11)]
 
 
 def test_colours_outside_of_rec709_are_clipped_at_0_and_counted(tmp_path: Path) -> None:
     codes = encoded(light(), to_d50(P3), None, 255)
     codes[:4] = (250, 20, 20)
-    photo = read_photo(png(tmp_path / "a.png", codes, SPACES["Display P3"][0]), whole_frame=True)
+    photo = read_photo(
+        png(tmp_path / "a.png", codes, SPACES["Display P3"][0]), whole_frame=WholeFrame.WITHOUT_MASK
+    )
     assert photo.image.min() == 0 and photo.image[0, 0, 0] > 1
     (note,) = photo.original.notes
     assert note.kind is ReadingNoteKind.OUT_OF_GAMUT and note.value == pytest.approx(4 / H)
@@ -248,7 +256,7 @@ def test_adobe_rgb_as_cameras_mark_it_in_exif(tmp_path: Path) -> None:
         exif = Image.Exif()
         exif.get_ifd(0x8769)[0xA005] = {1: index}
         image.save(tmp_path / "a.jpg", quality=98, subsampling=0, exif=exif)
-        photo = read_photo(tmp_path / "a.jpg", whole_frame=True)
+        photo = read_photo(tmp_path / "a.jpg", whole_frame=WholeFrame.WITHOUT_MASK)
         assert photo.original.colour_profile == name
         error = np.percentile(off(np.minimum(photo.image, 1), flat), 95)
         assert error < 4 if name else error > 5
@@ -263,7 +271,7 @@ def test_chunks_of_a_png(tmp_path: Path) -> None:
 
     def read(codes: np.ndarray, *chunks: tuple[bytes, bytes]) -> np.ndarray:
         path = with_chunks(png(tmp_path / "a.png", codes), *chunks)
-        return read_photo(path, whole_frame=True).image
+        return read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).image
 
     plain = read(codes)
     white_first = np.array([(0.3127, 0.3290), *P3])
@@ -303,7 +311,7 @@ def test_chromaticities_of_an_exr(
     planes = {name: np.ascontiguousarray(stored[..., c]) for c, name in enumerate("RGB")}
     header = {"chromaticities": tuple(float(n) for pair in chromaticities for n in pair)}
     OpenEXR.File(header, planes).write(str(tmp_path / "a.exr"))
-    photo = read_photo(tmp_path / "a.exr", whole_frame=True)
+    photo = read_photo(tmp_path / "a.exr", whole_frame=WholeFrame.WITHOUT_MASK)
     assert photo.image == pytest.approx(stored @ matrix.T, abs=2e-4)
     assert photo.image[0] == pytest.approx(stored[0], abs=1e-6), "grey stays grey"
     assert photo.original.colour_profile == "chromaticities of the EXR"
@@ -316,7 +324,7 @@ def test_defects_of_a_wide_exr_are_still_found(tmp_path: Path) -> None:
     header = {"chromaticities": tuple(n for pair in REC2020 for n in pair)}
     OpenEXR.File(header, planes).write(str(tmp_path / "a.exr"))
     with pytest.raises(InputError, match="1 pixels inside the mask are NaN"):
-        read_photo(tmp_path / "a.exr", whole_frame=True)
+        read_photo(tmp_path / "a.exr", whole_frame=WholeFrame.WITHOUT_MASK)
 
 
 # --- writing in the photo's own space -------------------------------------------------------------

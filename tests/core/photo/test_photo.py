@@ -22,7 +22,15 @@ from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.limits import Limits
-from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster, tidy_mask
+from isc_core.photo import (
+    Photo,
+    PhotoSource,
+    WholeFrame,
+    read_linear,
+    read_photo,
+    read_raster,
+    tidy_mask,
+)
 
 H, W = 40, 52
 
@@ -275,7 +283,7 @@ def test_the_fourth_channel_of_a_tiff_is_alpha_if_the_file_says_so(
     for extra, source in (("unassalpha", "alpha"), ("unspecified", "whole frame")):
         path = tmp_path / f"{extra}.tif"
         tifffile.imwrite(path, stored.astype(kind), photometric="rgb", extrasamples=[extra])
-        assert read_photo(path, whole_frame=True).original.mask_from == source
+        assert read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).original.mask_from == source
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32])
@@ -623,7 +631,7 @@ def test_an_alpha_channel_with_stray_pixels_is_no_mask(tmp_path: Path) -> None:
     alpha = np.full((H, W), 255, np.uint8)
     alpha[3, 4], alpha[:, 0] = 0, 250
     path = saved(tmp_path / "a.png", Image.fromarray(np.dstack([codes() // 2 + 50, alpha])))
-    assert read_photo(path, whole_frame=True).original.mask_from == "whole frame"
+    assert read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK).original.mask_from == "whole frame"
     with pytest.raises(InputError, match="there is no mask"):
         read_photo(path)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.photo import read_photo
+from isc_core.photo import WholeFrame, read_photo
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
 from isc_core.separation.support.layers import white_layers
@@ -73,7 +73,11 @@ def test_full_white_speaks_for_itself() -> None:
 
 @pytest.mark.parametrize("method", ["tan_2005", "yang_2010", "mallick_2006", "shen_2013"])
 def test_knowing_what_is_clipped_does_no_harm(shared: Path, method: str) -> None:
-    photo = read_photo(shared / "data/highlight/animals.bmp", transfer="linear", whole_frame=True)
+    photo = read_photo(
+        shared / "data/highlight/animals.bmp",
+        transfer="linear",
+        whole_frame=WholeFrame.WITHOUT_MASK,
+    )
     truth = highlight_photo(shared, "animals")[1]
     assert photo.clipped.any()
     blind, told = (
