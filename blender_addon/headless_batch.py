@@ -227,7 +227,8 @@ def _write_outputs(
 ) -> None:
     """Build the object of a result; save and render it."""
     name = plan.source.name
-    monitor.report(f"building {name}", 0.0)
+    stage = f"building {name}"
+    monitor.report(stage, 0.0)
     empty_scenes = open_empty_file() if new_file_needed else []
     request = _create_request(plan.source, options)
     build_as_undo_step(bpy.context, RunOutput(folder), request)
@@ -238,9 +239,10 @@ def _write_outputs(
     if plan.blend is not None:
         save_blend(plan.blend)
     if plan.render is not None:
-        monitor.report(f"rendering {name}", 0.3)
+        stage = f"rendering {name}"
+        monitor.report(stage, 0.3)
         render_scene(scene, plan.render)
-    monitor.report(f"building {name}", 1.0)
+    monitor.report(stage, 1.0)
 
 
 def _each(source: Source, options: argparse.Namespace) -> bool:

@@ -107,6 +107,8 @@ def test_a_result_becomes_a_blend_file_and_a_matching_render(tmp_path: Path) -> 
         tmp_path / "result", "-o", blend, "--render", picture, "--samples", 32, "--specular", "none"
     )
     assert done.returncode == 0, done.stdout + done.stderr
+    stages = [line for line in done.stderr.splitlines() if line.endswith("ing result")]
+    assert stages == ["isc: building result", "isc: rendering result"]
     scenes, active, loose = scenes_of(blend)
     assert scenes == {"result": ["CYCLES", 32, 88, 2]}, "the object's own scene, and no other"
     assert (active, loose) == ("result", [])
