@@ -38,6 +38,7 @@ _MAX_SECONDS = 90  # more are shown in minutes
 _MASK_ADVICE = "choose a mask image, or make one with Add Point or Select Box"
 _ADVICE = {  # what a command line does otherwise
     "use --light-colour estimate": "set Light Color to Estimate",
+    "use --light-colour R,G,B": "set Light Color to Custom",
     "or --camera MM": "or set Camera to Perspective",
     "or require lower odds": "or set Remove Highlights to Likely",
     "leave out --transfer": "set Color Space to sRGB",

@@ -132,12 +132,14 @@ def solve_under_given_light(
 
 def _diagnostics(light: Illuminant, setting: str, used: bool) -> LightColourDiagnostics:
     red, green, blue = (round(float(part), 4) for part in light.colour)
+    white_assumed = setting == LightColour.ESTIMATE and not used
     return LightColourDiagnostics(
-        LightColour.BALANCED if setting == LightColour.ESTIMATE and not used else setting,
+        LightColour.BALANCED if white_assumed else setting,
         (red, green, blue),
         round(light.confidence, 4),
         light.outcome,
         light.determined and float(np.abs(light.colour - 1).max()) > _COLOURED,
+        white_assumed,
     )
 
 

@@ -177,7 +177,12 @@ def _light_colour(record: Any) -> LightColourDiagnostics | None:
         isinstance(advice, str) and advice.startswith(_OLD_HELP[1])
     )
     return LightColourDiagnostics(
-        used if isinstance(used, str) else "white", estimate, confidence, outcome, coloured
+        used if isinstance(used, str) else "white",
+        estimate,
+        confidence,
+        outcome,
+        coloured,
+        record.get("white_assumed") is True,
     )
 
 

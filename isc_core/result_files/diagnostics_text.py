@@ -24,6 +24,9 @@ CROPPED = (
     "the photo was cropped, so its focal length is not used: use the whole photo, or --camera MM"
 )
 COLOURED = "the light is coloured: use --light-colour estimate"
+WHITE_ASSUMED = (
+    "the photo does not show the light's colour, white is assumed: use --light-colour R,G,B"
+)
 
 _COLOURS = {
     PhotoColours.GREY: (
@@ -116,10 +119,12 @@ def note_lines(diagnostics: Diagnostics) -> list[str]:
         lines.append(f"gloss: {lobe_text(diagnostics.lobe)}")
     if diagnostics.expected_error is not None:
         lines.append(f"expected error: {expected_error_text(diagnostics.expected_error)}")
+    colours = diagnostics.photo_colours
     advice = light_colour_advice(diagnostics.light_colour)
-    lines += [f"note: {advice}"] if advice else []
-    if diagnostics.photo_colours in _COLOURS:
-        lines.append(f"note: {_COLOURS[diagnostics.photo_colours]}")
+    if advice and not (colours in _COLOURS and advice == WHITE_ASSUMED):
+        lines.append(f"note: {advice}")
+    if colours in _COLOURS:
+        lines.append(f"note: {_COLOURS[colours]}")
     return lines + [f"note: {warning_text(warning)}" for warning in diagnostics.warnings]
 
 
@@ -208,6 +213,8 @@ def light_colour_advice(light: LightColourDiagnostics | None) -> str:
         return ""
     if light.outcome.too_strong:
         return STRONG_COLOUR
+    if light.white_assumed:
+        return WHITE_ASSUMED
     return COLOURED if light.coloured and light.used != "estimate" else ""
 
 

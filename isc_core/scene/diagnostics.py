@@ -249,6 +249,8 @@ class LightColourDiagnostics:
         How far the photo determines it.
     coloured : bool
         The estimate differs clearly from white.
+    white_assumed : bool
+        The estimate was asked for, but the photo does not determine it.
     """
 
     used: str
@@ -256,6 +258,7 @@ class LightColourDiagnostics:
     confidence: float
     outcome: IlluminantOutcome
     coloured: bool = False
+    white_assumed: bool = False
 
     @property
     def determined(self) -> bool:
@@ -360,6 +363,7 @@ class Diagnostics:
                 "determined": light.determined,
                 "outcome": light.outcome.value,
                 "coloured": light.coloured,
+                "white_assumed": light.white_assumed,
             },
             "photo_colours": self.photo_colours and self.photo_colours.value,
             "scene_classes": self.scene_classes,

@@ -632,6 +632,7 @@ def test_notes_speak_of_the_panel_in_blenders_spelling() -> None:
     """Every sentence that a result can have: no option of the command line is left in it."""
     texts = [
         *(diagnostics_text.STRONG_COLOUR, diagnostics_text.CROPPED, diagnostics_text.COLOURED),
+        diagnostics_text.WHITE_ASSUMED,
         *diagnostics_text._COLOURS.values(),
         *diagnostics_text._WARNINGS.values(),
         *diagnostics_text._LOBE.values(),
@@ -642,6 +643,8 @@ def test_notes_speak_of_the_panel_in_blenders_spelling() -> None:
         shown = translate_message(text, {})
         assert not re.search(r"--[a-z]|colour|grey|odds", shown), shown
     assert translate_message(diagnostics_text.COLOURED, {}).endswith("set Light Color to Estimate")
+    assumed = translate_message(diagnostics_text.WHITE_ASSUMED, {})
+    assert assumed.endswith("set Light Color to Custom")
     named = translate_message("/t/a.png: it is grey", {"/t/a.png": "my grey colour chart"})
     assert named == "my grey colour chart: it is gray"
 

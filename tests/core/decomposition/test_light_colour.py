@@ -15,7 +15,11 @@ from isc_core.decomposition.shape import desaturated
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.photo import Photo, PhotoSource
-from isc_core.result_files.diagnostics_text import STRONG_COLOUR, light_colour_advice
+from isc_core.result_files.diagnostics_text import (
+    STRONG_COLOUR,
+    WHITE_ASSUMED,
+    light_colour_advice,
+)
 from isc_core.scene.decomposition import Separation
 from isc_core.scene.diagnostics import Diagnostics, IlluminantOutcome, StopReason
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOutcome, LobeLight
@@ -98,6 +102,7 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
     found = answer.diagnostics.light_colour
     assert found is not None and found.used == "balanced"
     assert ("--light-colour estimate" in light_colour_advice(found)) == (asked == "balanced")
+    assert (light_colour_advice(found) == WHITE_ASSUMED) == (asked == "estimate")
 
 
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:

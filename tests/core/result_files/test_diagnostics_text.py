@@ -10,6 +10,7 @@ from isc_core.result_files.diagnostics_text import (
     COLOURED,
     STOPPED_EARLY,
     STRONG_COLOUR,
+    WHITE_ASSUMED,
     joint_text,
     note_lines,
     outcome_text,
@@ -26,6 +27,7 @@ from isc_core.scene.diagnostics import (
     LobeDiagnostics,
     LobeFitOutcome,
     LobeStatus,
+    PhotoColours,
     StopReason,
     WarningKind,
 )
@@ -161,6 +163,14 @@ def test_each_entry_has_its_line() -> None:
         "white", (1.0, 1.0, 1.0), 0.0, IlluminantOutcome.STRONG_OBJECT_COLOUR
     )
     assert note_lines(Diagnostics(light_colour=strong)) == [f"note: {STRONG_COLOUR}"]
+    unknown = LightColourDiagnostics(
+        "balanced", (1.0, 1.0, 1.0), 0.0, IlluminantOutcome.UNRELIABLE, white_assumed=True
+    )
+    assert note_lines(Diagnostics(light_colour=unknown)) == [f"note: {WHITE_ASSUMED}"]
+    grey = note_lines(Diagnostics(light_colour=unknown, photo_colours=PhotoColours.GREY))
+    assert len(grey) == 1 and "the photo is grey" in grey[0]
+    stored = Diagnostics(light_colour=unknown).to_json()
+    assert diagnostics_from_json(stored).light_colour == unknown
     bound = LobeDiagnostics(LobeStatus.FITTED, LobeFitOutcome.CLIPPED, (0.0, 0.3, 0.3))
     assert note_lines(Diagnostics(lobe=bound))[0].startswith("gloss: roughness at most 0.30: ")
 
@@ -180,6 +190,7 @@ def test_a_note_is_one_short_line_with_a_remedy() -> None:
         STOPPED_EARLY,
         STRONG_COLOUR,
         COLOURED,
+        WHITE_ASSUMED,
         *(warning_text(AssumptionWarning(kind, 0.23)) for kind in WarningKind),
     ]
     assert all(len(note) <= 100 and "\n" not in note for note in notes)
