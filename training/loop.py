@@ -23,8 +23,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, Protocol, TypeVar
+from zipfile import is_zipfile
 
 import numpy as np
 import torch
@@ -411,11 +411,15 @@ class _Report:
 
 
 def _checkpoint(path: Path) -> dict[str, Any]:
+    found = None
     try:
-        found = torch.load(path, weights_only=True, map_location="cpu")
+        with path.open("rb") as file:
+            if is_zipfile(file):
+                file.seek(0)
+                found = torch.load(file, weights_only=True, map_location="cpu")
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
-    except (RuntimeError, UnpicklingError, EOFError):
+    except RuntimeError:  # an archive of something else
         found = None
     if not isinstance(found, dict) or not found.keys() >= _CHECKPOINT_KEYS:
         raise InputError(f"{path} is not a training checkpoint: give the .pt file of a run")

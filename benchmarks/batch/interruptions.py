@@ -31,6 +31,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
+from benchmarks.program import run_program
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import Settings
 from isc_core.photo import read_photo
@@ -521,4 +522,4 @@ def table(rows: list[dict[str, object]]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
+from benchmarks.program import run_program
 from isc_core.batch.engine import WorkerOptions
 from isc_core.batch.item import DONE, ImageJob, ImageOutcome, Outcomes
 from isc_core.batch.run_batch import Batch, run_batch
@@ -171,4 +172,4 @@ def _peak_mb() -> float:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

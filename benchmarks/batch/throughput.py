@@ -24,6 +24,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
+from benchmarks.program import run_program
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import Settings
 from isc_core.photo import read_photo
@@ -242,4 +243,4 @@ def table(place: Path, first: BatchRun, again: BatchRun, alone: BatchRun) -> str
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -20,7 +20,6 @@ Limits: shading alone; the texture that a slope stretches is not measured.
 """
 
 import argparse
-import sys
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +27,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.program import run_program
 from isc_core.numerics.logistic import logistic_weights
 from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.solids.back import Back
@@ -305,4 +305,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_program(main)

@@ -18,7 +18,6 @@ Limits: `result_files.turned_view` draws; light as `shading` has it, without sha
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from benchmarks.program import run_program
 from blender_addon.datablocks.mesh import front_geometry
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.evaluation.metrics import psnr
@@ -304,4 +304,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_program(main)

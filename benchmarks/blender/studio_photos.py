@@ -10,7 +10,6 @@ from above.
 """
 
 import argparse
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from mathutils import Vector
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+from benchmarks.program import run_program
 from blender_addon.datablocks.images import COLOR, map_file, new_image
 from synth.albedos import make_albedo
 from synth.capture.recipe import FamilyMember
@@ -332,4 +332,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_program(main)

@@ -15,11 +15,11 @@ Limits: parallel projection; figures are weighted by the area of the recovered s
 """
 
 import argparse
-import sys
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from blender_addon.files.result_arrays import read_result
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.rim import Rim
@@ -96,4 +96,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_program(main)

@@ -30,6 +30,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from benchmarks.program import run_program
+
 _HERE = Path(__file__).parents[2]
 _SUFFIXES = (".png", ".jpg", ".jpeg")
 _BUILD = """
@@ -224,4 +226,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

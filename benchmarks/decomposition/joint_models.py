@@ -23,6 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from benchmarks.records import append_row, read_rows
 from benchmarks.sirfs.mit_berkeley import rounded
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
@@ -274,4 +275,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

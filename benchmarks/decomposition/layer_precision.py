@@ -25,6 +25,7 @@ import numpy as np
 from scipy.ndimage import map_coordinates
 
 from benchmarks.decomposition.joint_models import photo_of, row_of, run_model, tables
+from benchmarks.program import run_program
 from benchmarks.records import append_row, read_rows
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects
 from isc_core.evaluation.evaluate import Estimate
@@ -177,4 +178,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

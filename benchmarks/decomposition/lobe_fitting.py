@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.decomposition.pipeline import decompose
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.networks.scene_network import predict_scene
@@ -520,4 +521,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

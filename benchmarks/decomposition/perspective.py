@@ -24,6 +24,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.bootstrap import bootstrap_samples, interval
+from benchmarks.program import run_program
 from isc_core.decomposition.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decomposition.pipeline import assemble
 from isc_core.scene.decomposition import Decomposition, Provenance
@@ -190,4 +191,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

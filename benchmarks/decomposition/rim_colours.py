@@ -23,6 +23,7 @@ import torch
 from scipy import ndimage
 
 from benchmarks.bootstrap import bootstrap_samples, interval
+from benchmarks.program import run_program
 from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.masking.confidence import mask_overlap
 from isc_core.masking.refusal import refusal_reason
@@ -166,4 +167,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.program import run_program
 from isc_core.result_files.mesh.build import build_mesh
 from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.mesh.result import MeshResult
@@ -282,4 +283,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

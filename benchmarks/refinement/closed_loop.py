@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.blender.renders import RenderVariant, render
+from benchmarks.program import run_program
 from blender_addon.files.result_arrays import read_result
 from isc_core.evaluation.metrics import psnr
 from isc_core.refinement import refine_gloss
@@ -92,4 +93,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

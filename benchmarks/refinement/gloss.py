@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.lobe_fitting.specular_level import fitted_specular
 from isc_core.refinement import GlossRefinement, refine_gloss
 from isc_core.result_files.result_folder import load
@@ -203,4 +204,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from benchmarks.program import run_program
 from isc_core.decomposition.pipeline import decompose
 from isc_core.decomposition.settings import Settings
 from isc_core.imaging.bounding_box import mask_box
@@ -88,4 +89,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -31,6 +31,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import nnls
 
+from benchmarks.program import run_program
 from isc_core.evaluation.metrics import geometric_mean, scaled_mse
 from isc_core.progress import Monitor
 from isc_core.refinement.working_scale import working_scale
@@ -289,4 +290,4 @@ def _text(values: np.ndarray) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

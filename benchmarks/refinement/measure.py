@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.evaluation.metrics import geometric_mean, scaled_mse
 from isc_core.scene.decomposition import Decomposition
 from synth.refine.refine import RefineOptions, refine
@@ -70,4 +71,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -28,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.datasets.highlight_set import SeparationTruth
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.separation.isc import VARIANTS, IscOptions, separate
@@ -232,4 +233,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

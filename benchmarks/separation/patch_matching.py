@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.program import run_program
 from isc_core.inpainting.coherency_sensitive_hashing import (
     CshOptions,
     CshSearch,
@@ -257,4 +258,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

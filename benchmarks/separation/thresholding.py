@@ -20,6 +20,7 @@ from scipy.stats import mannwhitneyu
 from skimage import data
 from skimage.color import rgb2gray
 
+from benchmarks.program import run_program
 from isc_core.thresholding import Optimum, OtsuObjective, exact, maximise, particle_swarm
 from isc_core.thresholding.clonal_selection import ClonalOptions, mutation_rate, search
 from isc_core.thresholding.logistic_map import (
@@ -421,4 +422,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.evaluation.evaluate import paired_bootstrap
 from isc_core.evaluation.metrics import geometric_mean
@@ -247,4 +248,4 @@ def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -14,6 +14,7 @@ import json
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.decomposition.settings import LightPrior, ShapePrior
 from isc_core.evaluation.metrics import score
@@ -62,4 +63,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.evaluation.metrics import geometric_mean
 from isc_core.numerics.thread_pool import ThreadPool
@@ -182,4 +183,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.program import run_program
 from benchmarks.records import append_row, read_rows
 from benchmarks.refinement.scenes import photo_of, rendered
 from isc_core.decomposition.pipeline import decompose
@@ -164,4 +165,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

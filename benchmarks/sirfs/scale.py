@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.decomposition.pipeline import Settings, decompose
 from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.resampling import resample_inside
@@ -247,4 +248,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -26,6 +26,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_natural_lights, load_object
 from isc_core.decomposition.models import solve
 from isc_core.decomposition.settings import ILLUMINATIONS
@@ -310,4 +311,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -5,6 +5,7 @@ python -m benchmarks.sirfs.solver_reference [--float64] [--engine numpy]
 
 import time
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.evaluation.metrics import geometric_mean
 from isc_core.numerics.lbfgs import LbfgsOptions
@@ -83,4 +84,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

@@ -25,6 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.program import run_program
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_natural_lights
 from isc_core.decomposition.shape import exposure_normalisation
 from isc_core.evaluation.metrics import Scores, truth_normal
@@ -323,4 +324,4 @@ def _start_text(starts: Starts) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

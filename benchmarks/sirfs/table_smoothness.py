@@ -7,6 +7,7 @@ Prints the log likelihood of each object under the table of the others.
 
 from dataclasses import replace
 
+from benchmarks.program import run_program
 from isc_core.prior_fitting.cross_validation import held_out_log_likelihood
 from isc_core.prior_fitting.fit import FitOptions
 from isc_core.prior_fitting.statistics import collect_statistics
@@ -42,4 +43,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    run_program(main)

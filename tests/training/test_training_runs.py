@@ -75,9 +75,11 @@ def test_another_networks_checkpoint_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"another network, [^\n]*size mismatch[^\n]*\Z"):
         fit(other, draw, SCHEDULE, options(path, resume=path.with_suffix(".pt")))
     torch.save({"weights": torch.zeros(1)}, tmp_path / "other.pt")
+    (tmp_path / "text.pt").write_text("no checkpoint")
     for name, match in (
         ("other.pt", "not a training checkpoint"),
         ("first.npz", "not a training checkpoint"),
+        ("text.pt", "not a training checkpoint"),
         ("none.pt", "cannot be read"),
     ):
         with pytest.raises(InputError, match=match):
