@@ -12,7 +12,8 @@ distant light with an ambient term, or the irradiance of an environment map (see
 
 A lobe under the present light is rendered with the distant light that best explains the specular
 layer, or else with that of the fit, since the recovered light is too smooth for highlights; without
-either, with the recovered light. This light rotates with a rotated light. By default ("auto") a
+either, or where the new light is unrelated to the present one, with the recovered light. This light
+rotates with a rotated light. By default ("auto") a
 rotation fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the
 angle by which this light moves: small rotations cause small changes, and a highlight far from its
 original position is entirely rendered.

@@ -115,7 +115,7 @@ def explain_shading(d: Decomposition) -> DirectionEstimate:
     first = np.maximum(np.linalg.lstsq(design, samples.values, rcond=None)[0], 1e-6 * samples.scale)
     light, others, cone = _refined(samples, model, start, np.concatenate(first), np.zeros(6))
     spread = np.square(samples.values - samples.values.mean(0)).sum()
-    explained = _explained(samples.values - model(light, others), spread)
+    explained = _explained(samples, samples.values - model(light, others), spread)
     return DirectionEstimate(
         DirectionalLight(light, np.pi * others[:3], others[3:]),
         explained,
@@ -147,7 +147,8 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
         [nonnegative_pair(facing, even, column) for column in samples.values.T]
     )
     error = samples.values - (facing[:, None] * strength + ambient)
-    explained = _explained(error, np.square(samples.values - samples.values.mean(0)).sum())
+    spread = np.square(samples.values - samples.values.mean(0)).sum()
+    explained = _explained(samples, error, spread)
     return DirectionalLight(direction, np.pi * strength, ambient), explained
 
 
@@ -230,7 +231,8 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
         error = model(*found[:2]) - samples.values
         fits.append((robust_loss(error, samples.scale), found))
     light, others, cone = min(fits, key=lambda fit: fit[0])[1]
-    explained = _explained(samples.values - model(light, others), np.square(samples.values).sum())
+    error = samples.values - model(light, others)
+    explained = _explained(samples, error, np.square(samples.values).sum())
     estimate = DirectionalLight(light, others[:3])
     return DirectionEstimate(
         estimate, explained, cone if explained > 0 else 180.0, float(np.exp(others[3]))
@@ -358,11 +360,15 @@ def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _S
     curvature = jacobian.T @ (weight[:, None] * jacobian)
     blocks = np.zeros((int(samples.block.max()) + 1, len(x)))
     np.add.at(blocks, np.repeat(samples.block, 3), (weight * error)[:, None] * jacobian)
-    inverse = np.linalg.pinv(curvature, hermitian=True)
+    # The parameters' units differ with the exposure; the direction's curvature is of squared light.
+    unit = np.sqrt(np.diag(curvature))
+    unit = np.where(unit > 0, unit, 1)
+    unit = unit[:, None] * unit
+    inverse = np.linalg.pinv(curvature / unit, hermitian=True) / unit
     spread = (inverse @ (blocks.T @ blocks) @ inverse)[:2, :2]
     # A direction without effect has no curvature, and its error is unbounded.
     flat = np.linalg.eigvalsh(curvature[:2, :2])[0] <= 1e-12 * max(
-        float(np.trace(curvature)), 1e-300
+        float(np.square(samples.values).sum()), 1e-300
     )
     return (
         180.0
@@ -371,12 +377,10 @@ def _cone(errors: Callable[[np.ndarray], np.ndarray], x: np.ndarray, samples: _S
     )
 
 
-def _explained(error: np.ndarray, whole: float) -> float:
-    return (
-        float(np.clip(1 - np.square(error).sum() / whole, 0, 1))
-        if whole > 1e-12 * max(error.size, 1)
-        else 0.0
-    )
+def _explained(samples: _Samples, error: np.ndarray, whole: float) -> float:
+    """The share explained; 0 where the `whole` is rounding, whatever the exposure."""
+    least = 1e-12 * max(error.size, 1) * (samples.scale / _ROBUST) ** 2
+    return float(np.clip(1 - np.square(error).sum() / whole, 0, 1)) if whole > least else 0.0
 
 
 def _tangents(direction: np.ndarray) -> np.ndarray:

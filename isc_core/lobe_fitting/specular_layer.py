@@ -35,7 +35,7 @@ from ..inpainting.pull_push import fill
 from ..shading.brdf.energy import directional_albedo
 from ..shading.brdf.ggx import F0, Ggx
 from ..shading.lights import VIEW
-from ..shading.mirrored_environment import MirroredEnvironment
+from ..shading.mirrored_environment import MirroredEnvironment, narrowest_alpha
 
 MOST = 0.96  # of the reflectance at normal incidence: the index of refraction is finite
 ENVIRONMENT_ROWS = 16  # enough: the recovered environment is smooth
@@ -166,9 +166,13 @@ class CoatedSurface:
         mask = largest(self.normal != 0)
         normal = self.normal[mask].astype(float)
         view = self.view if self.view.ndim == 1 else self.view[mask]
-        model = _layer(level, roughness)
-        mirrored = MirroredEnvironment(model, self.environment).toward(normal, view)
-        share = specular_share(level, roughness, total(normal * view))[:, None]
+        cosines = total(normal * view)
+        share = specular_share(level, roughness, cosines)[:, None]
+        # Narrower lobes mirror a smooth map in the same way, but for their albedo.
+        wide = max(roughness, float(np.sqrt(narrowest_alpha(len(self.environment)))))
+        mirrored = MirroredEnvironment(_layer(level, wide), self.environment).toward(normal, view)
+        if wide > roughness:
+            mirrored *= share / specular_share(level, wide, cosines)[:, None]
         inside = np.concatenate([mirrored / np.maximum(self.shading[mask], _DARKEST), share], -1)
         if self.variation is not None:
             inside *= self.variation[mask][:, None]

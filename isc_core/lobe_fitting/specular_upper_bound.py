@@ -27,7 +27,6 @@ from .specular_level import SpecularFit, SpecularSource, fitted_specular
 
 _ROWS = 16  # of the environment map: the lobe of a smooth map is smooth
 _PERCENTILE = 5.0
-_MIN_ALPHA = 0.05  # alpha: narrower lobes reflect a smooth map in the same way
 
 
 def bounded_specular(d: Decomposition) -> SpecularFit:
@@ -76,9 +75,10 @@ def specular_upper_bound(d: Decomposition, roughness: float, environment: np.nda
         1 is plastic; infinite under a black environment map.
     """
     from ..shading.environment_map import resampled
-    from ..shading.mirrored_environment import MirroredEnvironment
+    from ..shading.mirrored_environment import MirroredEnvironment, narrowest_alpha
 
-    lobe = Ggx(max(float(alpha_from_blender(roughness)), _MIN_ALPHA), F0)
+    # narrower lobes reflect a smooth map in the same way
+    lobe = Ggx(max(float(alpha_from_blender(roughness)), narrowest_alpha(_ROWS)), F0)
     mirrored, view = MirroredEnvironment(lobe, resampled(environment, _ROWS)), d.view
     bounds = list[np.ndarray]()
     for block in row_blocks(d.mask.shape):

@@ -10,7 +10,7 @@ Limits: no cast shadows, no interreflection. In an environment the lobe's width 
 are those of the view along z.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from .brdf.ggx import Ggx
 from .brdf.model import Model, check_range
 from .brdf.roughness import exponent_from_alpha, fitted_exponent
 from .lights import VIEW, DirectionalLight
-from .mirrored_environment import MirroredEnvironment
+from .mirrored_environment import MirroredEnvironment, narrowest_alpha
 from .radiance import directional, radiance
 
 DEFAULT_EXPONENT = 60.0
@@ -96,6 +96,8 @@ def lobe_in_environment(
 ) -> np.ndarray:
     """Compute the radiance of the lobe toward the viewer in an environment.
 
+    A lobe narrower than the pixels of the environment is taken to be as wide as these.
+
     Parameters
     ----------
     lobe : Lobe
@@ -110,7 +112,15 @@ def lobe_in_environment(
     -------
     (N, 3) ndarray
     """
-    return MirroredEnvironment(lobe.model, environment).toward(normal, view)
+    model = _widened(lobe, narrowest_alpha(len(environment))).model
+    return MirroredEnvironment(model, environment).toward(normal, view)
+
+
+def _widened(lobe: Lobe, alpha: float) -> Lobe:
+    """The lobe, at least as wide as one of `alpha`."""
+    if lobe.alpha is not None:
+        return replace(lobe, alpha=max(lobe.alpha, alpha))
+    return replace(lobe, exponent=min(lobe.exponent, float(exponent_from_alpha(alpha))))
 
 
 def _unit(normal: np.ndarray) -> np.ndarray:

@@ -9,7 +9,8 @@ Citation: R. Ramamoorthi, P. Hanrahan, "Frequency space environment map renderin
 doi:10.1145/566654.566611 (the integral; here it is summed directly).
 
 Limits: no cast shadows, no interreflection. The lobe's width and Fresnel's factor are those of the
-view along z.
+view along z. A lobe narrower than `narrowest_alpha` falls between the samples of the map and of the
+table: an even sky would be mirrored in spots. Callers take a lobe of that width instead.
 """
 
 import numpy as np
@@ -22,7 +23,24 @@ from .perspective import far_view_normals
 from .radiance import DistantLights, radiance
 
 _TABLE = 65  # samples of the stereographic plane along an axis
+_SAMPLES = 2.0  # alpha times the rows: with it, an even sky is mirrored evenly within 3 %
 _CHUNK = 1 << 17  # numbers looked up at a time, so that temporary arrays stay in the cache
+
+
+def narrowest_alpha(rows: int) -> float:
+    """Return the width of the narrowest lobe of which an environment map has enough samples.
+
+    Parameters
+    ----------
+    rows : int
+        Of the map.
+
+    Returns
+    -------
+    float
+        Alpha of GGX, or of the Blinn-Phong lobe with the exponent 2 / alpha^2 - 2; at most .5.
+    """
+    return min(_SAMPLES / min(rows, (_TABLE - 1) // 4), 0.5)
 
 
 class MirroredEnvironment:
@@ -31,7 +49,7 @@ class MirroredEnvironment:
     Parameters
     ----------
     model : Model
-        Its values have no colour.
+        Its values have no colour; its lobe is at least as wide as `narrowest_alpha`.
     environment : (rows, 2 rows, 3) ndarray
         Linear radiance, see `environment_map`.
     """

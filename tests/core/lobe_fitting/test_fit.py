@@ -11,7 +11,11 @@ from scipy.ndimage import gaussian_filter
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
-from isc_core.lobe_fitting.environment_response import respond_to, split_environment
+from isc_core.lobe_fitting.environment_response import (
+    interpolated_response,
+    respond_to,
+    split_environment,
+)
 from isc_core.lobe_fitting.lamps import Lamps, Problem, evaluate, step_parameters
 from isc_core.lobe_fitting.observed import observe
 from isc_core.lobe_fitting.pixels import choose_pixels
@@ -231,6 +235,16 @@ def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
     for model, lobe in (("ggx", Ggx(0.4)), ("blinn_phong", BlinnPhong(1.0, 2 / 0.4**2 - 2))):
         found = respond_to(split_environment(env_map), model, normal, 0.4)  # type: ignore[arg-type]
         np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
+
+
+@pytest.mark.parametrize(("size", "error"), [(48, 1e-9), (200, 0.06)])
+def test_a_sharp_lobe_is_predicted_as_sharp(size: int, error: float) -> None:
+    lamp = np.zeros((64, 128, 3))
+    lamp[20, 70] = 1 / solid_angles(64)[20, 70]
+    env_map, (normal, mask) = split_environment(lamp), ball(size)
+    exact = respond_to(env_map, "ggx", normal[mask], 0.05)
+    found = interpolated_response(env_map, "ggx", 0.05, normal[mask])
+    assert np.linalg.norm(found - exact) < error * np.linalg.norm(exact)
 
 
 @pytest.mark.slow

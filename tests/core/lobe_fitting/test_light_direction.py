@@ -36,6 +36,19 @@ def degrees(a: np.ndarray, b: np.ndarray) -> float:
     return float(np.rad2deg(np.arccos(np.clip(a @ b, -1, 1))))
 
 
+@pytest.mark.parametrize("exposure", [1e-6, 1e6])
+def test_the_exposure_does_not_matter(exposure: float) -> None:
+    d, factor = ball((48, 60), 20.0, (22.0, 33.0)), np.float32(exposure)
+    other = replace(
+        d, image=factor * d.image, specular=factor * d.specular, shading=factor * d.shading
+    )
+    for explain in (explain_shading, explain_specular):
+        one, same = explain(d), explain(other)
+        assert same.determined and same.explained == pytest.approx(one.explained, abs=1e-4)
+        assert same.cone == pytest.approx(one.cone, rel=0.02, abs=0.01)
+        assert degrees(one.light.direction, same.light.direction) < 0.05
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("direction", LIGHTS)
 def test_a_lambert_ball_tells_its_light(direction: tuple[float, float, float]) -> None:

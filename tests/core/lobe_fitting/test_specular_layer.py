@@ -23,14 +23,15 @@ def evenly_lit(radiance: float = 0.7, variation: np.ndarray | None = None) -> Co
     return CoatedSurface(normal, shading, environment, variation=variation)
 
 
+@pytest.mark.parametrize("roughness", [0.05, 0.4])
 @pytest.mark.parametrize("level", [0.3, 1.0])
-def test_under_an_even_sky_the_layer_is_not_seen(level: float) -> None:
+def test_under_an_even_sky_the_layer_is_not_seen(level: float, roughness: float) -> None:
     """What is left of the diffuse light and what the layer mirrors add up to the plain colour."""
     surface = evenly_lit()
-    layer = surface.layer(level, 0.4)
+    layer = surface.layer(level, roughness)
     assert layer is not None
     mask, color = surface.normal.any(-1), np.full(surface.normal.shape, 0.8)
-    share = specular_share(level, 0.4, surface.normal[mask][:, 2])[:, None]
+    share = specular_share(level, roughness, surface.normal[mask][:, 2])[:, None]
     seen = layer.color_under(color)[mask] * (1 - share) + share
     facing = surface.normal[mask][:, 2] > 0.5
     np.testing.assert_allclose(seen[facing], 0.8, rtol=0.02)

@@ -31,6 +31,14 @@ def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
     assert specular_upper_bound(grey, 0.3, 0 * even) == np.inf
 
 
+@pytest.mark.parametrize("roughness", [0.2, 0.4])
+def test_an_even_sky_is_mirrored_alike_from_all_sides(roughness: float) -> None:
+    d, even = glossy(), np.ones((16, 32, 3))
+    tilted = replace(d, normal=np.where(d.normal[..., 2:] > 0.7, d.normal, np.float32([0, 0, 1])))
+    grey = replace(tilted, image=np.full_like(d.image, 0.02))
+    assert specular_upper_bound(grey, roughness, even) == pytest.approx(0.5, rel=0.08)
+
+
 @pytest.mark.slow
 def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> None:
     d = glossy()

@@ -7,6 +7,7 @@ from isc_core.errors import InputError
 from isc_core.shading.brdf.energy import directional_albedo
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.lobe_rendering import Lobe, lobe_in_environment
 from isc_core.shading.radiance import DistantLights, directional, environment, radiance, sh_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
@@ -64,6 +65,15 @@ def test_a_cosine_sky_on_a_matt_surface_has_a_closed_form() -> None:
     normal = polar_units(np.array([1.0, 0.8, 0.3]))
     seen = radiance(Lambert(1.0), normal, normal, light)
     assert np.allclose(seen, 1 + 2 / 3 * normal[:, 2:], rtol=2e-3)
+
+
+@pytest.mark.parametrize("lobe", [Lobe(1e4), Lobe(alpha=0.01)])
+def test_a_narrow_lobe_mirrors_an_even_sky_evenly(lobe: Lobe) -> None:
+    tilt = np.linspace(0, np.radians(35), 12)
+    normals = np.stack([0.6 * np.sin(tilt), 0.8 * np.sin(tilt), np.cos(tilt)], axis=-1)
+    seen = lobe_in_environment(lobe, normals, np.ones((16, 32, 3)))[:, 0]
+    albedo = [directional_albedo(lobe.model, cosine) for cosine in normals[:, 2]]
+    np.testing.assert_allclose(seen, albedo, rtol=0.12)
 
 
 def test_our_light_is_the_exponential_of_harmonics() -> None:
