@@ -87,7 +87,7 @@ class Ellpack:
         array = np.zeros((len(self.columns), self.width), self.weights.dtype)
         rows = np.broadcast_to(np.arange(len(array))[:, None], self.columns.shape)
         kept = self.weights != 0
-        array[rows[kept], self.columns[kept]] = self.weights[kept]
+        np.add.at(array, (rows[kept], self.columns[kept]), self.weights[kept])
         return array
 
     def part(self, rows: slice, columns: slice) -> "Ellpack":

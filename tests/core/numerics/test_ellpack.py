@@ -51,6 +51,9 @@ def test_products_of_matrices_are_those_of_scipy() -> None:
 def test_entries_at_one_place_are_added() -> None:
     entries = np.array([1, 1, 0]), np.array([2, 2, 0]), np.array([3.0, 4.0, 1.0])
     assert_array_equal(Ellpack.of(*entries, (3, 3)).dense, [[1, 0, 0], [0, 0, 7], [0, 0, 0]])
+    twice = Ellpack(np.array([[2, 2]]), np.array([[3.0, 4.0]]), 3)
+    assert_array_equal(twice.dense, [[0, 0, 7]])
+    assert_array_equal(twice @ np.array([0.0, 0.0, 1.0]), [7])
 
 
 def test_a_matrix_may_be_empty() -> None:
