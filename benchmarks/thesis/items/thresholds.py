@@ -375,11 +375,6 @@ def _objective_verdicts(
     best = Holds.NO
     if hits["CS"] > 0.95 * total:
         best = Holds.YES if hits["CS"] == total else Holds.PARTLY
-    over_swarm = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["PSO"], total)[1]
-    over_clonal = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["ClonalG"], total)[1]
-    holds = Holds.UNDETERMINED if hits["CS"] > hits["PSO"] else Holds.NO
-    if over_swarm:
-        holds = Holds.YES if over_clonal else Holds.PARTLY
     return (
         ClaimVerdict(
             CHAOS_FINDS_OPTIMUM,
@@ -390,13 +385,29 @@ def _objective_verdicts(
             CHAOS_HELPS,
             f"CS reaches the optimum in {share['CS']} of runs, ClonalG in {share['ClonalG']}, "
             f"PSO in {share['PSO']}; CS on one orbit in {share['CS, one orbit']}.",
-            holds,
-            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source "
-            "of numbers."
-            if over_swarm and not over_clonal
-            else "",
+            *_more_often(hits, total),
         ),
     )
+
+
+def _more_often(hits: dict[str, int], total: int) -> tuple[Holds, str]:
+    """Judge by the intervals of the shares whether CS succeeds more often than the others."""
+    low, high = zip(*(wilson_interval(hits[search], total) for search in COMPARED), strict=True)
+    swarm, plain, chaotic = range(len(COMPARED))
+    over = {place: low[chaotic] > high[place] for place in (swarm, plain)}
+    if all(over.values()):
+        return Holds.YES, ""
+    if over[swarm] and low[plain] > high[swarm]:
+        return Holds.PARTLY, (
+            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source "
+            "of numbers."
+        )
+    if any(over.values()):
+        better, other = ("PSO", "ClonalG") if over[swarm] else ("ClonalG", "PSO")
+        return Holds.PARTLY, f"It beats {better}, but not {other}."
+    if any(hits["CS"] > hits[search] for search in ("PSO", "ClonalG")):
+        return Holds.UNDETERMINED, "Too few runs: the intervals of the shares overlap."
+    return Holds.NO, "It succeeds no more often than the others."
 
 
 def _speed_verdict(
@@ -404,25 +415,39 @@ def _speed_verdict(
     cases: list[tuple[str, int]],
     p_values: np.ndarray,
 ) -> ClaimVerdict:
-    chaotic, plain, swarm = (
-        np.concatenate([found[search, *case].needed for case in cases])
-        for search in ("CS", "ClonalG", "PSO")
-    )
-    more, p = rank_sum_test(chaotic, plain)
-    faster = p < _SIGNIFICANT and more < 0.5
+    needed = {
+        search: np.concatenate([found[search, *case].needed for case in cases])
+        for search in COMPARED
+    }
+    tests = {other: rank_sum_test(needed["CS"], needed[other]) for other in ("ClonalG", "PSO")}
+    faster = [p < _SIGNIFICANT and more < 0.5 for more, p in tests.values()]
     different = int((p_values < _SIGNIFICANT).sum())
-    medians = [np.median(needed[np.isfinite(needed)]) for needed in (chaotic, plain, swarm)]
+    pairs = " and ".join(
+        f"than {other} in {100 * more:.0f} % (p = {p:.2g})" for other, (more, p) in tests.items()
+    )
     return ClaimVerdict(
         CHAOS_HELPS,
-        f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO "
-        f"{medians[2]:.0f} in successful runs (medians). CS needs more than ClonalG in "
-        f"{100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of "
-        f"{len(cases)} cases differ.",
-        Holds.YES if faster else Holds.NO,
+        f"CS needs {_median(needed['CS'])} evaluations, ClonalG {_median(needed['ClonalG'])}, PSO "
+        f"{_median(needed['PSO'])} in successful runs (medians). Of pairs of runs, CS needs more "
+        f"{pairs}; {different} of {len(cases)} cases of CS and ClonalG differ.",
+        Holds.YES if all(faster) else Holds.PARTLY if any(faster) else Holds.NO,
         ""
-        if faster
-        else "Chaotic and pseudo-random numbers give indistinguishable speed of the search.",
+        if all(faster)
+        else f"{_speed_words('ClonalG', *tests['ClonalG'])} {_speed_words('PSO', *tests['PSO'])}",
     )
+
+
+def _speed_words(other: str, more: float, p: float) -> str:
+    """Say what the test of CS and another search shows."""
+    if p >= _SIGNIFICANT:
+        return f"The speed of CS and {other} cannot be told apart."
+    return f"CS is {'slower' if more > 0.5 else 'faster'} than {other}."
+
+
+def _median(needed: np.ndarray) -> str:
+    """Format the median over the successful runs."""
+    hit = needed[np.isfinite(needed)]
+    return f"{np.median(hit):.0f}" if len(hit) else "(never successful)"
 
 
 def _shares(

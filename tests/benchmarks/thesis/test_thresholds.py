@@ -11,9 +11,14 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from benchmarks.separation.thresholding import COUNTS, IMAGES
-from benchmarks.thesis.items.thresholds import exhaustive_search
+from benchmarks.thesis.items.thresholds import (
+    _more_often,
+    _speed_verdict,
+    exhaustive_search,
+)
 from benchmarks.thesis.measuring.context import Context
 from benchmarks.thesis.measuring.threshold_runs import (
+    ThresholdRuns,
     count_iterations,
     holm_correction,
     image_objective,
@@ -124,6 +129,50 @@ def test_intervals_and_tests_equal_known_values() -> None:
     assert share == 1.0 and p < 1e-6
     assert count_iterations("PSO", np.array([40, 41, 80, 120])).tolist() == [0, 1, 1, 2]
     assert count_iterations("CS", np.array([50, 51, 305, 306])).tolist() == [0, 1, 1, 2]
+
+
+@pytest.mark.parametrize(
+    ("swarm", "plain", "chaotic", "holds", "why"),
+    [
+        (100, 100, 150, "yes", ""),
+        (100, 150, 150, "partly", "so does plain ClonalG"),
+        (120, 135, 146, "partly", "It beats PSO, but not ClonalG"),
+        (150, 100, 150, "partly", "It beats ClonalG, but not PSO"),
+        (148, 150, 150, "undetermined", "Too few runs"),
+        (150, 150, 150, "no", "no more often"),
+        (150, 150, 100, "no", "no more often"),
+    ],
+)
+def test_more_successful_is_judged_against_both_other_searches(
+    swarm: int, plain: int, chaotic: int, holds: str, why: str
+) -> None:
+    found, words = _more_often({"PSO": swarm, "ClonalG": plain, "CS": chaotic}, 150)
+    assert found == holds and why in words and bool(words) == bool(why)
+
+
+@pytest.mark.parametrize(
+    ("swarm", "plain", "holds", "why"),
+    [
+        (2000, 2000, "yes", ""),
+        (-2000, 2000, "partly", "faster than ClonalG. CS is slower than PSO."),
+        (-2000, 0, "no", "CS and ClonalG cannot be told apart. CS is slower than PSO."),
+        (-2000, -2000, "no", "slower than ClonalG. CS is slower than PSO."),
+        (np.inf, np.inf, "yes", ""),
+    ],
+)
+def test_faster_is_judged_against_both_other_searches(
+    swarm: float, plain: float, holds: str, why: str
+) -> None:
+    chaotic = 4000 + np.arange(50.0)
+    found = {
+        (search, "camera", 3): ThresholdRuns(needed, needed, np.zeros((50, 3)))
+        for search, needed in (
+            ("CS", chaotic), ("ClonalG", chaotic + plain), ("PSO", chaotic + swarm)
+        )
+    }  # fmt: skip
+    verdict = _speed_verdict(found, [("camera", 3)], np.array([0.5]))
+    assert verdict.holds == holds and why in verdict.why and bool(verdict.why) == bool(why)
+    assert "nan" not in verdict.here
 
 
 @pytest.mark.slow
