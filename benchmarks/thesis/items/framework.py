@@ -69,14 +69,13 @@ def _framework(context: Context) -> ItemContent:
     d = decompose_subject(context, subject)
     gain = exposure(d.image, d.mask)
     shown = characteristic_panels(d)
-    if d.brdf is not None:
-        shown.append(Panel("the fitted lobe's highlights", d.brdf.predicted, d.mask, gain=gain))
+    shown += _lobe_panel(d, "the fitted lobe", gain)
     sun = explain_shading(d).light.direction
     white = np.repeat(np.maximum(d.normal @ sun, 0)[..., None], 3, axis=2)
     shown.append(Panel("white, under the single light that explains most", white, d.mask, gain=0.9))
     turned = relight(d, NewLight(coefficients=turned_light(d.illumination, turn(yaw=70))))
     shown.append(Panel("relit: the light turned by 70°", turned.image, d.mask, gain=gain))
-    rebuilt = d.reflectance * d.shading + d.specular + d.residual
+    rebuilt = d.reflectance * d.shading + d.specular
     shown.append(Panel("rebuilt: reflectance × shading + specular", rebuilt, d.mask, gain=gain))
     seconds = tuple((name, float(value)) for name, value in d.provenance.timings.items())
     table = ItemTable(("stage", "seconds"), seconds, f"{subject.name}: time per stage.")
@@ -336,7 +335,7 @@ def _mdr(context: Context) -> ItemContent:
 def _lobe_panel(d: Decomposition, title: str, gain: float) -> list[Panel]:
     return (
         []
-        if d.brdf is None
+        if d.brdf is None or not d.brdf.predicted.any()
         else [Panel(f"{title}: its highlights", d.brdf.predicted, d.mask, gain=gain)]
     )
 
@@ -356,9 +355,15 @@ def _lobe_words(d: Decomposition) -> str:
     """Return a sentence if the fitted lobe explains little of the specular layer; else nothing."""
     if d.brdf is None or d.brdf.explained >= _LEAST_EXPLAINED:
         return ""
+    if not d.brdf.predicted.any():
+        return f" No lobe was fitted ({outcome_text(d.brdf.outcome)})."
+    if d.brdf.determined:
+        return (
+            " The fitted lobe explains little of the specular layer: with the estimated "
+            "shape, its highlight is elsewhere."
+        )
     return (
-        " The fitted lobe explains little of the specular layer: with the estimated "
-        "shape, its highlight is elsewhere."
+        f" The fitted lobe explains little of the specular layer ({outcome_text(d.brdf.outcome)})."
     )
 
 

@@ -31,6 +31,8 @@ from benchmarks.thesis.report.item import ItemContent, ThesisItem
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.diagnostics import LobeFitOutcome
+from isc_core.scene.lobe_fit import LobeFit
 from isc_core.separation.support.filter_statistics import BINS, FILTERS
 from isc_core.shading.brdf.phong import Phong
 from isc_core.shading.lights import toward
@@ -283,6 +285,21 @@ def test_edits_change_only_what_was_requested(context: Context) -> None:
     assert set(column(recoloured, "of the highlights (%)").values()) == {0.0}
     assert min(column(recoloured, "change inside (%)").values()) > 1
     assert max(column(recoloured, "change of luminance (%)").values()) < 5
+
+
+def test_a_lobe_that_was_not_fitted_is_not_said_to_lie_elsewhere() -> None:
+    d = ball((32, 32), 14.0, (15.5, 15.5))
+    none = LobeFit.without_lobe("ggx", LobeFitOutcome.NO_SPECULAR, d.image.shape)
+    bare = replace(d, brdf=none)
+    assert framework._lobe_words(bare) == (
+        " No lobe was fitted (undetermined: there is no specular light)."
+    )
+    assert framework._lobe_panel(bare, "3. GGX lobe", 1.0) == []
+    wide = replace(d, brdf=replace(none, outcome=LobeFitOutcome.SMOOTH_LIGHT, predicted=d.image))
+    assert "in smooth light, any roughness" in framework._lobe_words(wide)
+    moved = replace(d, brdf=replace(none, outcome=LobeFitOutcome.DETERMINED, predicted=d.image))
+    assert framework._lobe_words(moved).endswith("its highlight is elsewhere.")
+    assert len(framework._lobe_panel(moved, "3. GGX lobe", 1.0)) == 1
 
 
 def test_no_search_beats_the_exact_one(context: Context) -> None:
