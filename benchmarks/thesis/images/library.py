@@ -15,8 +15,10 @@ those published on the codes.
 """
 
 import hashlib
-from collections.abc import Callable, Iterator
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,8 +37,10 @@ KINDS = ("specular", "synthetic", "diffuse")
 SIGNIFICANT = ("apple", "pear", "potato", "teabag1", "teabag2")
 FULL_PHOTO = 320  # longest side of a photo, pixels
 _QUICK_COUNT, _DIFFUSE_COUNT, _GLOSSY_COUNT = 2, 4, 3
+_BESIDE = ("photos", "highlight")
 _SETS = ("", "mit_berkeley_train", "data", "data/mit_berkeley_train")
 _LABORATORY = ("laboratory", "MIT-Berkeley-Laboratory")
+_NATURAL = ("natural", "MIT-Berkeley-Natural")
 _PHOTO_SUFFIXES = (".png", ".bmp", ".ppm", ".jpg", ".jpeg", ".tif", ".tiff")
 
 
@@ -108,22 +112,23 @@ class SubjectLibrary:
                 self._sized(replace(s, kind="photo", diffuse=None, specular=None, truth=None))
                 for s in self._first(rendered_subjects)
             )
+        stems = Counter(path.stem for path in paths)
         return tuple(
-            self._sized(_photo(path)) for path in (paths[:_QUICK_COUNT] if self.quick else paths)
+            self._sized(
+                # Results are kept by name.
+                _photo(
+                    path,
+                    path.stem if stems[path.stem] == 1 else f"{path.parent.name}-{path.name}",
+                )
+            )
+            for path in (paths[:_QUICK_COUNT] if self.quick else paths)
         )
 
     @property
     def photo_paths(self) -> list[Path]:
         """Photo files without ground truth."""
-        folders = [
-            folder for name in ("photos", "highlight") if (folder := self._beside(name)) is not None
-        ]
-        paths = [
-            p
-            for folder in folders
-            for p in sorted(folder.iterdir())
-            if p.suffix.lower() in _PHOTO_SUFFIXES
-        ]
+        folders = [folder for name in _BESIDE if (folder := self._beside(name)) is not None]
+        paths = [path for folder in folders for path in _pictures(folder)]
         return [
             path
             for path in paths
@@ -132,18 +137,24 @@ class SubjectLibrary:
 
     @property
     def fingerprint(self) -> str:
-        """Digest of the names of the available data."""
+        """Digest of the contents of the available data, wherever the folder is."""
         if self.data is None:
             return "rendered"
-        names = [
-            *self._objects,
-            *(
-                folder.name
-                for name in ("photos", "highlight")
-                if (folder := self._beside(name)) is not None
-            ),
-        ]
-        return hashlib.sha256(" ".join(names).encode()).hexdigest()[:12]
+        beside = [folder for name in _BESIDE if (folder := self._beside(name)) is not None]
+        return _digest(
+            [
+                self._objects_fingerprint,
+                *(f"{each.name} {_files_digest(each, _pictures(each))}" for each in beside),
+            ]
+        )
+
+    @property
+    def _objects_fingerprint(self) -> str:
+        """Digest of MIT-Berkeley's files; empty without a copy."""
+        if self._root is None:
+            return ""
+        folders = [self._root / name for name in (*_LABORATORY, *_NATURAL)]
+        return _digest(_files_digest(folder, folder.rglob("*")) for folder in folders)
 
     def check(self) -> None:
         """Check that the data folder holds a known data set.
@@ -160,11 +171,7 @@ class SubjectLibrary:
                 f"{self.data} is not a folder; pass the folder that holds MIT-Berkeley "
                 f"({' or '.join(_LABORATORY)})"
             )
-        if (
-            self._root is None
-            and self._beside("photos") is None
-            and self._beside("highlight") is None
-        ):
+        if self._root is None and all(self._beside(name) is None for name in _BESIDE):
             raise InputError(
                 f"{self.data} holds no known data set; expected MIT-Berkeley "
                 f"({' or '.join(_LABORATORY)}), highlight/ or photos/"
@@ -210,7 +217,7 @@ class SubjectLibrary:
             yield _laboratory(self._required_root(), name, "original", "specular")
         for name in pairs:
             assert highlight is not None
-            yield _shen_zheng(highlight, name)
+            yield _shen_zheng(highlight, name, f"highlight-{name}" if name in names else name)
 
     def _synthetic(self, monitor: Monitor) -> Iterator[Subject]:
         yield from self._rendered("glossy", monitor)
@@ -238,6 +245,7 @@ class SubjectLibrary:
             family,
             self.cache,
             self._root,
+            self._objects_fingerprint,
             names,
             QUICK_SIZE if self.quick else 256,
             self.seed,
@@ -269,8 +277,8 @@ def _laboratory(root: Path, name: str, used: str, kind: str) -> Subject:
     return Subject(name, kind, image, truth.mask, diffuse, np.maximum(image - diffuse, 0), truth)
 
 
-def _shen_zheng(folder: Path, name: str) -> Subject:
-    pair = load_shen_zheng(folder, name)
+def _shen_zheng(folder: Path, file: str, name: str) -> Subject:
+    pair = load_shen_zheng(folder, file)
     image, diffuse = (
         srgb_to_linear(layer).astype(np.float32) for layer in (pair.image, pair.diffuse)
     )
@@ -287,7 +295,7 @@ def _without_highlights(subject: Subject) -> Subject:
     return Subject(subject.name, "diffuse", image, subject.mask, image, np.zeros_like(image), truth)
 
 
-def _photo(path: Path) -> Subject:
+def _photo(path: Path, name: str) -> Subject:
     photo = read_photo(
         path,
         None,
@@ -301,4 +309,36 @@ def _photo(path: Path) -> Subject:
         slice(max(rows.start - 4, 0), rows.stop + 4),
         slice(max(columns.start - 4, 0), columns.stop + 4),
     )
-    return Subject(path.stem, "photo", photo.image[part], photo.mask[part])
+    return Subject(name, "photo", photo.image[part], photo.mask[part])
+
+
+def _pictures(folder: Path) -> list[Path]:
+    """List the image files of a folder by name."""
+    return [path for path in sorted(folder.iterdir()) if path.suffix.lower() in _PHOTO_SUFFIXES]
+
+
+def _files_digest(folder: Path, files: Iterable[Path]) -> str:
+    """Digest of the names and contents of some files of a folder; empty if there are none."""
+    return _digest(
+        f"{path.relative_to(folder).as_posix()} {_content(path, size, changed)}"
+        for path in sorted(files)
+        if path.is_file()
+        for size, changed in [(path.stat().st_size, path.stat().st_mtime_ns)]
+    )
+
+
+@cache
+def _content(path: Path, size: int, changed: int) -> str:
+    """Digest of a file, read again only after its size or time changed."""
+    del size, changed
+    try:
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+
+
+def _digest(parts: Iterable[str]) -> str:
+    """Digest of several texts; empty if there are none."""
+    each = list(parts)
+    return hashlib.sha256("\n".join(each).encode()).hexdigest()[:12] if each else ""

@@ -7,7 +7,8 @@ synth`. All have the ground truth of every layer, stored like that of MIT-Berkel
 
 Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: `glossy` replaces it.
 
-Limits: a cached image is identified by its file name, which contains the program's version.
+Limits: a cached image is identified by its file name, which contains the program's version and a
+digest of the MIT-Berkeley files.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -84,6 +85,7 @@ def rendered_subjects(
     family: str,
     folder: Path,
     root: Path | None,
+    version: str,
     objects: Sequence[str],
     size: int,
     seed: int,
@@ -99,6 +101,8 @@ def rendered_subjects(
         Cache of rendered images.
     root : Path or None
         MIT-Berkeley folder used by "glossy"; None uses own objects.
+    version : str
+        Digest of that folder.
     objects : sequence of str
         MIT-Berkeley objects used by "glossy".
     size : int
@@ -120,7 +124,7 @@ def rendered_subjects(
     Cancelled
         If the user cancels.
     """
-    origin = "-data" if root is not None and family == "glossy" else ""
+    origin = f"-{version}" if root is not None and family == "glossy" else ""
     for name, make in _plans(family, root, objects, size, seed):
         path = folder / f"{family}-{name}-{size}-{seed}-{__version__}{origin}.npz"
         if not path.is_file():

@@ -2,7 +2,7 @@
 
 Rows are JSON objects. The rows of a key are kept below `output/.work/rows`, so that an interrupted
 run resumes and items share expensive results. They are reused only for the same seed, size of the
-run, data and program version.
+run, contents of the data and program version.
 
 Limits: a kept row does not depend on the code that made it: after a change within one version,
 `--again` recomputes it.

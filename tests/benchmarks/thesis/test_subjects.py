@@ -3,9 +3,11 @@ either layout, smaller copies.
 """
 
 import os
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -164,6 +166,37 @@ def test_the_fingerprint_follows_the_data(shared: Path, tmp_path: Path) -> None:
         )
         == 3
     )
+
+
+def photo_folder(folder: Path, files: dict[str, int]) -> Path:
+    """A data folder with photos of a brighter and a darker half."""
+    (folder / "photos").mkdir(parents=True)
+    for name, level in files.items():
+        picture = np.zeros((24, 24, 3), np.uint8)  # a black border, outside of the object
+        picture[6:-6, 6:-6] = level
+        picture[6:-6, 12:-6] = level - 50
+        assert cv2.imwrite(str(folder / "photos" / name), picture)
+    return folder
+
+
+def test_results_of_other_photos_are_not_taken_for_those_of_these(tmp_path: Path) -> None:
+    one, other = (
+        Context(tmp_path / "out", photo_folder(tmp_path / name, {"cup.png": level}))
+        for name, level in (("a", 100), ("b", 200))
+    )
+    assert one.fingerprint != other.fingerprint, "the photos differ, only their names agree"
+    assert one.rows("key", lambda: [{"of": "one"}]) != other.rows("key", lambda: [{"of": "other"}])
+    shutil.copytree(tmp_path / "a", tmp_path / "moved")
+    assert Context(tmp_path / "out", tmp_path / "moved").fingerprint == one.fingerprint
+    photo_folder(tmp_path / "c", {"cup.png": 100, "hat.png": 100})
+    assert Context(tmp_path / "out", tmp_path / "c").fingerprint != one.fingerprint
+
+
+def test_photos_of_one_stem_have_different_names(tmp_path: Path) -> None:
+    """Their decompositions are kept by name."""
+    data = photo_folder(tmp_path, {"cup.png": 100, "cup.bmp": 200, "hat.png": 150})
+    photos = SubjectLibrary(tmp_path / "cache", data, False, 0).photos(Monitor())
+    assert [photo.name for photo in photos] == ["photos-cup.bmp", "photos-cup.png", "hat"]
 
 
 def test_a_folder_without_known_data_is_refused(tmp_path: Path) -> None:
