@@ -18,7 +18,7 @@ from .measuring.context import Context
 from .registry import all_items
 from .report.files import write_index, write_item
 from .report.item import ThesisItem
-from .report.records import ItemRecord, is_complete, read_record
+from .report.records import ItemRecord, is_complete, read_record, read_records
 
 _DEFAULT_SECONDS = 10.0  # of an item without a record
 
@@ -73,6 +73,8 @@ def make_items(
         for item in wanted
         if again or not is_complete(context.output, item.name, context.fingerprint)
     ]
+    if not missing:
+        write_index(context.output, all_items())
     failed: list[tuple[str, str]] = []
     for item, part in _with_monitors(missing, context):
         try:
@@ -102,8 +104,9 @@ def item_states(items: Sequence[ThesisItem], folder: Path) -> Iterator[str]:
     str
         One line per item, followed by one per verdict.
     """
+    records = read_records(folder, items)
     for item in items:
-        record = read_record(folder, item.name)
+        record = records.get(item.name)
         reason = f" ({item.reason})" if item.make is None else ""
         yield f"{item.kind:6s} {item.number:5s} {_state(item, record):15s} {item.title}{reason}"
         for verdict in record.verdicts if record is not None else ():

@@ -125,8 +125,12 @@ def publish(source: Path, target: Path, items: Sequence[ThesisItem]) -> list[Pat
     Raises
     ------
     InputError
-        If `source` has no items, or `target` cannot be written.
+        If `source` has no items, or `target` is the same folder or cannot be written.
     """
+    if source.resolve() == target.resolve():
+        raise InputError(
+            f"{target} holds the items themselves; publish to another folder with --to"
+        )
     records = read_records(source, items)
     if not records:
         raise InputError(f"{source} has no items; run `isc thesis all -o {source}` first")

@@ -116,10 +116,14 @@ def read_records(folder: Path, items: Iterable[ThesisItem]) -> dict[str, ItemRec
     Returns
     -------
     dict of str to ItemRecord
-        By the item's name; items without a record are omitted.
+        By the item's name; items without a record, or of which a file is missing, are omitted.
     """
     records = ((item.name, read_record(folder, item.name)) for item in items)
-    return {name: record for name, record in records if record is not None}
+    return {
+        name: record
+        for name, record in records
+        if record is not None and _has_files(folder, record)
+    }
 
 
 def remove_record(folder: Path, name: str) -> None:
@@ -152,11 +156,7 @@ def is_complete(folder: Path, name: str, fingerprint: str) -> bool:
     bool
     """
     record = read_record(folder, name)
-    return (
-        record is not None
-        and record.fingerprint == fingerprint
-        and all((folder / file).is_file() for file in record.files)
-    )
+    return record is not None and record.fingerprint == fingerprint and _has_files(folder, record)
 
 
 def describe_machine() -> str:
@@ -179,6 +179,10 @@ def _processor() -> str:
         return done.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return platform.machine()
+
+
+def _has_files(folder: Path, record: ItemRecord) -> bool:
+    return all((folder / file).is_file() for file in record.files)
 
 
 def _record_path(folder: Path, name: str) -> Path:

@@ -356,3 +356,27 @@ def test_published_are_the_index_the_tables_pages_and_a_sheet_per_chapter(tmp_pa
     assert sheet.shape[1] > 300 and np.ptp(sheet) > 240  # JPEG rounds white and black
     with pytest.raises(InputError, match="has no items"):
         publish(tmp_path / "empty", target, items_made)
+
+
+def test_an_item_without_its_files_is_neither_listed_as_made_nor_published(tmp_path: Path) -> None:
+    source, target = Context(tmp_path / "out"), tmp_path / "docs"
+    items_made = (item(), ThesisItem("figure", "8.1", "A figure", lambda context: drawn()))
+    for one in items_made:
+        write_item(one, drawn(), source, 1.0)
+    with pytest.raises(InputError, match="publish to another folder"):
+        publish(source.output, tmp_path / "docs" / ".." / "out", items_made)
+    (source.output / "figure-8.1.png").unlink()
+    assert "figure 8.1   not made" in list(item_states(items_made, source.output))[-1]
+    publish(source.output, target, items_made)
+    index = (target / "README.md").read_text(encoding="utf-8")
+    assert "chapter-8.jpg" not in index and "1 of 2 items are available" in index
+    (source.output / "table-9.1.md").unlink()
+    with pytest.raises(InputError, match="has no items"):
+        publish(source.output, target, items_made)
+
+
+def test_a_run_in_which_all_is_complete_writes_the_index_anew(tmp_path: Path) -> None:
+    make_items([item()], Context(tmp_path))
+    (tmp_path / "README.md").unlink()
+    assert make_items([item()], Context(tmp_path)).kept == 1
+    assert (tmp_path / "README.md").is_file()
