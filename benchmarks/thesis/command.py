@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING
 
 from isc_core.cli.interface.parser import describe, hints
 from isc_core.cli.interface.values import count
-from isc_core.errors import InputError
+from isc_core.errors import InputError, Rejected
 from isc_core.extras import install_command
 from isc_core.progress import Monitor
 
 if TYPE_CHECKING:
+    from .making import MakeSummary
     from .report.item import ThesisItem
 
 _DEFAULT = Path("build") / "thesis"
@@ -181,7 +182,7 @@ def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     item = find_item(options.kind, options.number)
     if item.make is None:
         raise InputError(f"{item.kind} {item.number} cannot be regenerated: {item.reason}")
-    return _make(options, [item], monitor)
+    return _summary_lines(options, _make(options, [item], monitor))
 
 
 def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -203,6 +204,8 @@ def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     ------
     InputError
         If data or folders cannot be used.
+    Rejected
+        If some items cannot be made; the others are complete.
     Cancelled
         If the user cancels.
     """
@@ -212,8 +215,12 @@ def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     from .report.records import read_records
 
     items, folder = all_items(), options.output
-    lines = _make(options, [item for item in items if item.make is not None], monitor)
+    summary = _make(options, [item for item in items if item.make is not None], monitor)
     write_chapter_sheets(folder, folder, items, read_records(folder, items))
+    lines = _summary_lines(options, summary)
+    if summary.failed:
+        reasons = (f"{name} was not made: {reason}" for name, reason in summary.failed)
+        raise Rejected("\n".join(reasons), lines)
     return lines
 
 
@@ -256,14 +263,16 @@ def _require_libraries() -> None:
 
 def _make(
     options: argparse.Namespace, wanted: "Sequence[ThesisItem]", monitor: Monitor
-) -> list[str]:
+) -> "MakeSummary":
     from .making import make_items
     from .measuring.context import Context
 
     context = Context(options.output, options.data, options.quick, options.seed, monitor)
     if options.again:
         context = replace(context, fresh_since=time.time())
-    summary = make_items(wanted, context, again=options.again)
-    lines = [f"{summary.made} made, {summary.kept} kept; index: {options.output / 'README.md'}"]
-    lines += [f"not made: {name}: {reason}" for name, reason in summary.failed]
-    return hints(options, *lines)
+    return make_items(wanted, context, again=options.again)
+
+
+def _summary_lines(options: argparse.Namespace, summary: "MakeSummary") -> list[str]:
+    index = options.output / "README.md"
+    return hints(options, f"{summary.made} made, {summary.kept} kept; index: {index}")

@@ -9,7 +9,7 @@ from ...errors import InputError
 
 EXIT_CODES = (
     "exit codes: 0 success; 1 finished with failures (several photos or objects, batch,\n"
-    "validate); 2 invalid input, stderr names the remedy; 130 cancelled."
+    "thesis, validate); 2 invalid input, stderr names the remedy; 130 cancelled."
 )
 # Where `add_general_options` stores its values.
 GENERAL = ("quiet", "verbose", "progress", "cancel_at_eof", "config", "no_config")

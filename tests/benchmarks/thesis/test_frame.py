@@ -380,3 +380,17 @@ def test_a_run_in_which_all_is_complete_writes_the_index_anew(tmp_path: Path) ->
     (tmp_path / "README.md").unlink()
     assert make_items([item()], Context(tmp_path)).kept == 1
     assert (tmp_path / "README.md").is_file()
+
+
+def test_a_run_with_failed_items_ends_with_1_and_names_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(context: Context) -> ItemContent:
+        raise InputError("too few images")
+
+    items_made = (item("9.1"), item("9.2", fails))
+    monkeypatch.setattr("benchmarks.thesis.registry.all_items", lambda: items_made)
+    monkeypatch.setattr("benchmarks.thesis.making.all_items", lambda: items_made)
+    assert isc(["thesis", "all", "-q", "-o", str(tmp_path)]) == 1
+    assert "table 9.2 was not made: too few images" in capsys.readouterr().err
+    assert (tmp_path / "table-9.1.md").is_file()
