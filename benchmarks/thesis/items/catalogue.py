@@ -405,7 +405,7 @@ def _characteristics(context: Context) -> ItemContent:
         "Y_k are orthonormal real spherical harmonics in the order (0,0) (1,-1) (1,0) "
         "(1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2). Maps are 0 outside the mask, normals "
         "(0, 0, 1). If a lobe was fitted, `lobe.R .G .B` is the specular light that it "
-        "predicts."
+        "predicts. "
         + (
             "Compared with a saved result: all fields, shapes and channels are as listed."
             if not wrong

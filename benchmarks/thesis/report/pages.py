@@ -273,11 +273,14 @@ def _settings(records: Mapping[str, ItemRecord]) -> str:
     commands = [record.command for record in records.values()]
     own = sum("--data" not in command for command in commands)
     quick = sum("--quick" in command for command in commands)
+    runs = len({record.fingerprint for record in records.values()})
     text = ""
     if own:
-        text += f", {own} of them on images rendered by the project or packaged with scikit-image"
+        text += f", {own} of them without `--data`: rendered by the project or from scikit-image"
     if quick:
         text += f", {quick} of them by a quick run: few small images, weak verdicts"
+    if runs > 1:
+        text += f"; they come from {runs} runs that differ in options, data or version"
     return text
 
 

@@ -228,7 +228,11 @@ def test_the_index_has_every_claim_and_every_item(tmp_path: Path) -> None:
         and "9.2 | A table | not made yet" in text
         and "not regenerable: nothing is computed in it" in text
     )
-    assert "glossy-mit" in text and "1 of 3 items are available" in text
+    assert "glossy-mit" in text and "1 of 3 items are available, 1 of them without `--data`" in text
+    other = write_item(item("9.2"), drawn(), Context(tmp_path, tmp_path, quick=True, seed=3), 1.0)
+    text = index_page([item(), item("9.2")], {"table-9.1": record, "table-9.2": other})
+    assert "1 of them without `--data`" in text and "1 of them by a quick run" in text
+    assert "they come from 2 runs" in text
 
 
 def test_a_damaged_record_counts_as_none(tmp_path: Path) -> None:
