@@ -113,7 +113,12 @@ def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int)
             format_ratio(paired_ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
             for name in METRICS
         ]
-        lines.append((label, *(["1"] * len(METRICS) if label == SIRFS.label else cells)))
+        lines.append(
+            (
+                _with_refusals(rows, label),
+                *(["1"] * len(METRICS) if label == SIRFS.label else cells),
+            )
+        )
     count = len({row.subject for row in rows})
     header = ("framework", *(_NAMES[name].partition(",")[0] for name in METRICS))
     return ItemTable(
@@ -159,7 +164,7 @@ def _speed(rows: Sequence[FrameworkErrors], seed: int) -> ItemTable:
             )
         ]
         means = [geometric_mean(each.values()) for each in (seconds, evaluations)]
-        lines.append((label, *means, *ratios))
+        lines.append((_with_refusals(rows, label), *means, *ratios))
     header = (
         "framework",
         "seconds",
@@ -204,6 +209,13 @@ def _time_verdict(rows: Sequence[FrameworkErrors], seed: int) -> ClaimVerdict:
         judged.holds,
         f"{why}evaluations, which do not depend on the load of the machine: {found} of SIRFS",
     )
+
+
+def _with_refusals(rows: Sequence[FrameworkErrors], label: str) -> str:
+    """Add the number of subjects that a framework refuses, which its means do not contain."""
+    count = len({row.subject for row in rows})
+    refused = count - len({row.subject for row in rows if row.framework == label})
+    return f"{label} (refuses {refused} of {count})" if refused else label
 
 
 def _of(rows: Sequence[FrameworkErrors], label: str, name: str) -> dict[str, float]:

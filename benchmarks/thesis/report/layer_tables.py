@@ -5,6 +5,8 @@ subjects are summarised by geometric means, so that no single dark or bright ima
 without highlights have no such ratio: the share of light removed is reported instead.
 
 Limits: where doing nothing is right, PSNR is infinite; PSNR of a mean is that of the mean error.
+Means of a method that refuses subjects are over the others, so that they compare with its ratios
+only; its row says how many it refuses.
 """
 
 import math
@@ -158,7 +160,7 @@ def accuracy_table(
         more = () if reference is None else (_compared(runs, label, layer[0], reference, seed),)
         rows.append(
             (
-                label,
+                _with_refusals(label, subjects),
                 relative_error(runs, label, kind, layer, seed),
                 format_cell(times_thousand(mean_or_none(local.values()))),
                 format_cell(None if level is None else decibels(level), ".2f"),
@@ -173,6 +175,12 @@ def accuracy_table(
         tuple(rows),
         f"The {_layer_name(layer)} layer, {count} subjects, {KINDS[kind]}",
     )
+
+
+def _with_refusals(label: str, subjects: Mapping[str, Sequence[SeparationScores]]) -> str:
+    """Add the number of subjects that a method refuses, which its means do not contain."""
+    refused = sum(any(run.refused for run in runs) for runs in subjects.values())
+    return f"{label} (refuses {refused} of {len(subjects)})" if refused else label
 
 
 def _layer_name(layer: LayerFields) -> str:
@@ -280,7 +288,14 @@ def speed_table(
             for name in names
         ]
         ratios = (_compared(runs, label, name, reference, seed) for name in names)
-        rows.append((label, *times, format_cell(geometric_or_none(rates)), *ratios))
+        rows.append(
+            (
+                _with_refusals(label, subjects),
+                *times,
+                format_cell(geometric_or_none(rates)),
+                *ratios,
+            )
+        )
     header = (
         "method",
         *(f"{what}, ms" for what in names.values()),

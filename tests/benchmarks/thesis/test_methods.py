@@ -23,7 +23,11 @@ from benchmarks.thesis.items import characteristics, removal, segmentation, shee
 from benchmarks.thesis.measuring import framework_runs, separation_scores
 from benchmarks.thesis.measuring.context import Context
 from benchmarks.thesis.measuring.framework_runs import AFTER, BOUND, SIRFS
-from benchmarks.thesis.measuring.separation_scores import NOTHING, SeparatorSetting
+from benchmarks.thesis.measuring.separation_scores import (
+    NOTHING,
+    SeparationScores,
+    SeparatorSetting,
+)
 from benchmarks.thesis.report import layer_tables
 from benchmarks.thesis.report.comparing import judge_reduction, paired_ratio, rank_sum_p
 from benchmarks.thesis.report.layer_tables import DIFFUSE, SPECULAR
@@ -190,6 +194,38 @@ def test_a_photo_that_a_method_rejects_is_a_row_with_the_reason(context: Context
         DIFFUSE,
     )
     assert table.rows[1][2] == "refused"
+
+
+def test_a_method_that_refuses_hard_subjects_is_marked_in_every_summary(
+    rows: list[framework_runs.FrameworkErrors],
+) -> None:
+    def scores(label: str, error: float, refused: str = "") -> list[SeparationScores]:
+        known = SeparationScores("", label, 0, 0.01)
+        if refused:
+            return [replace(known, refused=refused)]
+        return [replace(known, mse=error, lmse=error, ssim=1 - error, seconds=0.1)]
+
+    runs = {
+        NOTHING.label: {"easy": scores("", 0.001), "hard": scores("", 0.1)},
+        "always": {"easy": scores("always", 0.001), "hard": scores("always", 0.05)},
+        "choosy": {"easy": scores("choosy", 0.001), "hard": scores("choosy", 0, "grey")},
+    }
+    for table in (
+        layer_tables.accuracy_table(runs, "specular", DIFFUSE, 0),
+        layer_tables.speed_table(runs, lambda label: "always", 0, "always"),
+    ):
+        assert [row[0] for row in table.rows] == [
+            NOTHING.label, "always", "choosy (refuses 1 of 2)",
+        ]  # fmt: skip
+    first = rows[0].subject
+    fewer = [row for row in rows if (row.subject, row.framework) != (first, BOUND.label)]
+    for table in (
+        characteristics.relative_error_table(fewer, "balls", 0),
+        characteristics._speed(fewer, 0),
+    ):
+        assert [row[0] for row in table.rows] == [
+            "SIRFS", "SIRFS-MBP", f"{BOUND.label} (refuses 1 of 2)",
+        ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
