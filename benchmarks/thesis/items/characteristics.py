@@ -242,9 +242,10 @@ _AFTER_TEXT = (
 _BEFORE_TEXT = (
     "Below 1 is better than SIRFS on the photo. MZK06 and YCK06 in their improved "
     "variants, SC with both specular-free images; MDR-SIRFS with the separation "
-    "`isc`. The last row is the result of a perfect separation and bounds the "
-    "possible gain. docs/research_log/models.md has more objects and levels of specular light, "
-    "cross-validated."
+    "`isc`. The last row is SIRFS after a perfect separation. It is no bound: errors "
+    "of a separation and of SIRFS can cancel, and `joint` also uses shape and light "
+    "for the separation. docs/research_log/models.md has more objects and levels of "
+    "specular light, cross-validated."
 )
 _TIME_TEXT = "Seconds include separation and SIRFS. They depend on the load of the machine."
 

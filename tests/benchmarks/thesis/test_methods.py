@@ -146,6 +146,19 @@ def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Conte
     assert layer_tables.relative_error(bare, NOTHING.label, "diffuse", DIFFUSE, 0) == "0.00"
 
 
+def test_the_text_of_a_table_says_what_its_figures_say(context: Context) -> None:
+    runs = layer_tables.score_settings(context, "diffuse", removal.settings())
+    said = removal.accuracy_text(runs)
+    for words in ("as published", "improved"):
+        removed = [
+            float(layer_tables.relative_error(runs, label, "diffuse", DIFFUSE, 0))
+            for label in runs
+            if label.endswith(words)
+        ]
+        assert f"{min(removed):.1f} to {max(removed):.1f} % {words}" in said
+    assert "remove" not in removal.accuracy_text({NOTHING.label: runs[NOTHING.label]})
+
+
 def test_every_search_marks_the_pixels_of_the_exact_one(context: Context) -> None:
     subject = context.subjects("specular")[0]
     exact = next(way for way in segmentation.SETTINGS if way.label == "exact search, as published")
