@@ -6,7 +6,8 @@ scenes with known shape and light. Two rows are added: `joint`, this project's m
 the true diffuse image, which is the result of a perfect separation.
 
 Equation: errors as in `isc_core.evaluation.metrics.Scores`; the ratio of geometric means over the
-subjects, with the interval of resampled subjects.
+subjects, with the interval of resampled objects: with public data, a photo and a synthetic image
+may show the same one.
 
 Citation: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712; B. Efron (1979),
 doi:10.1214/aos/1176344552.
@@ -18,6 +19,7 @@ few subjects the intervals are wide.
 
 from collections.abc import Callable, Sequence
 
+from isc_core.evaluation.evaluate import Ratio
 from isc_core.evaluation.metrics import geometric_mean
 
 from ..measuring.context import Context
@@ -33,7 +35,7 @@ from ..measuring.framework_runs import (
     subjects_with_truth,
 )
 from ..report import claims
-from ..report.comparing import format_ratio, judge_reduction, paired_ratio
+from ..report.comparing import format_ratio, judge_reduction, object_of_kind, paired_ratio
 from ..report.item import Cell, ClaimVerdict, ItemContent, ItemTable, ThesisItem
 
 KINDS = {"specular": "photos with significant specularity", "synthetic": "synthetic images"}
@@ -110,7 +112,7 @@ def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int)
     lines: list[tuple[str, ...]] = []
     for label in dict.fromkeys(row.framework for row in rows):
         cells = [
-            format_ratio(paired_ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
+            format_ratio(_ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
             for name in METRICS
         ]
         lines.append(
@@ -119,12 +121,16 @@ def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int)
                 *(["1"] * len(METRICS) if label == SIRFS.label else cells),
             )
         )
-    count = len({row.subject for row in rows})
+    subjects = {row.subject for row in rows}
+    objects = len({object_of_kind(subject) for subject in subjects})
+    count = f"{len(subjects)} subjects"
+    if objects < len(subjects):
+        count += f", which show {objects} objects"
     header = ("framework", *(_NAMES[name].partition(",")[0] for name in METRICS))
     return ItemTable(
         header,
         tuple(lines),
-        f"Errors relative to SIRFS, geometric means (95 %): {words}, {count} subjects",
+        f"Errors relative to SIRFS, geometric means (95 %): {words}, {count}",
     )
 
 
@@ -157,7 +163,7 @@ def _speed(rows: Sequence[FrameworkErrors], seed: int) -> ItemTable:
         seconds, evaluations = _seconds(rows, label), _evaluations(rows, label)
         plain = label == SIRFS.label
         ratios = [
-            "1" if plain else format_ratio(paired_ratio(ours, reference, seed))
+            "1" if plain else format_ratio(_ratio(ours, reference, seed))
             for ours, reference in (
                 (seconds, _seconds(rows, SIRFS.label)),
                 (evaluations, _evaluations(rows, SIRFS.label)),
@@ -185,7 +191,7 @@ def _verdicts(rows: Sequence[FrameworkErrors], seed: int) -> tuple[ClaimVerdict,
         judge_reduction(
             claim,
             share,
-            paired_ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed),
+            _ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed),
             f"error of {_NAMES[name].partition(',')[0]}",
         )
         for claim, name, share in _CLAIMED
@@ -196,12 +202,10 @@ def _time_verdict(rows: Sequence[FrameworkErrors], seed: int) -> ClaimVerdict:
     judged = judge_reduction(
         claims.MDR_TIME,
         0.192,
-        paired_ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed),
+        _ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed),
         "time",
     )
-    found = format_ratio(
-        paired_ratio(_evaluations(rows, _JUDGED), _evaluations(rows, SIRFS.label), seed)
-    )
+    found = format_ratio(_ratio(_evaluations(rows, _JUDGED), _evaluations(rows, SIRFS.label), seed))
     why = f"{judged.why}; " if judged.why else ""
     return ClaimVerdict(
         judged.claim,
@@ -216,6 +220,10 @@ def _with_refusals(rows: Sequence[FrameworkErrors], label: str) -> str:
     count = len({row.subject for row in rows})
     refused = count - len({row.subject for row in rows if row.framework == label})
     return f"{label} (refuses {refused} of {count})" if refused else label
+
+
+def _ratio(ours: dict[str, float], theirs: dict[str, float], seed: int) -> Ratio | None:
+    return paired_ratio(ours, theirs, seed, object_of_kind)
 
 
 def _of(rows: Sequence[FrameworkErrors], label: str, name: str) -> dict[str, float]:

@@ -15,6 +15,7 @@ from isc_core.separation import variants
 
 from ..measuring.context import Context
 from ..measuring.separation_scores import NOTHING, SeparatorSetting
+from ..report.comparing import object_of_kind
 from ..report.item import ItemContent, ThesisItem
 from ..report.layer_tables import (
     DIFFUSE,
@@ -93,9 +94,10 @@ def _speed(context: Context) -> ItemContent:
             whole.setdefault(label, {}).update(
                 {f"{kind} {name}": runs for name, runs in found.items()}
             )
-    return ItemContent(
-        (speed_table(whole, _quickest, context.seed, "SC09, as published"),), text=_SPEED
+    table = speed_table(
+        whole, _quickest, context.seed, "SC09, as published", object_of=object_of_kind
     )
+    return ItemContent((table,), text=_SPEED)
 
 
 def _quickest(label: str) -> str | None:

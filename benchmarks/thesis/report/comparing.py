@@ -1,25 +1,34 @@
 """Comparison of two methods over the same subjects, for table cells and verdicts.
 
 Equation: the ratio of geometric means, exp(mean_k log a_k / b_k), with the percentile interval of
-resampled subjects k; for repeated runs on one subject, the two-sided rank-sum test.
+resampled objects, each with all of its subjects k, since subjects that show the same object are not
+independent; for repeated runs on one subject, the two-sided rank-sum test.
 
 Citation: B. Efron (1979), doi:10.1214/aos/1176344552; H. B. Mann, D. R. Whitney (1947),
 doi:10.1214/aoms/1177730491.
 
-Limits: fewer than two subjects give no interval; few subjects give one that is too narrow.
+Limits: fewer than two objects give no interval; few objects give one that is too narrow.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
+import numpy as np
 from scipy.stats import mannwhitneyu
 
-from isc_core.evaluation.evaluate import Ratio, paired_bootstrap
+from isc_core.evaluation.evaluate import Ratio
 
 from .item import ClaimVerdict, Holds
 
+_RESAMPLES = 10_000
 
-def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> Ratio | None:
+
+def paired_ratio(
+    ours: Mapping[str, float],
+    theirs: Mapping[str, float],
+    seed: int,
+    object_of: Callable[[str], str] = str,
+) -> Ratio | None:
     """Compute the ratio of geometric means over common subjects.
 
     Parameters
@@ -28,18 +37,41 @@ def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: i
         Errors by subject; subjects with an error of 0 are skipped.
     seed : int
         Seed of the bootstrap.
+    object_of : callable, optional
+        Returns the object that a subject shows; by default, each shows another one.
 
     Returns
     -------
     Ratio or None
-        Ratio with its 95 % interval; None for fewer than two subjects.
+        Ratio with its 95 % interval; None for subjects of fewer than two objects.
     """
-    both = [name for name, value in ours.items() if value > 0 and theirs.get(name, 0) > 0]
-    if len(both) < 2:
+    logarithms: dict[str, list[float]] = {}
+    for name, value in ours.items():
+        if value > 0 and (other := theirs.get(name, 0)) > 0:
+            logarithms.setdefault(object_of(name), []).append(math.log(value) - math.log(other))
+    if len(logarithms) < 2:
         return None
-    return paired_bootstrap(
-        [math.log(ours[name]) for name in both], [math.log(theirs[name]) for name in both], seed
-    )
+    sums, counts = (np.array([of(each) for each in logarithms.values()]) for of in (sum, len))
+    drawn = np.random.default_rng(seed).integers(0, len(sums), size=(_RESAMPLES, len(sums)))
+    means = sums[drawn].sum(axis=1) / counts[drawn].sum(axis=1)
+    low, high = np.quantile(means, [0.025, 0.975])
+    return Ratio(*map(math.exp, (sums.sum() / counts.sum(), low, high)))
+
+
+def object_of_kind(subject: str) -> str:
+    """Return the object of a subject that is named by its kind and name.
+
+    Parameters
+    ----------
+    subject : str
+        As in "specular apple".
+
+    Returns
+    -------
+    str
+        As in "apple", which other kinds may show as well.
+    """
+    return subject.partition(" ")[2]
 
 
 def format_ratio(ratio: Ratio | None) -> str:
@@ -103,7 +135,7 @@ def judge_reduction(claim: str, claimed: float, ratio: Ratio | None, what: str) 
         by less; NO if the interval includes 1 but not the claim; UNDETERMINED if it includes both.
     """
     if ratio is None:
-        reason = "fewer than two subjects with an error"
+        reason = "fewer than two objects with an error"
         return ClaimVerdict(claim, "-", Holds.UNDETERMINED, reason)
     change = f"{100 * abs(1 - ratio.ratio):.1f} % {'lower' if ratio.ratio <= 1 else 'higher'}"
     here = f"{what} {change}: ratio {format_ratio(ratio)}"

@@ -187,12 +187,21 @@ def _layer_name(layer: LayerFields) -> str:
     return "diffuse" if layer is DIFFUSE else "specular"
 
 
-def _compared(runs: RunScores, label: str, field: str, reference: Reference, seed: int) -> str:
+def _compared(
+    runs: RunScores,
+    label: str,
+    field: str,
+    reference: Reference,
+    seed: int,
+    object_of: Callable[[str], str] = str,
+) -> str:
     other = reference(label)
     if other is None or other == label:
         return "-"
     return format_ratio(
-        paired_ratio(mean_scores(runs[label], field), mean_scores(runs[other], field), seed)
+        paired_ratio(
+            mean_scores(runs[label], field), mean_scores(runs[other], field), seed, object_of
+        )
     )
 
 
@@ -246,7 +255,13 @@ def subject_table(
 
 
 def speed_table(
-    runs: RunScores, reference: Reference, seed: int, reference_label: str, *, search: bool = True
+    runs: RunScores,
+    reference: Reference,
+    seed: int,
+    reference_label: str,
+    *,
+    search: bool = True,
+    object_of: Callable[[str], str] = str,
 ) -> ItemTable:
     """Summarise run times, one row per setting.
 
@@ -262,6 +277,8 @@ def speed_table(
         Name of the reference in the header.
     search : bool
         Whether to list the time of the threshold search separately, where there is one.
+    object_of : callable, optional
+        Returns the object that a subject shows; by default, each shows another one.
 
     Returns
     -------
@@ -287,7 +304,7 @@ def speed_table(
             format_cell(times_thousand(geometric_or_none(mean_scores(subjects, name).values())))
             for name in names
         ]
-        ratios = (_compared(runs, label, name, reference, seed) for name in names)
+        ratios = (_compared(runs, label, name, reference, seed, object_of) for name in names)
         rows.append(
             (
                 _with_refusals(label, subjects),

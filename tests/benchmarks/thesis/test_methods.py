@@ -29,7 +29,12 @@ from benchmarks.thesis.measuring.separation_scores import (
     SeparatorSetting,
 )
 from benchmarks.thesis.report import layer_tables
-from benchmarks.thesis.report.comparing import judge_reduction, paired_ratio, rank_sum_p
+from benchmarks.thesis.report.comparing import (
+    judge_reduction,
+    object_of_kind,
+    paired_ratio,
+    rank_sum_p,
+)
 from benchmarks.thesis.report.layer_tables import DIFFUSE, SPECULAR
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import InputError
@@ -264,6 +269,25 @@ def test_comparisons_are_paired_and_report_insignificance() -> None:
     assert found == pytest.approx((0.5, 0.5, 0.5))  # the two subjects that both have, not c and d
     assert paired_ratio({"a": 1.0, "b": 0.0}, {"a": 1.0, "b": 1.0}, 0) is None
     assert rank_sum_p([1, 2], [1, 2]) is None
+
+
+def test_subjects_that_show_one_object_count_as_one_draw() -> None:
+    """Two images of every object tell no more than one: the interval does not become narrower."""
+    rng = np.random.default_rng(1)
+    errors = {f"object {k}": float(error) for k, error in enumerate(np.exp(rng.normal(size=6)))}
+    alone = paired_ratio(errors, dict.fromkeys(errors, 1.0), 0)
+    twice = {
+        f"{kind} {name}": errors[name] for kind in ("specular", "synthetic") for name in errors
+    }
+    both = paired_ratio(twice, dict.fromkeys(twice, 1.0), 0, object_of_kind)
+    independent = paired_ratio(twice, dict.fromkeys(twice, 1.0), 0)
+    assert alone is not None and independent is not None and both == pytest.approx(alone)
+    assert independent.high / independent.low < 0.8 * alone.high / alone.low
+    one = {"specular apple": 1.0, "synthetic apple": 2.0}
+    assert paired_ratio(one, one, 0, object_of_kind) is None
+
+
+def test_repeated_runs_are_compared_by_ranks() -> None:
     assert rank_sum_p([2, 2, 2], [2, 2, 2]) == 1
     low, high = [1.0, 1.1, 1.2, 1.3, 1.4], [2.0, 2.1, 2.2, 2.3, 2.4]
     chance = rank_sum_p(low, high)
