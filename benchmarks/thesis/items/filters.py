@@ -2,22 +2,24 @@
 
 Equation: with h_s,f and g_s,f the histograms of filter f on the specular and the diffuse layer of
 subject s, and h_f, g_f their means over the subjects, the distance is the total variation
-1/2 sum |h_f - g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in any
-subject: p is the share of all exchanges (at most 4096 random ones) with no smaller distance.
-Neighbouring pixels are correlated, so that tests that count pixels are far too optimistic;
-subjects are counted. The nine p values are corrected by Holm's rule.
+1/2 sum |h_f - g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in all
+subjects that show the same object: p is the share of all exchanges (at most 4096 random ones) with
+no smaller distance. Neighbouring pixels are correlated, so that tests that count pixels are far too
+optimistic; objects are counted. The nine p values are corrected by Holm's rule.
 
 The area is that under the ROC curve of single pixels of a subject, classified by the histograms of
-the others.
+other objects.
 
 Citation: H. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be
 applied to samples from any populations", Supplement to the Journal of the Royal Statistical Society
 4(1), 119-130 (1937), doi:10.2307/2984124 (exchanges); S. Holm, "A simple sequentially rejective
 multiple test procedure", Scandinavian Journal of Statistics 6(2), 65-70 (1979), which has no DOI.
 
-Limits: n subjects cannot give a p below 2 / 2^n.
+Limits: n objects cannot give a p below 2 / 2^n, nor below 1 / 4096.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -69,7 +71,8 @@ def layer_samples(subjects: list[Subject]) -> list[Sample]:
             one.specular,
             np.zeros_like(one.mask),
         )
-        sample = sample_of(truth, "layers")
+        # `sample_of` shortens names as those of rendered scenes.
+        sample = replace(sample_of(truth, "layers"), subject=truth.name)
         if min(len(sample.of_highlight), len(sample.of_without)) >= _LEAST:
             found.append(sample)
     return found
@@ -115,8 +118,8 @@ def total_variation(pairs: np.ndarray) -> np.ndarray:
     return np.abs(pairs[:, 0].mean(axis=0) - pairs[:, 1].mean(axis=0)).sum(axis=1) / 2
 
 
-def exchange_test(pairs: np.ndarray, seed: int) -> np.ndarray:
-    """Test the distances by exchanging the layers within subjects.
+def exchange_test(pairs: np.ndarray, seed: int, objects: Sequence[str] | None = None) -> np.ndarray:
+    """Test the distances by exchanging the layers of objects.
 
     Parameters
     ----------
@@ -124,22 +127,26 @@ def exchange_test(pairs: np.ndarray, seed: int) -> np.ndarray:
         Histograms by subject and layer.
     seed : int
         Random seed.
+    objects : sequence of str, optional
+        The object of each subject, whose layers are exchanged together; by default, each shows
+        another one.
 
     Returns
     -------
     (F,) ndarray
         p values.
     """
-    count = len(pairs)
+    places = np.unique(range(len(pairs)) if objects is None else objects, return_inverse=True)[1]
+    count = int(places.max()) + 1
     if 2**count <= _EXCHANGES:
         flips = (np.arange(2**count)[:, None] >> np.arange(count)) & 1
     else:
         flips = np.random.default_rng(seed).integers(0, 2, (_EXCHANGES, count))
         flips[0] = 0  # what was seen is one of them
     difference = pairs[:, 0] - pairs[:, 1]
-    sign = 1 - 2.0 * flips
+    sign = 1 - 2.0 * flips[:, places]
     seen = total_variation(pairs)
-    exchanged = np.abs(np.einsum("es,sfb->efb", sign, difference)).sum(axis=2) / (2 * count)
+    exchanged = np.abs(np.einsum("es,sfb->efb", sign, difference)).sum(axis=2) / (2 * len(pairs))
     return np.asarray((exchanged >= seen - 1e-12).mean(axis=0))
 
 
@@ -164,7 +171,7 @@ def holm_correction(p: np.ndarray) -> np.ndarray:
 
 
 def left_out_area(samples: list[Sample]) -> float:
-    """Classify single pixels of each subject by the histograms of the others.
+    """Classify single pixels of each subject by the histograms of other objects.
 
     Parameters
     ----------
@@ -177,27 +184,33 @@ def left_out_area(samples: list[Sample]) -> float:
         Mean area under the ROC curve.
     """
     areas = []
-    for number, one in enumerate(samples):
-        table = fitted([other for k, other in enumerate(samples) if k != number])
+    for one in samples:
+        table = fitted([other for other in samples if _object_of(other) != _object_of(one)])
         areas.append(area(table.evidence(one.of_highlight), table.evidence(one.of_without)))
     return float(np.mean(areas))
+
+
+def _object_of(sample: Sample) -> str:
+    """Return the object of a sample, which is named by `subject_title`."""
+    return sample.subject.rpartition(" (")[0]
 
 
 def _filters(context: Context) -> ItemContent:
     samples = layer_samples(
         subjects_with_highlights([*context.subjects("specular"), *context.subjects("synthetic")])
     )
-    if len(samples) < 2:
+    objects = [_object_of(sample) for sample in samples]
+    count = len(set(objects))
+    if count < 2:
         return ItemContent(
             text=(
-                "Fewer than two subjects have enough pixels of both layers: nothing can be "
-                "compared."
+                "Fewer than two objects have enough pixels of both layers: nothing can be compared."
             )
         )
     spread = fitted(samples).spread
     pairs = np.stack([layer_histograms(sample, spread) for sample in samples])
 
-    p = exchange_test(pairs, context.seed)
+    p = exchange_test(pairs, context.seed, objects)
     columns = zip(FILTERS, total_variation(pairs), p, holm_correction(p), strict=True)
     cells = tuple(
         (kind, 100 * width, float(distance), float(one), float(raised))
@@ -207,11 +220,11 @@ def _filters(context: Context) -> ItemContent:
     names = ", ".join(sample.subject for sample in samples)
     nearest, furthest = min(cell[2] for cell in cells), max(cell[2] for cell in cells)
     text = (
-        f"{len(samples)} subjects: {names}. Of the specular layers, only pixels with at "
-        f"least a quarter of the light count. Distances are {nearest:.2f} to "
-        f"{furthest:.2f} of at most 1; with so many subjects, p cannot be below "
-        f"{2 / 2 ** len(samples):.2g}. Single pixels of a subject, classified by the "
-        "histograms of the others, reach an area under the ROC curve of "
+        f"{len(samples)} subjects, which show {count} objects: {names}. Of the specular "
+        "layers, only pixels with at least a quarter of the light count. Distances are "
+        f"{nearest:.2f} to {furthest:.2f} of at most 1; with so many objects, p cannot be below "
+        f"{max(2 / 2**count, 1 / _EXCHANGES):.2g}. Single pixels of a subject, classified by the "
+        "histograms of other objects, reach an area under the ROC curve of "
         f"{left_out_area(samples):.2f} (.5 is chance, 1 is perfect). A photo contains "
         "only the sum of the layers; docs/methods/filter_statistics.md measures what "
         "remains of the difference. Widths are shares of the object's diagonal."

@@ -256,7 +256,17 @@ def test_chance_is_distinguished_from_a_difference() -> None:
     assert (filters.exchange_test(many, 0) <= 4 / 4096).all(), (
         "beyond twelve subjects exchanges are drawn at random"
     )
+    named = [f"object {number % 8}" for number in range(16)]
+    assert filters.exchange_test(many, 0, named) == pytest.approx(2 / 2**8), (
+        "two images of an object tell no more than one"
+    )
     assert np.allclose(filters.holm_correction(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
+
+
+def test_samples_keep_the_names_of_their_objects() -> None:
+    named = [known_ball(name) for name in ("cup_a", "cup_b")]
+    samples = filters.layer_samples(named)
+    assert [filters._object_of(sample) for sample in samples] == ["cup_a", "cup_b"]
 
 
 @pytest.mark.slow
