@@ -38,7 +38,7 @@ from ..drawing.panels import Panel, normals_panel, panel_figure
 from ..drawing.style import LETTERS, OKABE_ITO, exposure, figure, image_sheet
 from ..images.subject import Subject
 from ..measuring.context import Context
-from ..measuring.decompositions import decompose_subject
+from ..measuring.decompositions import decompose_subject, illumination_of
 from ..measuring.specular_free_images import (
     DARK,
     KINDS,
@@ -343,7 +343,7 @@ def _intrinsic(context: Context) -> ItemContent:
     table = ItemTable(
         ("intrinsic image", "RMS error after the best scale (% of its RMS)"),
         cells,
-        f"{subject.name}: estimated by `--model mdr`.",
+        f"{subject.name}: estimated by `--model mdr --illumination {illumination_of(subject)}`.",
     )
     text = (
         "image = reflectance × shading + specular. Top: ground truth; bottom: "

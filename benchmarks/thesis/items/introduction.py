@@ -26,7 +26,7 @@ from isc_core.shading.lights import toward
 from ..drawing.panels import COLOURS, Panel, characteristic_panels, panel_figure
 from ..images.subject import Subject
 from ..measuring.context import Context, JsonRow
-from ..measuring.decompositions import decompose_subject
+from ..measuring.decompositions import decompose_subject, illumination_of
 from ..report.item import ItemContent, ItemTable, ThesisItem
 
 LIGHT = toward(-0.4, 0.5, 1.0)
@@ -291,8 +291,8 @@ def _characteristics(kind: str, context: Context) -> ItemContent:
     )
     text = (
         f"{subject.name}, the first subject of its kind, by `isc decompose --model "
-        f"mdr`: {100 * share:.1f} % of its light was estimated as specular; {state}. "
-        f"{COLOURS}"
+        f"mdr --illumination {illumination_of(subject)}`: {100 * share:.1f} % of its "
+        f"light was estimated as specular; {state}. {COLOURS}"
     )
     return ItemContent((table,), (panel_figure(characteristic_panels(d), 4),), text)
 

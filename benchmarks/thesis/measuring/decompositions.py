@@ -7,6 +7,7 @@ clipped.
 import numpy as np
 
 from isc_core.decomposition.pipeline import Settings, decompose
+from isc_core.decomposition.settings import Illumination
 from isc_core.photo import FLOAT_STEP, Photo, PhotoSource
 from isc_core.result_files.result_folder import load, save
 from isc_core.scene.decomposition import Decomposition
@@ -41,6 +42,22 @@ def subject_as_photo(subject: Subject) -> Photo:
     )
 
 
+def illumination_of(subject: Subject) -> str:
+    """Return the light prior of a subject: that of its ground truth, or the default of photos.
+
+    Parameters
+    ----------
+    subject : Subject
+        The subject.
+
+    Returns
+    -------
+    str
+        A value of `--illumination`.
+    """
+    return str(Illumination.PHOTO if subject.truth is None else subject.truth.illumination)
+
+
 def decompose_subject(
     context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None
 ) -> Decomposition:
@@ -55,7 +72,7 @@ def decompose_subject(
     model : str
         One of `pipeline.MODELS`.
     illumination : str, optional
-        Light prior; by default that of the subject's ground truth, or "natural".
+        Light prior; by default `illumination_of` the subject.
 
     Returns
     -------
@@ -69,7 +86,7 @@ def decompose_subject(
     Cancelled
         If the user cancels.
     """
-    lit = illumination or ("natural" if subject.truth is None else subject.truth.illumination)
+    lit = illumination or illumination_of(subject)
     folder = (
         context.output
         / WORK

@@ -25,11 +25,14 @@ from benchmarks.thesis.items import (
     framework,
     introduction,
 )
+from benchmarks.thesis.measuring import decompositions
 from benchmarks.thesis.measuring.context import Context
 from benchmarks.thesis.measuring.specular_free_images import KINDS, PHOTO, residual_highlight
 from benchmarks.thesis.report.item import ItemContent, ThesisItem
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject
+from isc_core.decomposition.pipeline import Settings
 from isc_core.evaluation.metrics import truth_normal
+from isc_core.photo import Photo
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.diagnostics import LobeFitOutcome
 from isc_core.scene.lobe_fit import LobeFit
@@ -261,6 +264,24 @@ def test_chance_is_distinguished_from_a_difference() -> None:
         "two images of an object tell no more than one"
     )
     assert np.allclose(filters.holm_correction(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
+
+
+def test_photos_are_decomposed_as_isc_decompose_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    used: list[Settings] = []
+
+    def answer(photo: Photo, settings: Settings, **also: object) -> Decomposition:
+        del photo, also
+        used.append(settings)
+        return ball()
+
+    monkeypatch.setattr(decompositions, "decompose", answer)
+    known = known_ball()
+    for subject in (replace(known, kind="photo", truth=None), known):
+        decompositions.decompose_subject(Context(tmp_path), subject)
+    assert [each.illumination for each in used] == [Settings().illumination, "natural"]
+    assert decompositions.illumination_of(known) == "natural"
 
 
 def test_samples_keep_the_names_of_their_objects() -> None:
