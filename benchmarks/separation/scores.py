@@ -5,6 +5,7 @@ import hashlib
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,8 @@ from isc_core.scene.decomposition import Separation
 
 # Methods that use the file of another method.
 _BUILT_ON = {"isc": ("sparse_coding",)}
+# Packages of the library that methods use.
+_SHARED = ("filters", "imaging", "inpainting", "networks", "numerics", "thresholding")
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,8 @@ def source_code(method: str) -> str:
     Returns
     -------
     str
-        Eight digits that change with the method's file or package and with any shared file.
+        Eight digits that change with the method's file or package, with any shared file, and with
+        the weights of the networks.
     """
     folder = Path(separation.__file__).parent
     others = set(separation.METHODS) - {method, *_BUILT_ON.get(method, ())}
@@ -154,8 +158,19 @@ def source_code(method: str) -> str:
         for path in sorted(folder.rglob("*.py"))
         if others.isdisjoint(path.relative_to(folder).with_suffix("").parts)
     ]
-    files += sorted((folder.parent / "inpainting").glob("*.py"))
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:8]
+    own = b"".join(path.read_bytes() for path in files)
+    return hashlib.sha256(own + _shared_code(folder.parent)).hexdigest()[:8]
+
+
+@cache
+def _shared_code(library: Path) -> bytes:
+    """Hash the packages that methods use, and the weights of the networks."""
+    found = hashlib.sha256()
+    for package in _SHARED:
+        for path in sorted((library / package).rglob("*")):
+            if path.suffix in (".py", ".npz"):
+                found.update(path.read_bytes())
+    return found.digest()
 
 
 def read_rows(path: Path) -> dict[tuple[str, str, str, str], SeparationRow]:

@@ -183,3 +183,13 @@ def test_a_run_is_taken_up_where_it_was_left(
 def test_the_source_of_every_method_has_its_mark() -> None:
     marks = [scores.source_code(method) for method in separation.METHODS]
     assert len(set(marks)) == len(marks) and all(len(mark) == 8 for mark in marks)
+
+
+@pytest.mark.parametrize("file", ["thresholding/otsu.py", "networks/data/weights.npz"])
+def test_a_change_of_what_methods_use_changes_the_mark(tmp_path: Path, file: str) -> None:
+    (tmp_path / file).parent.mkdir(parents=True)
+    (tmp_path / file).write_text("before")
+    before = scores._shared_code(tmp_path)
+    (tmp_path / file).write_text("after")
+    scores._shared_code.cache_clear()
+    assert scores._shared_code(tmp_path) != before
