@@ -52,7 +52,8 @@ from .leave_one_out import METRICS, without
 from .mit_berkeley import LIGHTS, write_json
 from .ways import Predictions, with_way
 
-WAYS = "-:-:-,.2:-:-,-:.2:-,-:-:4,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
+_NONE = "-:-:-"  # what all ways are compared with
+WAYS = f"{_NONE},.2:-:-,-:.2:-,-:-:4,.2:.2:4,.5:.5:1,1:1:1,1:3:1"
 _CORRELATED = 15.0  # pixels: standard deviation of the filter that makes errors smooth
 
 
@@ -251,8 +252,8 @@ def jobs(given: argparse.Namespace) -> list[Job]:
                 given.solve_as,
             )
             for illumination in given.lights.split(",")
-            for way in given.ways.split(",")
-            for number in range(given.noises if way != "-:-:-" else 1)
+            for way in dict.fromkeys((_NONE, *given.ways.split(",")))
+            for number in range(given.noises if way != _NONE else 1)
         ]
     return made
 
@@ -263,13 +264,14 @@ def report(found: dict[tuple[str, str], dict[str, list[list[float]]]]) -> None:
     Parameters
     ----------
     found : dict of (str, str) to dict
-        By illumination and way, the errors and evaluations of each object's noises.
+        By illumination and way, the errors and evaluations of each object's noises; no prediction
+        is among the ways.
     """
     heads = "light", "way", "N", "S", "R", "L", "avg (95 %; largest)", "evaluations"
     print("\n| " + " | ".join(heads) + " |\n" + "|---" * len(heads) + "|")
     for (illumination, way), objects in found.items():
         logs = {name: np.log(rows).mean(axis=0) for name, rows in objects.items()}
-        base = found.get((illumination, "-:-:-"), objects)
+        base = found[illumination, _NONE]
         none = {name: np.log(base[name]).mean(axis=0) for name in objects}
         gain = np.array([logs[name] - none[name] for name in logs])
         ratio, averages = np.exp(gain.mean(axis=0)), gain[:, : len(METRICS)].mean(axis=1)
@@ -290,7 +292,9 @@ def main() -> None:
     options.add_argument("--weights", type=Path, help="archive of a scene network")
     options.add_argument("--lights", default=",".join(LIGHTS), help="default: %(default)s")
     options.add_argument("--solve-as", choices=ILLUMINATIONS, help="default: as what it is")
-    options.add_argument("--ways", default=WAYS, help="comma-separated, see above")
+    options.add_argument(
+        "--ways", default=WAYS, help="comma-separated, see above; no prediction is added"
+    )
     options.add_argument("--noises", type=int, default=1, help="noises per object and light")
     options.add_argument("--degrees", type=float, default=18.0, help="of normals")
     options.add_argument("--shading", type=float, default=0.15, help="of log shading")

@@ -258,7 +258,7 @@ def report(found: Sequence[StartResult], ways: Sequence[Starts]) -> None:
         ]
         print(
             f"| {_start_text(starts)} | {' | '.join(cells)} "
-            f"| {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |"
+            f"| {_standard_error(ratios[:, -1], [case for case, _, _ in cases])} |"
         )
     for (case, other, rounding), by in cases.items():
         best = min(one.average for one in by.values())
@@ -271,6 +271,13 @@ def report(found: Sequence[StartResult], ways: Sequence[Starts]) -> None:
                 f"{Path(case).name}{f' under the light of {other}' if other else ''}, "
                 f"rounding {rounding}: " + ", ".join(each)
             )
+
+
+def _standard_error(ratios: np.ndarray, objects: Sequence[str]) -> str:
+    """Format the standard error of the mean over objects: lights and roundings of one are alike."""
+    places = np.unique(objects, return_inverse=True)[1]
+    means = np.bincount(places, ratios) / np.bincount(places)
+    return f"{means.std(ddof=1) / np.sqrt(len(means)):.3f}" if len(means) > 1 else "-"
 
 
 def main() -> None:
