@@ -149,4 +149,6 @@ def judge_reduction(claim: str, claimed: float, ratio: Ratio | None, what: str) 
         return ClaimVerdict(claim, here, Holds.NO, "not lower at all")
     if 1 - ratio.ratio >= claimed:
         return ClaimVerdict(claim, here, Holds.YES)
-    return ClaimVerdict(claim, here, Holds.PARTLY, "lower, but by less than claimed")
+    within = "; the interval includes the claim" if ratio.low <= 1 - claimed else ""
+    reason = f"lower, but by less than claimed{within}"
+    return ClaimVerdict(claim, here, Holds.PARTLY, reason)

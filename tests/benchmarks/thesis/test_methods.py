@@ -251,6 +251,7 @@ def test_a_method_that_refuses_hard_subjects_is_marked_in_every_summary(
     [
         (Ratio(0.80, 0.7, 0.9), "yes"),
         (Ratio(0.95, 0.93, 0.97), "partly"),
+        (Ratio(0.93, 0.88, 0.98), "partly"),
         (Ratio(0.99, 0.95, 1.03), "no"),
         (Ratio(1.2, 1.1, 1.3), "no"),
         (Ratio(0.8, 0.6, 1.1), "undetermined"),
@@ -260,7 +261,12 @@ def test_a_method_that_refuses_hard_subjects_is_marked_in_every_summary(
 def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(
     found: Ratio | None, holds: str
 ) -> None:
-    assert judge_reduction("ten per cent less", 0.1, found, "error").holds == holds
+    verdict = judge_reduction("ten per cent less", 0.1, found, "error")
+    assert verdict.holds == holds
+    if found == Ratio(0.95, 0.93, 0.97):
+        assert "interval" not in verdict.why
+    if found == Ratio(0.93, 0.88, 0.98):
+        assert "the interval includes the claim" in verdict.why
 
 
 def test_comparisons_are_paired_and_report_insignificance() -> None:
