@@ -28,6 +28,7 @@ from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.masking.finder import MaskSearch
 from isc_core.photo import WholeFrame, read_photo
 from isc_core.progress import Monitor
 
@@ -296,14 +297,11 @@ def _without_highlights(subject: Subject) -> Subject:
 
 
 def _photo(path: Path, name: str) -> Subject:
-    photo = read_photo(
-        path,
-        None,
-        "auto",
-        whole_frame=WholeFrame.WITHOUT_MASK
-        if path.parent.name == "highlight"
-        else WholeFrame.NEVER,
-    )
+    """Read a photo: of the highlight set whole, others with a mask as in `isc decompose`."""
+    if path.parent.name == "highlight":
+        photo = read_photo(path, whole_frame=WholeFrame.WITHOUT_MASK)
+    else:
+        photo = read_photo(path, finder=MaskSearch())
     rows, columns = mask_slices(photo.mask)
     part = (
         slice(max(rows.start - 4, 0), rows.stop + 4),

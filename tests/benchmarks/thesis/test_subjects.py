@@ -19,6 +19,8 @@ from benchmarks.thesis.measuring.context import Context
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.metrics import Scores, score, truth_normal
+from isc_core.masking.finder import MaskSearch
+from isc_core.photo.found_mask import FoundMask
 from isc_core.progress import Monitor
 from isc_core.shading.spherical_harmonics import light_from_reference
 
@@ -197,6 +199,25 @@ def test_photos_of_one_stem_have_different_names(tmp_path: Path) -> None:
     data = photo_folder(tmp_path, {"cup.png": 100, "cup.bmp": 200, "hat.png": 150})
     photos = SubjectLibrary(tmp_path / "cache", data, False, 0).photos(Monitor())
     assert [photo.name for photo in photos] == ["photos-cup.bmp", "photos-cup.png", "hat"]
+
+
+def test_the_mask_of_a_photo_is_found_as_by_isc_decompose(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "photos").mkdir()
+    picture = np.full((40, 40, 3), 200, np.uint8)
+    picture[10:30, 10:30] = np.arange(20, 220, 10, np.uint8)[:, None, None] // 2
+    cv2.imwrite(str(tmp_path / "photos" / "box.png"), picture)
+    mask = np.zeros((40, 40), bool)
+    mask[10:30, 10:30] = True
+
+    def found(search: MaskSearch, name: str, light: np.ndarray) -> FoundMask:
+        del search, name, light
+        return FoundMask(mask.astype(np.float32), 0.9, np.array([0.0, 1.0, 0.0]), np.zeros(0))
+
+    monkeypatch.setattr(MaskSearch, "__call__", found)
+    (photo,) = SubjectLibrary(tmp_path / "cache", tmp_path, False, 0).photos(Monitor())
+    assert photo.mask.sum() == 400 and photo.mask.shape == (28, 28)
 
 
 def test_a_folder_without_known_data_is_refused(tmp_path: Path) -> None:
