@@ -306,7 +306,7 @@ def _masks(kind: str, context: Context) -> ItemContent:
     text = (
         "Orange: the pixels above the highest of three thresholds of the smallest "
         "channel, for each search; in the last column, those whose true specular layer "
-        "has at least a tenth of its maximum."
+        "is above a tenth of its 99.9th percentile."
     )
     return ItemContent(
         (table,), (image_sheet(("photo", *names, "true highlights"), rows, expose=False),), text

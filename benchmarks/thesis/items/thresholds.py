@@ -50,7 +50,7 @@ _MARKS = ("o", "s", "D", "^")
 
 
 def exhaustive_search(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
-    """Find the best three thresholds among all 2.7 million sets.
+    """Find the best three thresholds among all 2.8 million sets.
 
     Parameters
     ----------
