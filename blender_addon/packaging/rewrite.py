@@ -42,6 +42,8 @@ LIGHT_MODULES = frozenset(
         "isc_core.result_files.diagnostics_json",
         "isc_core.result_files.diagnostics_text",
         "isc_core.result_files.exports.targets",
+        "isc_core.result_files.mesh.options",
+        "isc_core.result_files.mesh.rim_heights",
         "isc_core.result_files.object_folders",
         "isc_core.result_files.reading_notes_text",
         "isc_core.result_files.solids.back",

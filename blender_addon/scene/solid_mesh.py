@@ -5,10 +5,16 @@ The confidence is 0 on the rim and on the back.
 
 import numpy as np
 
+from isc_core.result_files.mesh.options import MeshOptions
+from isc_core.result_files.mesh.rim_heights import limit_rim
 from isc_core.result_files.solids.back import Back
 from isc_core.result_files.solids.rim import Rim
-from isc_core.result_files.solids.solid_mesh import continued
-from isc_core.result_files.solids.surface import Solid, before_camera, make_solid
+from isc_core.result_files.solids.surface import (
+    Solid,
+    before_camera,
+    make_solid,
+    view_heights,
+)
 from isc_core.shading.perspective import view_directions
 
 from ..datablocks.mesh import MeshGeometry, metres_per_pixel, to_blender
@@ -73,16 +79,20 @@ def _solid(result: ResultArrays, back: str, triangles: int) -> Solid:
 def _heights(result: ResultArrays) -> np.ndarray:
     """(H, W): pixels toward the viewer from the mesh's origin, inside the mask.
 
-    At a vertex of the result's mesh this is its height, whose spikes at the rim are limited.
+    At a vertex of the result's mesh this is its height. That mesh may have fewer vertices than
+    pixels: the others are lifted alike.
     """
-    rows, columns = result.vertex_pixel.T
-    found = np.zeros(result.mask.shape)
-    found[rows, columns] = result.vertices[:, 2] / result.metres_per_pixel
-    known = np.zeros_like(result.mask)
-    known[rows, columns] = True
+    limited = limit_rim(result.height, result.mask, MeshOptions().rim)
     if result.eye is None:
-        return np.where(known, found, result.height - result.origin[2])
-    return continued(found, known, result.mask)
+        return limited - result.origin[2]
+    seen = view_heights(limited, result.mask, result.camera)
+    # The unit of the result's mesh is a pixel at the mean distance of its own vertices.
+    rows, columns = result.vertex_pixel.T
+    eye, vertices = (
+        axis[..., 2] / result.metres_per_pixel for axis in (result.eye, result.vertices)
+    )
+    scale = (eye - vertices.mean()) / -seen[rows, columns].mean()
+    return np.asarray(eye + scale * seen)
 
 
 def _placed(result: ResultArrays, solid: Solid) -> np.ndarray:

@@ -11,8 +11,10 @@ from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.photo.camera import Camera
 from isc_core.result_files.arrays_file import mesh_of, write_arrays
+from isc_core.result_files.mesh.options import MeshOptions
 from isc_core.result_files.result_folder import save
 from isc_core.scene.part_of_result import ResultPart
+from isc_core.shading.perspective import lifted_points, object_axis
 from tests.addon.scene_render import render
 from tests.core.perspective_scene import CAMERA, bump_before_camera
 
@@ -94,6 +96,36 @@ def test_a_closed_back_is_hidden_by_the_front(blender: Any, result: ResultArrays
     assert np.abs(seen[count:] - seen[:count]).max() < 0.01
     assert np.ptp(vertices[count:, 1]) < 1e-5
     assert vertices[count:, 1].min() > vertices[:count, 1].max()
+
+
+def test_every_pixel_has_its_height_if_the_mesh_of_the_result_has_fewer_vertices(
+    blender: Any, tmp_path: Path
+) -> None:
+    """As the mesh of an object of more than 50,000 pixels has."""
+    d, few = bump_before_camera(), MeshOptions(triangles=200)
+    save(d, tmp_path / "bump", arrays=True, mesh=few)
+    result = read_result(tmp_path / "bump")
+    camera, inner = result.camera, _eroded(result.mask)
+    assert camera is not None
+    points = lifted_points(result.height, camera, object_axis(camera, result.mask))
+    built = build(result, back="open", triangles=0)
+    seen = evaluated_vertices(built) - np.array(built.camera.matrix_world.translation)
+    pixels = np.rint(seen_pixels(built, evaluated_vertices(built))).astype(int)
+    row, column = pixels[inner[tuple(pixels.T)]].T
+    assert len(row) == inner.sum() > 2 * len(result.vertices)
+    found, expected = seen[inner[tuple(pixels.T)], 1], -points[row, column, 2]
+    ratio = found / expected
+    np.testing.assert_allclose(ratio, ratio.mean(), rtol=1e-5)
+
+
+def _eroded(mask: np.ndarray) -> np.ndarray:
+    """Without the rings whose heights the mesh limits."""
+    for _ in range(3):
+        mask = np.pad(mask, 1)
+        mask = np.logical_and.reduce(
+            [mask[i : i - 2 or None, j : j - 2 or None] for i in range(3) for j in range(3)]
+        )
+    return mask
 
 
 def test_the_other_type_of_camera_replaces_the_first(
