@@ -18,7 +18,7 @@ from .operators.result import scene_before
 from .runs.active_run import active_run
 from .runs.messages import NOTE, is_about_mask
 from .runs.worker_run import RunState
-from .scene.built_object import BuiltObject, find_built
+from .scene.built_object import BuiltObject, find_built, light_owner
 from .scene.collection import LIGHT_AND_CAMERA, find_layer_collection
 from .scene.copies import has_other_material, objects_sharing_material
 from .settings.usage import unused_reason
@@ -183,6 +183,7 @@ class _Edit(_Panel):
         self.layout.operator("isc.export_textures", icon="TEXTURE")
 
     def _draw_light(self, context: Any, built: BuiltObject) -> None:
+        built = light_owner(built)
         column = self.layout.column(align=True)
         column.label(text="Light", icon="LIGHT_SUN")
         for light, text in (("OPTIMAL", "Estimated Sun"), ("CHOSEN", "Sun from the Side")):

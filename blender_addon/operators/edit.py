@@ -19,7 +19,7 @@ from ..materials.edit_nodes import dichromatic_node
 from ..materials.material import set_specular_gain
 from ..materials.photo_highlights import can_show_highlights, hide_highlights, show_highlights
 from ..runs.messages import sentence
-from ..scene.built_object import BuiltObject, find_built, selection_problem
+from ..scene.built_object import BuiltObject, find_built, light_owner, selection_problem
 from ..scene.copies import find_material, has_other_material, make_material_single_user
 from ..scene.sun import ensure_sun, hide_lamps, relight, sun_collection
 from ..scene.world import set_sun_mix
@@ -382,13 +382,15 @@ class ISC_OT_relight(EditOperator, bpy.types.Operator):
         Parameters
         ----------
         built : BuiltObject
-            The active object and what belongs to it.
+            The active object and what belongs to it; of several objects of a photo, the light is
+            that of the largest one.
 
         Raises
         ------
         InputError
             If the object does not store its light, or the direction is zero.
         """
+        built = light_owner(built)
         obj = built.object
         if self.light == "RECOVERED":
             relight(obj, False, built.scene)

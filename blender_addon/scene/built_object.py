@@ -4,9 +4,12 @@ from dataclasses import dataclass
 
 import bpy
 
-from ..datablocks.provenance import KEY, ROLE, find_tagged, is_isc_datablock
+from ..datablocks.provenance import KEY, PHOTO_HASH, ROLE, find_tagged, is_isc_datablock
+from .collection import is_in_scene
 from .copies import COPY, OBJECT, find_material
 from .world import world_of
+
+LIGHT_OF = "isc_light_of"  # of an object: the key of the object of its photo that has the light
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,29 @@ def scene_of(obj: bpy.types.Object) -> bpy.types.Scene | None:
     if bpy.context.scene in scenes:
         return bpy.context.scene
     return find_tagged(bpy.data.scenes, obj[KEY], "scene") or next(iter(scenes), None)
+
+
+def light_owner(built: BuiltObject) -> BuiltObject:
+    """Return the object whose light shines on an object.
+
+    Parameters
+    ----------
+    built : BuiltObject
+        An object of ISC.
+
+    Returns
+    -------
+    BuiltObject
+        Of several objects of a photo the largest one, if it is in the same scene; otherwise the
+        object itself.
+    """
+    obj = built.object
+    owner = find_tagged(bpy.data.objects, obj.get(LIGHT_OF, ""), OBJECT)
+    if owner is None or built.scene is None or not is_in_scene(owner, built.scene):
+        return built
+    if owner.get(PHOTO_HASH) != obj.get(PHOTO_HASH):  # of a file to which this one was appended
+        return built
+    return find_built(owner) or built
 
 
 def selection_problem(obj: bpy.types.Object | None) -> str:

@@ -30,7 +30,7 @@ from isc_core.shading.spherical_harmonics import real_sh
 from ..datablocks.provenance import KEY, datablock_name
 from ..files.result_arrays import ResultArrays
 from .build import StagedObject, key_of, place_object, require_placeable, stage_object
-from .built_object import BuiltObject
+from .built_object import LIGHT_OF, BuiltObject
 from .camera import eye_of
 from .placement import world_matrix
 from .preparation import BuildOptions, PreparedObject, prepare
@@ -195,6 +195,8 @@ def place_objects(
         for one in others:
             beside = place @ Matrix.Translation(one.prepared.offset)
             built.append(place_object(one, scene=built[0].scene, photo=photo, matrix=beside))
+            built[-1].object[LIGHT_OF] = built[0].object[KEY]
+        built[0].object.pop(LIGHT_OF, None)  # it was not the largest one before an update
         options = first.prepared.options
         if options.each and options.own_scene:
             _name_scene(built[0])

@@ -20,10 +20,11 @@ from blender_addon.operators import decompose as operators  # noqa: E402
 from blender_addon.operators import result  # noqa: E402
 from blender_addon.operators.modal import advance_run  # noqa: E402
 from blender_addon.runs.active_run import begin_run  # noqa: E402
-from blender_addon.runs.request import request_from_settings  # noqa: E402
+from blender_addon.runs.request import DecomposeRequest, request_from_settings  # noqa: E402
 from blender_addon.scene.built_object import find_built  # noqa: E402
 from blender_addon.scene.objects import place_objects, prepare_objects, stage_objects  # noqa: E402
 from blender_addon.scene.preparation import BuildOptions  # noqa: E402
+from blender_addon.scene.world import sun_mix  # noqa: E402
 from isc_core.result_files.object_folders import object_folders  # noqa: E402
 from isc_core.result_files.result_folder import save  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
@@ -325,3 +326,36 @@ def test_staging_does_not_need_the_photo_again(blender: Any, tmp_path: Path) -> 
     built = place_objects(run_to_end(steps), photo=again)
     assert [one.object.name for one in built] == ["pair 1", "pair 2"]
     assert [one.object.data.get("mine") for one in built] == [1, 1]
+
+
+@pytest.mark.parametrize("light", ["OPTIMAL", "CHOSEN"])
+def test_the_light_of_each_object_is_that_of_the_photo(
+    addon: Any, tmp_path: Path, light: str
+) -> None:
+    """One sun replaces the recovered light, whichever object is active."""
+    options = BuildOptions(name="pair", each=True)
+    prepared = prepare_objects(several_results(tmp_path), options)
+    largest, other = place_objects(run_to_end(stage_objects(prepared)))
+    addon.context.window.scene = largest.scene
+    for one in (other, largest, other):
+        addon.context.view_layer.objects.active = one.object
+        assert addon.ops.isc.relight(light=light) == {"FINISHED"}
+        suns = [obj.name for obj in largest.scene.objects if obj.type == "LIGHT"]
+        assert suns == [f"{largest.object.name} sun"]
+        mix = sun_mix(largest.scene.world)
+        assert mix is not None and mix.sun
+    assert addon.ops.isc.relight(light="RECOVERED") == {"FINISHED"}
+    assert not [obj for obj in largest.scene.objects if obj.type == "LIGHT"]
+    mix = sun_mix(largest.scene.world)
+    assert mix is not None and not mix.sun
+
+
+def test_the_active_object_stays_active_when_all_are_updated(addon: Any, tmp_path: Path) -> None:
+    several_results(tmp_path)
+    request = DecomposeRequest(build=BuildOptions(name="pair", each=True, own_scene=False))
+    addon.ops.isc.build_result(directory=str(tmp_path), request=request.to_json())
+    assert addon.context.object.name == "pair 1"
+    assert {one.name for one in addon.context.selected_objects} == {"pair 1", "pair 2"}
+    addon.context.view_layer.objects.active = addon.data.objects["pair 2"]
+    addon.ops.isc.build_result(directory=str(tmp_path), request=request.to_json())
+    assert addon.context.object.name == "pair 2"
