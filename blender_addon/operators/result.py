@@ -152,6 +152,7 @@ class ISC_OT_build_result(bpy.types.Operator):
             )
             scene = find_by_full_name(bpy.data.scenes, request.scene) or context.scene
             photo = find_by_full_name(bpy.data.images, request.image)
+            active = context.object
             staged = _staged.get(self.directory)
             if staged is None:
                 prepared = read_and_prepare(
@@ -164,7 +165,8 @@ class ISC_OT_build_result(bpy.types.Operator):
             return {"CANCELLED"}
         for one in built:
             _store_settings(one, request, scene)
-        activate(context, *built)
+        # Of several objects that are updated, the active one stays so.
+        activate(context, *sorted(built, key=lambda one: one.object != active))
         return {"FINISHED"}
 
 
